@@ -1,0 +1,131 @@
+//! Composes the WGSL kernels from `shaders/*.wesl` (WESL imports), validates each with naga, and writes the shader
+//! table that `src/gpu/shaders.rs` includes: text, workgroup size and bindings by name.
+
+use std::{env, fmt::Write, fs, path::Path};
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+fn main() {
+    println!("cargo::rerun-if-changed=shaders");
+    println!("cargo::rerun-if-changed=build.rs");
+    let mut stems: Vec<String> = fs::read_dir("shaders")
+        .expect("shaders/ lies beside build.rs")
+        .map(|entry| entry.expect("shaders/ can be listed").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "wesl"))
+        .map(|path| path.file_stem().expect("a file has a stem").to_string_lossy().into_owned())
+        .collect();
+    stems.sort();
+    let mut table = String::from("[\n");
+    for stem in &stems {
+        table += &shader_entry(stem, &compose(stem));
+    }
+    table += "]\n";
+    let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
+    fs::write(Path::new(&out).join("shader_table.rs"), table).expect("OUT_DIR can be written");
+}
+
+/// The kernel with everything it imports, names as written.
+fn compose(stem: &str) -> String {
+    let mut compiler = wesl::Wesl::new("shaders");
+    compiler.set_mangler(wesl::ManglerKind::None).use_sourcemap(true);
+    let root = format!("package::{stem}").parse().expect("a file stem is a module name");
+    match compiler.compile(&root) {
+        Ok(composed) => composed.to_string(),
+        Err(error) => fail(&format!("shaders/{stem}.wesl: {error}")),
+    }
+}
+
+/// One line of the shader table; stops the build where naga finds the kernel invalid.
+fn shader_entry(stem: &str, wgsl: &str) -> String {
+    let module = naga::front::wgsl::parse_str(wgsl)
+        .unwrap_or_else(|e| fail_at(stem, wgsl, e.location(wgsl), &e.emit_to_string(wgsl)));
+    let info = Validator::new(ValidationFlags::all(), Capabilities::all())
+        .validate(&module)
+        .unwrap_or_else(|e| fail_at(stem, wgsl, e.location(wgsl), &e.emit_to_string(wgsl)));
+    let [entry] = module.entry_points.as_slice() else {
+        fail(&format!("shaders/{stem}.wesl: a kernel file has exactly one entry point"));
+    };
+    assert_eq!(entry.name, stem, "shaders/{stem}.wesl: the entry point carries the file's stem");
+    let mut bindings = String::new();
+    for (handle, var) in module.global_variables.iter() {
+        let Some(binding) = var.binding else { continue };
+        if info.get_entry_point(0)[handle].is_empty() {
+            continue;
+        }
+        let kind = match var.space {
+            naga::AddressSpace::Uniform => "Uniform",
+            naga::AddressSpace::Storage { access } if access.contains(naga::StorageAccess::STORE) => "ReadWrite",
+            _ => "ReadOnly",
+        };
+        let name = var.name.as_deref().expect("a binding has a name");
+        let (group, index) = (binding.group, binding.binding);
+        writeln!(
+            bindings,
+            "        Binding {{ group: {group}, index: {index}, name: {name:?}, kind: BindingKind::{kind} }},"
+        )
+        .expect("a String can be written");
+    }
+    format!("    Shader {{ stem: {stem:?}, wgsl: {wgsl:?}, bindings: &[\n{bindings}    ] }},\n")
+}
+
+/// Stops the build with naga's message and the file and line that it stems from.
+fn fail_at(stem: &str, wgsl: &str, location: Option<naga::SourceLocation>, message: &str) -> ! {
+    let place = location.and_then(|l| source_line(wgsl, l.offset as usize)).unwrap_or_default();
+    fail(&format!("{place}in kernel shaders/{stem}.wesl: {message}"))
+}
+
+/// Finds `file:line` of a place in the composed text. WESL prints declarations anew but keeps their words, so the
+/// n-th word of a declaration in the composed text is the n-th word of the declaration of that name in its file.
+fn source_line(wgsl: &str, offset: usize) -> Option<String> {
+    let words = |text: &str| -> Vec<(usize, String)> {
+        let bare: String = blank_comments(text);
+        let mut found = Vec::new();
+        let mut start = None;
+        for (i, c) in bare.char_indices().chain([(bare.len(), ' ')]) {
+            match (c.is_alphanumeric() || c == '_', start) {
+                (true, None) => start = Some(i),
+                (false, Some(s)) => {
+                    found.push((s, bare[s..i].to_string()));
+                    start = None;
+                }
+                _ => {}
+            }
+        }
+        found
+    };
+    let is_keyword = |w: &str| matches!(w, "fn" | "struct" | "const" | "override" | "var" | "alias");
+    let composed = words(wgsl);
+    let at = composed.partition_point(|(i, _)| *i <= offset).checked_sub(1)?;
+    let declaration = (0..=at).rev().find(|&i| {
+        is_keyword(&composed[i].1)
+            && wgsl[..composed[i].0].lines().last().is_none_or(|l| l.trim_start().len() == l.len())
+    })?;
+    let name = &composed.get(declaration + 1)?.1;
+    for folder in ["shaders", "shaders/lib"] {
+        for path in fs::read_dir(folder).ok()?.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_file()) {
+            let text = fs::read_to_string(&path).ok()?;
+            let source = words(&text);
+            let found = source.windows(2).position(|w| is_keyword(&w[0].1) && w[1].1 == *name);
+            if let Some(first) = found {
+                let (i, _) = source.get(first + at - declaration)?;
+                return Some(format!("{}:{}: ", path.display(), text[..*i].lines().count().max(1)));
+            }
+        }
+    }
+    None
+}
+
+/// The text with line comments turned into spaces, so that offsets stay.
+fn blank_comments(text: &str) -> String {
+    text.split_inclusive('\n')
+        .map(|line| match line.find("//") {
+            Some(i) => format!("{}{}", &line[..i], line[i..].replace(|c| c != '\n', " ")),
+            None => line.to_string(),
+        })
+        .collect()
+}
+
+fn fail(message: &str) -> ! {
+    eprintln!("{message}");
+    std::process::exit(1)
+}

@@ -1,0 +1,41 @@
+//! The one error type: what went wrong, where, and what to do next.
+
+use std::path::PathBuf;
+
+/// Anything that can stop the work. Displayed as one line.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file could not be read or written.
+    #[error("{}: {source}", path.display())]
+    Io { path: PathBuf, source: std::io::Error },
+    /// A scene file that cannot be rendered: `place` names the element, as a JSON path where there is one.
+    #[error("{}: {place}: {problem}", path.display())]
+    Scene { path: PathBuf, place: String, problem: String },
+    /// No usable adapter, or none of the asked name.
+    #[error("{0}")]
+    Device(String),
+    /// Something is larger than the adapter allows.
+    #[error("{what} needs {needed} {unit}, but {limit} of {adapter} is {allowed}; {advice}")]
+    Limit {
+        what: String,
+        needed: u64,
+        unit: &'static str,
+        limit: &'static str,
+        adapter: String,
+        allowed: u64,
+        advice: String,
+    },
+    /// The driver reported an error in the middle of the work.
+    #[error("{0}")]
+    Gpu(String),
+    /// A setting outside its range.
+    #[error("{name} {value}: {problem}")]
+    Setting { name: &'static str, value: String, problem: String },
+    /// The caller asked to stop.
+    #[error("stopped")]
+    Stopped,
+}
+
+/// Result of this crate.
+pub type Result<T> = std::result::Result<T, Error>;

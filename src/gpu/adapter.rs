@@ -1,0 +1,97 @@
+//! Finding adapters and choosing one.
+
+use crate::error::{Error, Result};
+
+/// One adapter of this machine and whether it can be used.
+#[derive(Debug)]
+pub struct AdapterReport {
+    pub name: String,
+    pub driver: String,
+    pub backend: String,
+    /// `discrete`, `integrated`, `virtual`, `software` or `other`.
+    pub kind: &'static str,
+    pub limits: wgpu::Limits,
+    /// Why it cannot be used, if so.
+    pub unusable: Option<String>,
+    pub(super) adapter: wgpu::Adapter,
+}
+
+/// Storage buffers that the largest kernel binds.
+pub const NEEDED_STORAGE_BUFFERS: u32 = 12;
+
+/// All adapters, best first: real GPUs before software, discrete before integrated, usable before others.
+#[must_use]
+pub fn adapters() -> Vec<AdapterReport> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::PRIMARY;
+    // Indirect arguments are written by our own kernels and bounded there; wgpu's checks would cost a kernel each.
+    descriptor.flags = wgpu::InstanceFlags::default() - wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
+    let instance = wgpu::Instance::new(descriptor);
+    let found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    let mut reports: Vec<_> = found.into_iter().map(report).collect();
+    reports.sort_by_key(|r| (r.unusable.is_some(), rank(r.kind)));
+    reports
+}
+
+/// The adapter of that name or index, or the best one.
+///
+/// # Errors
+/// [`Error::Device`] if there is none; the message says what to install or which adapters there are.
+pub fn choose(wanted: Option<&str>) -> Result<AdapterReport> {
+    let mut all = adapters();
+    if all.is_empty() {
+        return Err(Error::Device(NO_ADAPTER.to_string()));
+    }
+    let index = match wanted {
+        None => Some(0),
+        Some(w) => find(&all, w),
+    };
+    let Some(index) = index else {
+        let names: Vec<_> = all.iter().enumerate().map(|(i, a)| format!("{i}: {}", a.name)).collect();
+        let wanted = wanted.unwrap_or_default();
+        return Err(Error::Device(format!("no adapter is called '{wanted}'; there are {}", names.join(", "))));
+    };
+    let chosen = all.swap_remove(index);
+    match &chosen.unusable {
+        Some(why) => Err(Error::Device(format!("adapter {} cannot be used: {why}", chosen.name))),
+        None => Ok(chosen),
+    }
+}
+
+const NO_ADAPTER: &str = "no Vulkan, Metal or Direct3D 12 adapter was found; install a driver, or software Vulkan: \
+    Debian and Ubuntu `apt install libvulkan1 mesa-vulkan-drivers`, Fedora `dnf install vulkan-loader \
+    mesa-vulkan-drivers`, Windows: the graphics driver of the GPU's maker, macOS: 10.15 or later (Metal is built in)";
+
+/// Position of the adapter with that index, or whose name contains the text, whatever the case.
+fn find(all: &[AdapterReport], wanted: &str) -> Option<usize> {
+    if let Ok(index) = wanted.parse::<usize>() {
+        return (index < all.len()).then_some(index);
+    }
+    all.iter().position(|a| a.name.to_lowercase().contains(&wanted.to_lowercase()))
+}
+
+fn rank(kind: &str) -> usize {
+    ["discrete", "integrated", "virtual", "software"].iter().position(|k| *k == kind).unwrap_or(4)
+}
+
+fn report(adapter: wgpu::Adapter) -> AdapterReport {
+    let (info, limits) = (adapter.get_info(), adapter.limits());
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => "discrete",
+        wgpu::DeviceType::IntegratedGpu => "integrated",
+        wgpu::DeviceType::VirtualGpu => "virtual",
+        wgpu::DeviceType::Cpu => "software",
+        wgpu::DeviceType::Other => "other",
+    };
+    let needs = [
+        ("storage buffers per shader stage", limits.max_storage_buffers_per_shader_stage, NEEDED_STORAGE_BUFFERS),
+        ("invocations per workgroup", limits.max_compute_invocations_per_workgroup, crate::layout::WORKGROUP_SIZE),
+    ];
+    let unusable = needs
+        .iter()
+        .find(|(_, has, needed)| has < needed)
+        .map(|(what, has, needed)| format!("it has {has} {what}, {needed} are needed"));
+    let driver = format!("{} {}", info.driver, info.driver_info).trim().to_string();
+    let backend = format!("{:?}", info.backend);
+    AdapterReport { name: info.name, driver, backend, kind, limits, unusable, adapter }
+}

@@ -1,0 +1,61 @@
+//! Buffers that count the device memory they take.
+
+use std::{
+    ops::Deref,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+/// Bytes of all live buffers, now and at most.
+#[derive(Debug, Default)]
+pub struct MemoryCount {
+    now: AtomicU64,
+    peak: AtomicU64,
+}
+
+impl MemoryCount {
+    pub(super) fn add(&self, bytes: u64) {
+        let now = self.now.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        self.peak.fetch_max(now, Ordering::Relaxed);
+    }
+
+    /// Bytes of the buffers alive now.
+    #[must_use]
+    pub fn now(&self) -> u64 {
+        self.now.load(Ordering::Relaxed)
+    }
+
+    /// The most bytes that were alive at once since the device was opened or [`Self::restart_peak`].
+    #[must_use]
+    pub fn peak(&self) -> u64 {
+        self.peak.load(Ordering::Relaxed)
+    }
+
+    /// Measures the peak anew from here.
+    pub fn restart_peak(&self) {
+        self.peak.store(self.now(), Ordering::Relaxed);
+    }
+}
+
+/// A buffer on the device; its memory is given back when it is dropped.
+#[derive(Debug)]
+pub struct Buffer {
+    pub(super) inner: wgpu::Buffer,
+    pub(super) memory: Arc<MemoryCount>,
+}
+
+impl Deref for Buffer {
+    type Target = wgpu::Buffer;
+    fn deref(&self) -> &wgpu::Buffer {
+        &self.inner
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        self.inner.destroy();
+        self.memory.now.fetch_sub(self.inner.size(), Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,18 @@
+//! Pictures: the film's frame, EXR and PNG files, tone mapping, difference measures.
+
+/// A finished frame, scene-linear, row 0 at the top. All vectors have `width * height` elements.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frame {
+    pub width: u32,
+    pub height: u32,
+    /// Radiance in W/(m² sr) per channel, linear Rec.709.
+    pub radiance: Vec<[f32; 3]>,
+    /// Fraction of the pixel's samples whose first ray hit something, 0 to 1.
+    pub alpha: Vec<f32>,
+    /// Distance of the first hit along the camera's axis, metres, mean over the samples that hit; 0 if none did.
+    pub depth: Vec<f32>,
+    /// Interpolated normal of the first hit in world space, mean over the samples that hit; 0 if none did.
+    pub normal: Vec<[f32; 3]>,
+    /// Colour of the first hit's material, mean over the samples that hit; 0 if none did.
+    pub albedo: Vec<[f32; 3]>,
+}

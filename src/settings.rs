@@ -1,0 +1,134 @@
+//! What a caller may choose. Every value has a unit, a range and a default.
+
+use serde::{Deserialize, Serialize};
+
+/// Which light reaches the picture, and by which way (the report's five modes).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// 0: direct light by shadow rays, all else by photons.
+    #[default]
+    Hybrid,
+    /// 1: all light by photons.
+    Photons,
+    /// 2: direct light by shadow rays only.
+    DirectRays,
+    /// 3: light straight from the lights or through delta surfaces only, by photons.
+    DirectPhotons,
+    /// 4: what mode 0 takes from photons.
+    IndirectPhotons,
+}
+
+impl Mode {
+    /// All modes in the report's order: the index is the report's number.
+    pub const ALL: [Mode; 5] =
+        [Mode::Hybrid, Mode::Photons, Mode::DirectRays, Mode::DirectPhotons, Mode::IndirectPhotons];
+
+    /// Name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        ["hybrid", "photons", "direct-rays", "direct-photons", "indirect-photons"][self as usize]
+    }
+
+    /// Direct light comes from shadow rays.
+    #[must_use]
+    pub fn direct_by_rays(self) -> bool {
+        matches!(self, Mode::Hybrid | Mode::DirectRays)
+    }
+
+    /// Photons are traced at all.
+    #[must_use]
+    pub fn traces_photons(self) -> bool {
+        self != Mode::DirectRays
+    }
+
+    /// The global map stores photons that come straight from a light (LD).
+    #[must_use]
+    pub fn stores_direct(self) -> bool {
+        matches!(self, Mode::Photons | Mode::DirectPhotons)
+    }
+
+    /// The caustic map stores photons that came through delta surfaces only (L S+ D).
+    #[must_use]
+    pub fn stores_direct_caustics(self) -> bool {
+        matches!(self, Mode::Hybrid | Mode::Photons | Mode::DirectPhotons | Mode::IndirectPhotons)
+    }
+
+    /// Photons go on after their first diffuse surface.
+    #[must_use]
+    pub fn follows_diffuse(self) -> bool {
+        !matches!(self, Mode::DirectRays | Mode::DirectPhotons)
+    }
+}
+
+/// How photon paths are dealt to lights.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LightSampling {
+    /// In proportion to power: all photons start with like flux.
+    #[default]
+    Power,
+    /// In turn, whatever the power.
+    Uniform,
+}
+
+/// How the file's light intensities are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LightUnit {
+    /// Candela read as W/sr in each channel.
+    #[default]
+    Radiometric,
+    /// Candela divided by 683 lm/W.
+    Photometric,
+}
+
+/// Settings of one render.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    pub mode: Mode,
+    /// Photons that the global map can hold, ≥ 1.
+    pub global_photons: u32,
+    /// Photons that the caustic map can hold, ≥ 1.
+    pub caustic_photons: u32,
+    /// Photon paths emitted at most; `None`: 100 times the larger capacity.
+    pub max_paths: Option<u64>,
+    /// Neighbours in the radiance estimate, 1 to 1000.
+    pub neighbors: u32,
+    /// Constant C of the cone filter, ≥ 1.
+    pub cone_constant: f32,
+    /// Bound of the search radius, metres.
+    pub max_radius: Option<f32>,
+    /// Longest photon path and longest delta chain of a camera path; 0: roulette alone ends paths.
+    pub max_bounces: u32,
+    /// Camera samples per pixel, ≥ 1.
+    pub spp: u32,
+    /// Picture in pixels; `None`: 512 high, as wide as the camera's aspect says.
+    pub size: Option<(u32, u32)>,
+    /// Name or index of the camera in the file; `None`: the first.
+    pub camera: Option<String>,
+    pub seed: u32,
+    pub light_sampling: LightSampling,
+    pub light_unit: LightUnit,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Hybrid,
+            global_photons: 100_000,
+            caustic_photons: 100_000,
+            max_paths: None,
+            neighbors: 100,
+            cone_constant: 2.0,
+            max_radius: None,
+            max_bounces: 20,
+            spp: 4,
+            size: None,
+            camera: None,
+            seed: 0,
+            light_sampling: LightSampling::Power,
+            light_unit: LightUnit::Radiometric,
+        }
+    }
+}

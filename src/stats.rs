@@ -1,0 +1,66 @@
+//! What happened in a render, for scripts: the `--stats` file.
+
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+/// Seconds by stage.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Seconds {
+    pub load: f64,
+    pub bvh: f64,
+    pub photons: f64,
+    pub grid: f64,
+    pub camera: f64,
+    pub direct: f64,
+    pub gather: f64,
+    pub total: f64,
+}
+
+/// One photon map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MapStats {
+    /// Paths that the map is normalised by.
+    pub emitted: u64,
+    /// Photons in the map.
+    pub stored: u64,
+}
+
+/// Both maps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PhotonStats {
+    pub global: MapStats,
+    pub caustic: MapStats,
+    /// Flux in W that the bounce limit took, mean of the channels, over all emitted paths.
+    pub lost_to_bounce_limit: f64,
+    /// Paths inside more media than the stack holds.
+    pub media_overflows: u64,
+}
+
+/// Adapter and driver.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct DeviceStats {
+    pub name: String,
+    pub driver: String,
+}
+
+/// Everything that one render reports.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Stats {
+    pub device: DeviceStats,
+    pub seconds: Seconds,
+    pub photons: PhotonStats,
+    /// Rays traced: photon paths' segments, camera rays and shadow rays.
+    pub rays: u64,
+    /// The most device memory that buffers took at once, bytes.
+    pub peak_device_bytes: u64,
+    pub warnings: Vec<String>,
+}
+
+/// Adds the time that `work` takes to `seconds`.
+pub fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    *seconds += Duration::as_secs_f64(&start.elapsed());
+    result
+}
