@@ -1,5 +1,17 @@
 //! Pictures: the film's frame, EXR and PNG files, tone mapping, difference measures.
 
+mod difference;
+mod exr;
+mod file;
+mod png;
+mod tonemap;
+
+pub use difference::{mae, mean, rel_mse, rmse};
+pub use exr::{Origin, read_exr, read_exr_attributes, write_exr};
+pub use file::{check_output, close_files, write_file};
+pub use png::write_png;
+pub use tonemap::{Tonemap, srgb_encode};
+
 /// A finished frame, scene-linear, row 0 at the top. All vectors have `width * height` elements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
@@ -15,4 +27,12 @@ pub struct Frame {
     pub normal: Vec<[f32; 3]>,
     /// Colour of the first hit's material, mean over the samples that hit; 0 if none did.
     pub albedo: Vec<[f32; 3]>,
+}
+
+impl Frame {
+    /// Number of pixels.
+    #[must_use]
+    pub fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
 }

@@ -1,0 +1,196 @@
+//! Output files that appear whole or not at all: written under a temporary name beside their place, then renamed.
+
+use std::{
+    fs::{self, File},
+    io::{self, Write},
+    path::{Path, PathBuf},
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use tempfile::{Builder, NamedTempFile};
+
+use crate::error::{Error, Result};
+
+/// Temporary files of writes under way.
+struct Open {
+    paths: Vec<PathBuf>,
+    closed: bool,
+}
+
+impl Open {
+    /// Whether the file was on the list; it is not any more.
+    fn forget(&mut self, path: &Path) -> bool {
+        self.paths.iter().position(|p| p == path).map(|i| self.paths.swap_remove(i)).is_some()
+    }
+}
+
+static OPEN: Mutex<Open> = Mutex::new(Open { paths: Vec::new(), closed: false });
+
+fn open_files() -> MutexGuard<'static, Open> {
+    OPEN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Writes a file whole: an older one is replaced only when all bytes of the new one are on the disk. What is neither
+/// a file nor a folder, as a pipe, is written as it stands.
+///
+/// # Errors
+/// [`Error::Io`] if the folder is missing or cannot be written, the path is a folder or a write-protected file, or
+/// [`close_files`] was called. Nothing is left behind then.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    let write = || -> io::Result<()> {
+        let Some(target) = target_of(path)? else {
+            return File::options().write(true).open(path)?.write_all(bytes);
+        };
+        let mut temporary = create_beside(&target)?;
+        let written = temporary.write_all(bytes).and_then(|()| temporary.as_file().sync_all());
+        put_in_place(temporary, written, &target)
+    };
+    write().map_err(|source| Error::Io { path: path.to_path_buf(), source })
+}
+
+/// Finds out, before hours of work, whether [`write_file`] could write there now.
+///
+/// # Errors
+/// As [`write_file`].
+pub fn check_output(path: &Path) -> Result<()> {
+    let check = || -> io::Result<()> {
+        let Some(target) = target_of(path)? else { return Ok(()) };
+        let probe = create_beside(&target)?;
+        open_files().forget(probe.path());
+        probe.close()
+    };
+    check().map_err(|source| Error::Io { path: path.to_path_buf(), source })
+}
+
+/// Removes the temporary files of all writes under way and lets no write begin or end any more: what a process does
+/// just before it exits in the middle of its work.
+pub fn close_files() {
+    let mut open = open_files();
+    open.closed = true;
+    for path in open.paths.drain(..) {
+        let _ = fs::remove_file(path);
+    }
+}
+
+/// The file to replace, links followed; `None` for a pipe or a device.
+fn target_of(path: &Path) -> io::Result<Option<PathBuf>> {
+    match fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder")),
+        Ok(found) if !found.is_file() => Ok(None),
+        Ok(found) if found.permissions().readonly() => {
+            Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file there is write-protected"))
+        }
+        Ok(_) => fs::canonicalize(path).map(Some),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(Some(path.to_path_buf())),
+        Err(e) => Err(e),
+    }
+}
+
+fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
+    let parent = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut name = std::ffi::OsString::from(".");
+    name.push(target.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "names no file"))?);
+    name.push(".");
+    let mut builder = Builder::new();
+    builder.prefix(&name).suffix(".part");
+    #[cfg(unix)]
+    {
+        // As any new file: the umask takes its bits away.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    let mut open = open_files();
+    if open.closed {
+        return Err(io::ErrorKind::Interrupted.into());
+    }
+    let temporary = builder.tempfile_in(parent).map_err(|e| explain(e, parent))?;
+    open.paths.push(temporary.path().to_path_buf());
+    Ok(temporary)
+}
+
+/// Renames the temporary file if it was written well, else removes it.
+fn put_in_place(temporary: NamedTempFile, written: io::Result<()>, target: &Path) -> io::Result<()> {
+    // Held to the end, so that `close_files` comes before or after the renaming.
+    let mut open = open_files();
+    let known = open.forget(temporary.path());
+    written?;
+    if !known {
+        return Err(io::ErrorKind::Interrupted.into());
+    }
+    if let Ok(older) = fs::metadata(target) {
+        fs::set_permissions(temporary.path(), older.permissions())?;
+    }
+    temporary.persist(target).map(|_| ()).map_err(|e| e.error)
+}
+
+/// Names the folder, for the system's message tells of a temporary name that means nothing to the user.
+fn explain(error: io::Error, folder: &Path) -> io::Error {
+    let kind = error.kind();
+    let why = match kind {
+        io::ErrorKind::NotFound => "does not exist".to_string(),
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => "cannot be written".to_string(),
+        io::ErrorKind::NotADirectory => "is not a folder".to_string(),
+        _ => return error,
+    };
+    io::Error::new(kind, format!("the folder {} {why}", folder.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn replaces_a_file_whole_and_leaves_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        check_output(&path).unwrap();
+        assert!(names(folder.path()).is_empty());
+        write_file(&path, b"old").unwrap();
+        write_file(&path, b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(names(folder.path()), ["a.exr"]);
+    }
+
+    #[test]
+    fn failures_name_the_place_in_one_line_and_keep_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = |path: &Path| {
+            let message = write_file(path, b"x").unwrap_err().to_string();
+            assert_eq!(check_output(path).unwrap_err().to_string(), message);
+            assert!(!message.contains('\n') && message.starts_with(&path.display().to_string()), "{message}");
+            message
+        };
+        assert!(text(folder.path()).ends_with("is a folder"));
+        assert!(text(&folder.path().join("no/a.exr")).contains("no does not exist"));
+        let protected = folder.path().join("old.exr");
+        fs::write(&protected, b"old").unwrap();
+        let mut permissions = fs::metadata(&protected).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&protected, permissions).unwrap();
+        assert!(text(&protected).contains("write-protected"));
+        assert_eq!(fs::read(&protected).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["old.exr"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_the_mode_stays() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        fs::write(&file, b"old").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_file(&link, b"new").unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&file).unwrap(), b"new");
+        assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
+    }
+}

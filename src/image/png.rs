@@ -1,0 +1,53 @@
+//! 8-bit preview: exposure, tone curve, sRGB.
+
+use std::path::Path;
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+use super::{Frame, Tonemap, srgb_encode, write_file};
+use crate::error::{Error, Result};
+
+/// Writes the frame's radiance as 8-bit sRGB. Radiance is multiplied by 2^`exposure`, then mapped by the curve.
+/// Where no ray hit anything the picture is black.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be written; an older file is kept then.
+pub fn write_png(path: &Path, frame: &Frame, exposure: f32, curve: Tonemap) -> Result<()> {
+    let pixels = to_srgb8(frame, exposure, curve);
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
+        .write_image(&pixels, frame.width, frame.height, ExtendedColorType::Rgb8)
+        .map_err(|e| Error::Io { path: path.to_path_buf(), source: std::io::Error::other(e) })?;
+    write_file(path, &bytes)
+}
+
+/// Three bytes a pixel, rows from the top.
+fn to_srgb8(frame: &Frame, exposure: f32, curve: Tonemap) -> Vec<u8> {
+    let scale = exposure.exp2();
+    let pixel = |radiance: &[f32; 3]| curve.apply(radiance.map(|x| x * scale)).map(to_byte);
+    frame.radiance.iter().flat_map(pixel).collect()
+}
+
+fn to_byte(linear: f32) -> u8 {
+    (srgb_encode(linear) * 255.0).round() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_written_file_holds_the_mapped_pixels() {
+        let radiance = vec![[0.0; 3], [0.09, 0.25, 4.0]];
+        let frame = Frame { width: 2, height: 1, radiance, ..Frame::default() };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_png(&path, &frame, 1.0, Tonemap::None).unwrap();
+        let read = image::open(&path).unwrap().into_rgb8();
+        assert_eq!(read.dimensions(), (2, 1));
+        // One stop more: 18 % grey is 118, one half is 188, and what is above 1 is clipped.
+        assert_eq!(read.into_raw(), [0, 0, 0, 118, 188, 255]);
+        write_png(&path, &frame, 0.0, Tonemap::None).unwrap();
+        assert_ne!(image::open(&path).unwrap().into_rgb8().into_raw()[3], 118);
+    }
+}

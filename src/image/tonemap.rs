@@ -1,0 +1,121 @@
+//! From scene-linear radiance to display values: tone curves and the sRGB transfer function.
+
+use serde::{Deserialize, Serialize};
+
+/// Curve that maps radiance to the range of a display.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tonemap {
+    /// Khronos PBR Neutral (Khronos Group 2024): keeps base colours as they are and rolls off highlights.
+    #[default]
+    Neutral,
+    /// ACES reference and output transforms, as fitted by Stephen Hill (BakingLab, `ACES.hlsl`), without its exposure
+    /// bias.
+    Aces,
+    /// Reinhard et al. 2002, eq. 3, on Rec.709 luminance Y: the colour is divided by 1 + Y, then clipped.
+    Reinhard,
+    /// Clips to 0..1.
+    None,
+}
+
+/// The largest value that a half float holds: brighter is drawn alike, and infinity stays out of the curves.
+const BRIGHTEST: f32 = 65504.0;
+
+impl Tonemap {
+    /// Maps linear Rec.709 to linear display values, each 0 to 1. Negative values and NaN are drawn black.
+    #[must_use]
+    pub fn apply(self, color: [f32; 3]) -> [f32; 3] {
+        let c = color.map(|x| if x > 0.0 { x.min(BRIGHTEST) } else { 0.0 });
+        let mapped = match self {
+            Self::Neutral => neutral(c),
+            Self::Aces => aces(c),
+            Self::Reinhard => {
+                let luminance = 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+                c.map(|x| x / (1.0 + luminance))
+            }
+            Self::None => c,
+        };
+        mapped.map(|x| x.clamp(0.0, 1.0))
+    }
+}
+
+/// Khronos PBR Neutral, with the names of its specification.
+fn neutral(color: [f32; 3]) -> [f32; 3] {
+    const F90: f32 = 0.04;
+    const START_COMPRESSION: f32 = 0.8 - F90;
+    const DESATURATION: f32 = 0.15;
+    // Takes away the 4 % that a dielectric reflects at normal incidence, gently near black.
+    let x = color[0].min(color[1]).min(color[2]);
+    let offset = if x < 2.0 * F90 { x - x * x / (4.0 * F90) } else { F90 };
+    let color = color.map(|c| c - offset);
+    let peak = color[0].max(color[1]).max(color[2]);
+    if peak <= START_COMPRESSION {
+        return color;
+    }
+    // Compresses the peak below 1 and pulls bright colours towards white.
+    let d = 1.0 - START_COMPRESSION;
+    let new_peak = 1.0 - d * d / (peak + d - START_COMPRESSION);
+    let g = 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    color.map(|c| new_peak + (c * new_peak / peak - new_peak) * g)
+}
+
+/// sRGB to the fit's working space: XYZ, D65 to D60, AP1, RRT saturation.
+const ACES_INPUT: [[f32; 3]; 3] =
+    [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]];
+/// ODT saturation, XYZ, D60 to D65, sRGB.
+const ACES_OUTPUT: [[f32; 3]; 3] =
+    [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]];
+
+fn aces(color: [f32; 3]) -> [f32; 3] {
+    let times = |m: &[[f32; 3]; 3], v: [f32; 3]| m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2]);
+    let fit = |v: f32| (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951) + 0.238_081);
+    times(&ACES_OUTPUT, times(&ACES_INPUT, color).map(fit))
+}
+
+/// Transfer function of sRGB (IEC 61966-2-1): linear 0..1 to encoded 0..1.
+#[must_use]
+pub fn srgb_encode(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assert_near(a: [f32; 3], b: [f32; 3]) {
+        assert!(a.iter().zip(b).all(|(x, y)| (x - y).abs() < 2e-4), "{a:?} is not {b:?}");
+    }
+
+    #[test]
+    fn curves_have_their_known_values() {
+        // Neutral, from the specification's formula by hand: below the compression it subtracts 0.04, near black
+        // x²/0.16 stays, and grey 2 becomes 1 - 0.24²/(1.96 + 0.24 - 0.76) = 0.96.
+        assert_near(Tonemap::Neutral.apply([0.5, 0.4, 0.3]), [0.46, 0.36, 0.26]);
+        assert_near(Tonemap::Neutral.apply([0.04; 3]), [0.01; 3]);
+        assert_near(Tonemap::Neutral.apply([2.0; 3]), [0.96; 3]);
+        // Hill's fit of grey 1: (1.0245786 - 0.000090537) / 1.654761, times rows that sum to 1.
+        assert_near(Tonemap::Aces.apply([1.0; 3]), [0.6191; 3]);
+        assert_near(Tonemap::Reinhard.apply([1.0; 3]), [0.5; 3]);
+        assert_near(Tonemap::Reinhard.apply([0.0, 1.0, 0.0]), [0.0, 1.0 / 1.7152, 0.0]);
+        assert_near(Tonemap::None.apply([0.25, 1.5, -1.0]), [0.25, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn every_curve_stays_in_range_and_rises() {
+        for curve in [Tonemap::Neutral, Tonemap::Aces, Tonemap::Reinhard, Tonemap::None] {
+            assert_eq!(curve.apply([f32::NAN; 3]), [0.0; 3].map(|x| curve.apply([x; 3])[0]));
+            assert!(curve.apply([f32::INFINITY; 3]).iter().all(|&x| x > 0.98), "{curve:?}");
+            let greys: Vec<_> = (0..200).map(|i| curve.apply([i as f32 * 0.02; 3])[0]).collect();
+            assert!(greys.windows(2).all(|w| w[0] <= w[1]), "{curve:?}");
+        }
+    }
+
+    #[test]
+    fn srgb_transfer_has_its_known_values() {
+        assert_eq!(srgb_encode(0.0), 0.0);
+        assert!((srgb_encode(1.0) - 1.0).abs() < 1e-6);
+        // 18 % grey is encoded as 0.4614, and the two pieces meet.
+        assert!((srgb_encode(0.18) - 0.461_356).abs() < 1e-5);
+        assert!((srgb_encode(0.003_130_8) - srgb_encode(0.003_130_9)).abs() < 1e-5);
+    }
+}
