@@ -6,7 +6,10 @@ use caustica::{
     image::Tonemap,
     settings::{LightSampling, LightUnit, Mode, Settings},
 };
-use clap::{ArgAction, Parser, Subcommand, ValueEnum};
+use clap::{
+    ArgAction, Parser, Subcommand, ValueEnum,
+    builder::{PathBufValueParser, TypedValueParser},
+};
 
 use super::values::{cone_constant, count, exposure, output, photons, radius, size};
 
@@ -48,7 +51,7 @@ pub struct RenderArgs {
     pub scene: PathBuf,
 
     /// File to write, .exr or .png; may be given several times
-    #[arg(short, long = "output", value_name = "FILE", required = true, value_parser = output)]
+    #[arg(short, long = "output", value_name = "FILE", required = true, value_parser = PathBufValueParser::new().try_map(output))]
     #[arg(action = ArgAction::Append)]
     pub outputs: Vec<PathBuf>,
 
@@ -57,11 +60,11 @@ pub struct RenderArgs {
     pub mode: ModeArg,
 
     /// How photon paths are dealt to lights
-    #[arg(long, value_enum, default_value = "power", help_heading = "Light")]
+    #[arg(long, value_name = "HOW", value_enum, default_value = "power", help_heading = "Light")]
     pub light_sampling: LightSamplingArg,
 
     /// How the file's light intensities are read
-    #[arg(long, value_enum, default_value = "radiometric", help_heading = "Light")]
+    #[arg(long, value_name = "UNIT", value_enum, default_value = "radiometric", help_heading = "Light")]
     pub light_unit: LightUnitArg,
 
     /// Photons that each map can hold, as 100000, 200k or 1.5M [default: 100k]

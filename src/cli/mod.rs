@@ -25,7 +25,8 @@ pub fn run() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(Error::Stopped) => ExitCode::from(signals::exit_code()),
         Err(error) => {
-            say::say(&format!("error: {error}"));
+            // One line, whatever a driver's message holds.
+            say::say(&format!("error: {}", error.to_string().lines().collect::<Vec<_>>().join(" ")));
             ExitCode::FAILURE
         }
     }

@@ -58,8 +58,7 @@ fn number(text: &str) -> Option<f32> {
 }
 
 /// A file that we know how to write.
-pub fn output(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
+pub fn output(path: PathBuf) -> Result<PathBuf, String> {
     match extension(&path).as_str() {
         "exr" | "png" => Ok(path),
         _ => Err("the name ends in neither .exr nor .png".to_string()),
@@ -109,6 +108,6 @@ mod tests {
         assert!(cone_constant("0.99").is_err() && cone_constant("1").is_ok() && cone_constant("inf").is_err());
         assert!(radius("0").is_err() && radius("NaN").is_err() && radius("1e-3").is_ok());
         assert!(exposure("-2.5").is_ok() && exposure("101").is_err());
-        assert!(output("a.EXR").is_ok() && output("a.jpg").is_err() && output("exr").is_err());
+        assert!(output("a.EXR".into()).is_ok() && output("a.jpg".into()).is_err() && output("exr".into()).is_err());
     }
 }
