@@ -76,7 +76,9 @@ pub struct Material {
     pub kind: u32,
     /// Index of refraction, of glass and panes.
     pub ior: f32,
-    pub pad: [u32; 3],
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// A point light.
@@ -98,7 +100,7 @@ pub struct Light {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Path {
     pub origin: [f32; 3],
-    /// Photons: diffuse bounces so far in the low 16 bits, photons stored in each map, see `bounce_photons`.
+    /// What the kernel that follows the path remembers of it, see `bounce_photons` and `trace_camera`.
     pub flags: u32,
     pub direction: [f32; 3],
     /// Surfaces met so far.
@@ -121,7 +123,7 @@ pub struct Photon {
     pub wi: u32,
     /// Flux in W, before the division by the number of emitted paths.
     pub flux: [f32; 3],
-    /// Before sorting: place in its path. After: Morton key of its cell.
+    /// While staged: path and place in it, see `bounce_photons`. In a built map: Morton key of its cell.
     pub key: u32,
 }
 
@@ -135,13 +137,139 @@ pub struct VisiblePoint {
     pub valid: u32,
     /// Weight of the camera path times the BRDF, albedo/π: multiplies irradiance.
     pub weight: [f32; 3],
-    pub pad0: u32,
+    /// Distance by which a ray that leaves must be moved along `ng` off the surface, metres.
+    pub offset: f32,
     /// Geometric normal, unit, on the viewer's side.
     pub ng: [f32; 3],
-    pub pad1: u32,
+    pub pad0: u32,
     /// Interpolated normal, unit, on the viewer's side of the geometric one.
     pub ns: [f32; 3],
+    pub pad1: u32,
+}
+
+/// What happens to a batch of paths; see `shaders/lib/queue.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Counters {
+    /// Paths in the list that the running bounce reads.
+    pub current: u32,
+    /// Paths put into the next list.
+    pub next: u32,
+    /// Photons staged, also those that did not fit.
+    pub staged: u32,
+    /// Flux that the bounce limit took, in units of `1 / PhotonBatch::lost_scale` W.
+    pub lost: u32,
+    /// Rays traced, low and high word.
+    pub rays: u32,
+    pub rays_high: u32,
+    /// Times that a path entered more media than the stack holds.
+    pub media_overflows: u32,
+    /// Rays given up after the loop budget.
+    pub unfinished: u32,
+}
+
+/// Settings of one batch of photon paths; see `shaders/lib/photon_batch.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PhotonBatch {
+    pub seed: u32,
+    /// Index of the first path, low and high word.
+    pub first_path: u32,
+    pub first_path_high: u32,
+    pub paths: u32,
+    pub light_count: u32,
+    /// Light of the first path where paths are dealt in turn, or [`NO_TURN`].
+    pub first_light: u32,
+    pub max_bounces: u32,
+    /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`].
+    pub rules: u32,
+    pub staging_capacity: u32,
+    pub lost_scale: f32,
+    pub pad0: u32,
+    pub pad1: u32,
+}
+
+pub const NO_TURN: u32 = u32::MAX;
+/// The global map still takes photons.
+pub const STORE_GLOBAL: u32 = 1;
+/// The global map takes photons that come straight from a light.
+pub const STORE_DIRECT: u32 = 2;
+/// The caustic map still takes photons.
+pub const STORE_CAUSTIC: u32 = 4;
+/// Paths go on after a diffuse surface.
+pub const FOLLOW_DIFFUSE: u32 = 8;
+
+/// What `store_photons` needs to know; see there.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Store {
+    pub staged: u32,
+    pub paths: u32,
+    pub global_capacity: u32,
+    pub caustic_capacity: u32,
+}
+
+/// A camera and the part of its samples that one tile holds; see `shaders/lib/camera_tile.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct CameraTile {
+    pub position: [f32; 3],
+    pub seed: u32,
+    /// From the centre of the picture, at distance 1, to its right edge.
+    pub right: [f32; 3],
+    pub width: u32,
+    /// From the centre of the picture, at distance 1, to its upper edge.
+    pub up: [f32; 3],
+    pub height: u32,
+    /// Unit direction of view.
+    pub forward: [f32; 3],
+    /// Samples per pixel of the whole picture.
+    pub spp: u32,
+    /// First pixel of the tile, counted along 8 x 8 blocks.
+    pub first_pixel: u32,
+    pub pixels: u32,
+    /// First sample of each pixel, and samples of each pixel, in this tile.
+    pub first_sample: u32,
+    pub samples: u32,
+    pub max_bounces: u32,
+    pub pad0: u32,
+    pub pad1: u32,
     pub pad2: u32,
+}
+
+/// What the first ray of a camera sample hit.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FirstHit {
+    /// Interpolated normal towards the viewer; 0 if nothing was hit.
+    pub normal: [f32; 3],
+    /// Distance along the camera's axis, metres.
+    pub depth: f32,
+    pub albedo: [f32; 3],
+    /// 1 if something was hit.
+    pub alpha: f32,
+}
+
+/// Sums over a tile's samples of one pixel.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct TilePixel {
+    pub radiance: [f32; 3],
+    pub alpha: f32,
+    pub normal: [f32; 3],
+    pub depth: f32,
+    pub albedo: [f32; 3],
+    pub pad: u32,
+}
+
+/// Which light `light_directly` takes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct DirectLight {
+    pub light: u32,
+    pub points: u32,
+    pub pad0: u32,
+    pub pad1: u32,
 }
 
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::{Error, Result};
+
 /// Which light reaches the picture, and by which way (the report's five modes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -46,12 +48,6 @@ impl Mode {
     #[must_use]
     pub fn stores_direct(self) -> bool {
         matches!(self, Mode::Photons | Mode::DirectPhotons)
-    }
-
-    /// The caustic map stores photons that came through delta surfaces only (L S+ D).
-    #[must_use]
-    pub fn stores_direct_caustics(self) -> bool {
-        matches!(self, Mode::Hybrid | Mode::Photons | Mode::DirectPhotons | Mode::IndirectPhotons)
     }
 
     /// Photons go on after their first diffuse surface.
@@ -130,5 +126,36 @@ impl Default for Settings {
             light_sampling: LightSampling::Power,
             light_unit: LightUnit::Radiometric,
         }
+    }
+}
+
+impl Settings {
+    /// Checks every value against its range.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] with the first that is out of range.
+    pub fn check(&self) -> Result<()> {
+        let fail = |name, value: String, problem: &str| {
+            Err(Error::Setting { name, value, problem: problem.to_string() })
+        };
+        if !(1..=1000).contains(&self.neighbors) {
+            return fail("neighbors", self.neighbors.to_string(), "must be from 1 to 1000");
+        }
+        if !(self.cone_constant >= 1.0 && self.cone_constant.is_finite()) {
+            return fail("cone-constant", self.cone_constant.to_string(), "must be at least 1");
+        }
+        if let Some(r) = self.max_radius.filter(|r| !(*r > 0.0 && r.is_finite())) {
+            return fail("max-radius", r.to_string(), "must be above 0");
+        }
+        if self.global_photons == 0 || self.caustic_photons == 0 {
+            return fail("photons", "0".to_string(), "must be at least 1");
+        }
+        if self.spp == 0 {
+            return fail("spp", "0".to_string(), "must be at least 1");
+        }
+        if self.max_paths == Some(0) {
+            return fail("max-paths", "0".to_string(), "must be at least 1");
+        }
+        Ok(())
     }
 }

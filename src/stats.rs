@@ -33,8 +33,6 @@ pub struct PhotonStats {
     pub caustic: MapStats,
     /// Flux in W that the bounce limit took, mean of the channels, over all emitted paths.
     pub lost_to_bounce_limit: f64,
-    /// Paths inside more media than the stack holds.
-    pub media_overflows: u64,
 }
 
 /// Adapter and driver.
@@ -52,6 +50,10 @@ pub struct Stats {
     pub photons: PhotonStats,
     /// Rays traced: photon paths' segments, camera rays and shadow rays.
     pub rays: u64,
+    /// Times that a path entered more media than its stack holds.
+    pub media_overflows: u64,
+    /// Rays given up after the loop budget; their light is lost.
+    pub unfinished_rays: u64,
     /// The most device memory that buffers took at once, bytes.
     pub peak_device_bytes: u64,
     pub warnings: Vec<String>,

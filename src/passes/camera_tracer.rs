@@ -1,0 +1,259 @@
+//! The camera pass: the picture's samples, tile by tile: camera rays to their visible points, direct light, and the
+//! sum over each pixel's samples. Memory depends on the size of a tile alone.
+
+use super::SceneBuffers;
+use crate::{
+    error::Result,
+    gpu::{Buffer, Gpu, Kernel},
+    layout::{CameraTile, Counters, DirectLight, FirstHit, Path, TilePixel, VisiblePoint},
+    scene::Camera,
+    settings::Settings,
+};
+
+/// Camera samples that a tile holds.
+const TILE_SAMPLES: u64 = 1 << 15;
+/// Samples of one pixel that a tile holds at most.
+const PIXEL_SAMPLES: u32 = 256;
+/// Bounces handed to the device at once.
+const BOUNCES_PER_SUBMISSION: u32 = 32;
+/// Width and height of the blocks in which pixels are counted; see `shaders/lib/camera_tile.wesl`.
+const BLOCK: u32 = 8;
+
+/// A part of the picture's samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Tile {
+    /// Pixels, counted along blocks: some of them lie outside the picture.
+    pub pixels: u32,
+    pub first_pixel: u32,
+    pub first_sample: u32,
+    /// Samples of each pixel.
+    pub samples: u32,
+}
+
+/// Kernels and buffers of the camera pass.
+#[derive(Debug)]
+pub struct CameraTracer {
+    start: Kernel,
+    advance: Kernel,
+    trace: Kernel,
+    direct: Kernel,
+    resolve: Kernel,
+    paths: Buffer,
+    queues: [Buffer; 2],
+    counters: Buffer,
+    dispatch_arguments: Buffer,
+    /// Two [`VisiblePoint`]s per sample, some of them not valid.
+    pub points: Buffer,
+    /// Radiance that reaches the camera from each visible point, `vec4f`.
+    pub radiance: Buffer,
+    first_hits: Buffer,
+    pixels: Buffer,
+    view: CameraTile,
+    lights: u32,
+}
+
+/// What one step did, for the statistics.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepCount {
+    pub rays: u64,
+    pub media_overflows: u64,
+    pub unfinished: u64,
+}
+
+impl CameraTracer {
+    /// # Errors
+    /// Limits of the adapter.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        camera: &Camera,
+        size: (u32, u32),
+        settings: &Settings,
+    ) -> Result<Self> {
+        let queue = || gpu.storage::<u32>("camera queue", 2 * TILE_SAMPLES);
+        Ok(Self {
+            start: Kernel::new(gpu, "start_camera", &[]),
+            advance: Kernel::new(gpu, "advance_queue", &[]),
+            trace: scene.kernel(gpu, "trace_camera"),
+            direct: scene.kernel(gpu, "light_directly"),
+            resolve: Kernel::new(gpu, "resolve", &[]),
+            paths: gpu.storage::<Path>("camera paths", 2 * TILE_SAMPLES)?,
+            queues: [queue()?, queue()?],
+            counters: gpu.storage::<Counters>("camera counters", 1)?,
+            dispatch_arguments: gpu.storage::<[u32; 3]>("camera dispatch arguments", 1)?,
+            points: gpu.storage::<VisiblePoint>("visible points", 2 * TILE_SAMPLES)?,
+            radiance: gpu.storage::<[f32; 4]>("radiance", 2 * TILE_SAMPLES)?,
+            first_hits: gpu.storage::<FirstHit>("first hits", TILE_SAMPLES)?,
+            pixels: gpu.storage::<TilePixel>("tile pixels", TILE_SAMPLES)?,
+            view: view(camera, size, settings),
+            lights: scene.light_table.len() as u32,
+        })
+    }
+
+    /// The tiles that make up the picture, in order.
+    #[must_use]
+    pub fn tiles(&self) -> Vec<Tile> {
+        let (width, height) = (self.view.width, self.view.height);
+        let all_pixels = width.div_ceil(BLOCK) * height.div_ceil(BLOCK) * BLOCK * BLOCK;
+        let samples = self.view.spp.min(PIXEL_SAMPLES);
+        let pixels = ((TILE_SAMPLES as u32 / samples) / (BLOCK * BLOCK)).max(1) * BLOCK * BLOCK;
+        let mut tiles = Vec::new();
+        for first_pixel in (0..all_pixels).step_by(pixels as usize) {
+            for first_sample in (0..self.view.spp).step_by(samples as usize) {
+                tiles.push(Tile {
+                    pixels: pixels.min(all_pixels - first_pixel),
+                    first_pixel,
+                    first_sample,
+                    samples: samples.min(self.view.spp - first_sample),
+                });
+            }
+        }
+        tiles
+    }
+
+    /// Visible points of a tile, at most.
+    #[must_use]
+    pub fn point_count(tile: &Tile) -> u32 {
+        2 * tile.pixels * tile.samples
+    }
+
+    /// Column and row of the `i`-th pixel of a tile; `None` outside the picture.
+    #[must_use]
+    pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
+        let pixel = tile.first_pixel + i;
+        let block = pixel / (BLOCK * BLOCK);
+        let blocks_x = self.view.width.div_ceil(BLOCK);
+        let even_bits = |p: u32| (p & 1) | ((p >> 1) & 2) | ((p >> 2) & 4);
+        let x = block % blocks_x * BLOCK + even_bits(pixel);
+        let y = block / blocks_x * BLOCK + even_bits(pixel >> 1);
+        (x < self.view.width && y < self.view.height).then_some((x, y))
+    }
+
+    /// Traces the tile's camera paths to their visible points; sets all radiance to 0.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn trace(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
+        let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
+        let named = |input: usize| {
+            scene.with(&[
+                ("tile", &uniform),
+                ("paths", &self.paths),
+                ("queue_in", &self.queues[input]),
+                ("queue_out", &self.queues[1 - input]),
+                ("counters", &self.counters),
+                ("dispatch_arguments", &self.dispatch_arguments),
+                ("points", &self.points),
+                ("first_hits", &self.first_hits),
+                ("radiance", &self.radiance),
+            ])
+        };
+        let advance = self.advance.bind(gpu, &named(0));
+        let trace = [0, 1].map(|input| self.trace.bind(gpu, &named(input)));
+        let mut encoder = gpu.encoder();
+        encoder.clear_buffer(&self.counters, 0, None);
+        self.start.dispatch(&mut encoder, &self.start.bind(gpu, &named(1)), u64::from(tile.pixels * tile.samples));
+        // The surface that ends the chain comes after max_bounces delta surfaces.
+        let mut surfaces = 0;
+        loop {
+            for _ in 0..BOUNCES_PER_SUBMISSION.min(self.view.max_bounces + 1 - surfaces) {
+                self.advance.dispatch(&mut encoder, &advance, 1);
+                let bindings = &trace[(surfaces % 2) as usize];
+                self.trace.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, 0);
+                surfaces += 1;
+            }
+            gpu.submit(encoder);
+            let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
+            if counters.next == 0 || surfaces > self.view.max_bounces {
+                return Ok(StepCount::from(counters));
+            }
+            encoder = gpu.encoder();
+        }
+    }
+
+    /// Adds the light that reaches the tile's visible points straight from the lights.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn light_directly(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
+        let points = Self::point_count(tile);
+        let mut encoder = gpu.encoder();
+        encoder.clear_buffer(&self.counters, 0, None);
+        for light in 0..self.lights {
+            let uniform = gpu.uniform("direct light", &DirectLight { light, points, ..Default::default() });
+            let bindings = self.direct.bind(
+                gpu,
+                &scene.with(&[
+                    ("direct", &uniform),
+                    ("points", &self.points),
+                    ("radiance", &self.radiance),
+                    ("counters", &self.counters),
+                ]),
+            );
+            self.direct.dispatch(&mut encoder, &bindings, u64::from(points));
+            gpu.submit(std::mem::replace(&mut encoder, gpu.encoder()));
+        }
+        let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
+        Ok(StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) })
+    }
+
+    /// Sums over the tile's samples of each of its pixels.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn resolve(&self, gpu: &Gpu, tile: &Tile) -> Result<Vec<TilePixel>> {
+        let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
+        let bindings = self.resolve.bind(
+            gpu,
+            &[
+                ("tile", &uniform),
+                ("radiance", &self.radiance),
+                ("first_hits", &self.first_hits),
+                ("pixels", &self.pixels),
+            ],
+        );
+        let mut encoder = gpu.encoder();
+        self.resolve.dispatch(&mut encoder, &bindings, u64::from(tile.pixels));
+        gpu.submit(encoder);
+        gpu.read(&self.pixels, 0, u64::from(tile.pixels))
+    }
+
+    fn tile_view(&self, tile: &Tile) -> CameraTile {
+        CameraTile {
+            first_pixel: tile.first_pixel,
+            pixels: tile.pixels,
+            first_sample: tile.first_sample,
+            samples: tile.samples,
+            ..self.view
+        }
+    }
+}
+
+impl From<Counters> for StepCount {
+    fn from(counters: Counters) -> Self {
+        Self {
+            rays: u64::from(counters.rays) | (u64::from(counters.rays_high) << 32),
+            media_overflows: u64::from(counters.media_overflows),
+            unfinished: u64::from(counters.unfinished),
+        }
+    }
+}
+
+/// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows from the aspect.
+fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> CameraTile {
+    let half_height = (camera.yfov / 2.0).tan();
+    let half_width = half_height * width as f32 / height as f32;
+    let bounces = if settings.max_bounces == 0 { super::BOUNCE_CEILING } else { settings.max_bounces };
+    CameraTile {
+        position: camera.position.to_array(),
+        seed: settings.seed,
+        right: (camera.right * half_width).to_array(),
+        width,
+        up: (camera.up * half_height).to_array(),
+        height,
+        forward: camera.forward.to_array(),
+        spp: settings.spp,
+        max_bounces: bounces.min(super::BOUNCE_CEILING),
+        ..Default::default()
+    }
+}

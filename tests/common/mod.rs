@@ -1,0 +1,96 @@
+//! Scenes built in code, and the one device that a test file opens.
+#![allow(dead_code, reason = "every test file uses a part of this one")]
+
+use std::sync::OnceLock;
+
+use caustica::{
+    gpu::Gpu,
+    progress::Silent,
+    renderer::{Render, render},
+    scene::{Camera, Light, Material, Scene, Sphere, Surface, Triangle},
+    settings::{Mode, Settings},
+};
+use glam::Vec3;
+
+/// The device of this test process; no adapter is a failure.
+pub fn gpu() -> &'static Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    GPU.get_or_init(|| Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("tests need an adapter"))
+}
+
+pub fn diffuse(albedo: f32) -> Surface {
+    Surface::Diffuse { albedo: Vec3::splat(albedo) }
+}
+
+pub fn glass() -> Surface {
+    Surface::Glass { ior: 1.5, tint: Vec3::ONE }
+}
+
+pub fn scene(surfaces: &[Surface]) -> Scene {
+    let materials = surfaces.iter().map(|&surface| Material { name: String::new(), surface }).collect();
+    Scene { materials, ..Scene::default() }
+}
+
+pub fn point_light(position: Vec3, intensity: f32) -> Light {
+    Light { name: String::new(), position, intensity: Vec3::splat(intensity) }
+}
+
+/// A camera at `position` that looks at `target`; full vertical angle in degrees.
+pub fn camera(position: Vec3, target: Vec3, degrees: f32) -> Camera {
+    let forward = (target - position).normalize();
+    let helper = if forward.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
+    let right = forward.cross(helper).normalize();
+    let yfov = degrees.to_radians();
+    Camera { name: String::new(), position, right, up: right.cross(forward), forward, yfov, aspect: Some(1.0) }
+}
+
+pub fn sphere(center: Vec3, radius: f32, material: u32) -> Sphere {
+    Sphere { center, radius, material }
+}
+
+/// The parallelogram `corner, corner + a, corner + a + b, corner + b`; its normal is along a × b.
+pub fn add_quad(scene: &mut Scene, corner: Vec3, a: Vec3, b: Vec3, material: u32) {
+    let normals = [a.cross(b).normalize(); 3];
+    for positions in [[corner, corner + a, corner + a + b], [corner, corner + a + b, corner + b]] {
+        scene.triangles.push(Triangle { positions, normals, material });
+    }
+}
+
+/// An axis-aligned box of six quads with outward normals.
+pub fn add_box(scene: &mut Scene, min: Vec3, max: Vec3, material: u32) {
+    let size = max - min;
+    let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
+    add_quad(scene, min, y, x, material);
+    add_quad(scene, min, x, z, material);
+    add_quad(scene, min, z, y, material);
+    add_quad(scene, max, -y, -z, material);
+    add_quad(scene, max, -z, -x, material);
+    add_quad(scene, max, -x, -y, material);
+}
+
+/// Small, quick settings.
+pub fn settings(mode: Mode, photons: u32, size: u32) -> Settings {
+    Settings {
+        mode,
+        global_photons: photons,
+        caustic_photons: photons,
+        size: Some((size, size)),
+        spp: 1,
+        ..Settings::default()
+    }
+}
+
+pub fn render_scene(scene: &Scene, settings: &Settings) -> Render {
+    render(gpu(), scene, settings, &Silent).expect("the scene renders")
+}
+
+/// Mean of all pixels and channels.
+pub fn mean(render: &Render) -> f64 {
+    let sum: f64 = render.frame.radiance.iter().flatten().map(|&x| f64::from(x)).sum();
+    sum / (3 * render.frame.radiance.len()) as f64
+}
+
+/// Whether `value` differs from `expected` by less than a fraction.
+pub fn within(value: f64, expected: f64, fraction: f64) -> bool {
+    (value - expected).abs() < fraction * expected.abs()
+}
