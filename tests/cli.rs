@@ -165,7 +165,30 @@ fn help_and_version_go_to_stdout() {
     assert!(["render", "devices", "info", "Exit codes"].iter().all(|said| general.contains(said)), "{general}");
     let of_render = help("render --help");
     for option in [
-        "--mode", "--photons", "--global-photons", "--caustic-photons", "--max-paths", "-k, --neighbors", "--cone-constant", "--max-radius", "--max-bounces", "--spp", "--size", "--camera", "--seed", "--device", "CAUSTICA_DEVICE", "--light-sampling", "--light-unit", "--exposure", "--tonemap", "--stats", "-q, --quiet", "-v, --verbose", "-o, --output", "Examples:"
+        "--mode",
+        "--photons",
+        "--global-photons",
+        "--caustic-photons",
+        "--max-paths",
+        "-k, --neighbors",
+        "--cone-constant",
+        "--max-radius",
+        "--max-bounces",
+        "--spp",
+        "--size",
+        "--camera",
+        "--seed",
+        "--device",
+        "CAUSTICA_DEVICE",
+        "--light-sampling",
+        "--light-unit",
+        "--exposure",
+        "--tonemap",
+        "--stats",
+        "-q, --quiet",
+        "-v, --verbose",
+        "-o, --output",
+        "Examples:",
     ] {
         assert!(of_render.contains(option), "{option}");
     }
@@ -219,9 +242,22 @@ fn a_render_writes_all_that_was_asked_for() {
     let text = fs::read_to_string(folder.path().join("s.json")).expect("statistics");
     let stats: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     for pointer in [
-        "/device/name", "/seconds/load", "/seconds/bvh", "/seconds/photons", "/seconds/grid", "/seconds/camera",
-        "/seconds/direct", "/seconds/gather", "/seconds/total", "/photons/global/emitted", "/photons/global/stored",
-        "/photons/caustic/emitted", "/photons/caustic/stored", "/rays", "/peak_device_bytes", "/warnings",
+        "/device/name",
+        "/seconds/load",
+        "/seconds/bvh",
+        "/seconds/photons",
+        "/seconds/grid",
+        "/seconds/camera",
+        "/seconds/direct",
+        "/seconds/gather",
+        "/seconds/total",
+        "/photons/global/emitted",
+        "/photons/global/stored",
+        "/photons/caustic/emitted",
+        "/photons/caustic/stored",
+        "/rays",
+        "/peak_device_bytes",
+        "/warnings",
     ] {
         assert!(stats.pointer(pointer).is_some(), "{pointer} is not in {text}");
     }
@@ -237,12 +273,11 @@ fn quiet_says_nothing_and_equal_runs_give_equal_files() {
         assert_eq!((ended.code, ended.stdout.as_str(), ended.stderr.as_str()), (Some(0), "", ""));
     }
     assert!(read("a.exr") == read("b.exr"));
-    let radiance =
-        |name: &str| caustica::image::read_exr(&folder.path().join(name)).expect("an EXR").radiance;
+    let radiance = |name: &str| caustica::image::read_exr(&folder.path().join(name)).expect("an EXR").radiance;
     assert!(radiance("a.exr") != radiance("c.exr"));
 }
 
-/// Sends a signal in the middle of a render that would take days.
+/// Sends a signal in the middle of a render that would take an hour.
 #[cfg(unix)]
 fn stopped_by(signal: &str, code: i32) {
     use std::{
@@ -252,7 +287,7 @@ fn stopped_by(signal: &str, code: i32) {
         time::{Duration, Instant},
     };
     let folder = folder();
-    let line = "render scene.gltf --size 256x256 --spp 1000000000 --photons 1k -o old.exr -o a.png --stats s.json";
+    let line = "render scene.gltf --size 64x64 --spp 1000000 --photons 1k -o old.exr -o a.png --stats s.json";
     let mut child = command(folder.path(), line).stderr(Stdio::piped()).spawn().expect("it starts");
     let mut lines = BufReader::new(child.stderr.take().expect("it is piped")).lines();
     let started = lines.find(|l| l.as_ref().is_ok_and(|l| l.starts_with("camera")));

@@ -42,11 +42,18 @@ fn twins() -> Vec<Twin> {
         BvhNode { left_min, left_first, left_max, left_count, right_min, right_first, right_max, right_count }
         Primitive { v0, material, e1, id, e2, pad }
         Normals { n0, n1, n2, flat_shaded }
-        Material { color, kind, ior, pad }
+        Material { color, kind, ior, pad0, pad1, pad2 }
         Light { position, cdf, intensity, probability }
         Path { origin, flags, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, key }
-        VisiblePoint { position, valid, weight, pad0, ng, pad1, ns, pad2 }
+        VisiblePoint { position, valid, weight, offset, ng, pad0, ns, pad1 }
+        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
+        PhotonBatch { seed, first_path, first_path_high, paths, light_count, first_light, max_bounces, rules, staging_capacity, lost_scale, pad0, pad1 }
+        Store { staged, paths, global_capacity, caustic_capacity }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_pixel, pixels, first_sample, samples, max_bounces, pad0, pad1, pad2 }
+        FirstHit { normal, depth, albedo, alpha }
+        TilePixel { radiance, alpha, normal, depth, albedo, pad }
+        DirectLight { light, points, pad0, pad1 }
     }
 }
 
@@ -55,7 +62,22 @@ macro_rules! constants {
 }
 
 fn constants() -> Vec<(&'static str, u64)> {
-    constants![WORKGROUP_SIZE, BVH_STACK, MEDIA_DEPTH, SPHERE_BIT, DIFFUSE, MIRROR, GLASS, PANE].to_vec()
+    constants![
+        WORKGROUP_SIZE,
+        BVH_STACK,
+        MEDIA_DEPTH,
+        SPHERE_BIT,
+        DIFFUSE,
+        MIRROR,
+        GLASS,
+        PANE,
+        NO_TURN,
+        STORE_GLOBAL,
+        STORE_DIRECT,
+        STORE_CAUSTIC,
+        FOLLOW_DIFFUSE
+    ]
+    .to_vec()
 }
 
 /// What of a kernel's text disagrees with `layout.rs`, one line each.

@@ -114,7 +114,7 @@ fn name(stage: Stage) -> &'static str {
 fn unit(stage: Stage) -> Option<&'static str> {
     match stage {
         Stage::Photons => Some("photons"),
-        Stage::Camera => Some("samples"),
+        Stage::Camera => Some("tiles"),
         Stage::Load | Stage::Bvh | Stage::Grid => None,
     }
 }
