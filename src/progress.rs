@@ -10,7 +10,7 @@ pub enum Stage {
     /// Counted in photons stored, of all maps.
     Photons,
     Grid,
-    /// Counted in pixels' samples; camera rays, direct light and gather, tile by tile.
+    /// Counted in tiles of camera samples: camera rays, direct light and gather.
     Camera,
 }
 

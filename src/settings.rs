@@ -135,9 +135,8 @@ impl Settings {
     /// # Errors
     /// [`Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        let fail = |name, value: String, problem: &str| {
-            Err(Error::Setting { name, value, problem: problem.to_string() })
-        };
+        let fail =
+            |name, value: String, problem: &str| Err(Error::Setting { name, value, problem: problem.to_string() });
         if !(1..=1000).contains(&self.neighbors) {
             return fail("neighbors", self.neighbors.to_string(), "must be from 1 to 1000");
         }

@@ -69,13 +69,8 @@ fn emitted_directions(count: u32) -> Vec<Vec3> {
     let bvh = Bvh::build(&scene);
     let buffers = SceneBuffers::new(gpu, &scene, &bvh, &Settings::default()).expect("the scene fits");
     let emit = Kernel::new(gpu, "emit_photons", &[]);
-    let batch = PhotonBatch {
-        seed: 3,
-        paths: count,
-        light_count: 1,
-        first_light: layout::NO_TURN,
-        ..Default::default()
-    };
+    let batch =
+        PhotonBatch { seed: 3, paths: count, light_count: 1, first_light: layout::NO_TURN, ..Default::default() };
     let uniform = gpu.uniform("batch", &batch);
     let paths = gpu.storage::<layout::Path>("paths", u64::from(count)).expect("fits");
     let queue = gpu.storage::<u32>("queue", u64::from(count)).expect("fits");

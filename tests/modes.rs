@@ -33,15 +33,17 @@ fn room() -> Scene {
 /// Largest difference of two pictures' channels, as a fraction of the mean.
 fn largest_difference(render: &Render, sum: &[[f32; 3]]) -> f64 {
     let scale = mean(render);
-    let difference = render.frame.radiance.iter().flatten().zip(sum.iter().flatten()).map(|(a, b)| f64::from((a - b).abs()));
+    let difference =
+        render.frame.radiance.iter().flatten().zip(sum.iter().flatten()).map(|(a, b)| f64::from((a - b).abs()));
     difference.fold(0.0, f64::max) / scale
 }
 
 #[test]
 fn hybrid_is_direct_rays_plus_indirect_photons() {
     let scene = room();
-    let [hybrid, direct, indirect, other] = [Mode::Hybrid, Mode::DirectRays, Mode::IndirectPhotons, Mode::DirectPhotons]
-        .map(|mode| render_scene(&scene, &settings(mode, 20_000, 48)));
+    let [hybrid, direct, indirect, other] =
+        [Mode::Hybrid, Mode::DirectRays, Mode::IndirectPhotons, Mode::DirectPhotons]
+            .map(|mode| render_scene(&scene, &settings(mode, 20_000, 48)));
     let sum = |a: &Render, b: &Render| -> Vec<[f32; 3]> {
         let add = |(a, b): (&[f32; 3], &[f32; 3])| (Vec3::from(*a) + Vec3::from(*b)).to_array();
         a.frame.radiance.iter().zip(&b.frame.radiance).map(add).collect()
@@ -100,7 +102,8 @@ fn modes_agree_on_a_smooth_shaded_ball() {
         (pairs.iter().map(square).sum::<f64>() / pairs.len() as f64).sqrt()
     };
     let rays = picture(Mode::DirectRays, true);
-    let (right, wrong) = (rms(&rays, &picture(Mode::DirectPhotons, true)), rms(&rays, &picture(Mode::DirectPhotons, false)));
+    let (right, wrong) =
+        (rms(&rays, &picture(Mode::DirectPhotons, true)), rms(&rays, &picture(Mode::DirectPhotons, false)));
     assert!(right < 0.5 * wrong, "smooth photons differ from smooth rays by {right}, flat photons by {wrong}");
     let (a, b) = (mean(&rays), mean(&picture(Mode::DirectPhotons, true)));
     assert!(within(b, a, 0.03), "mean {b} by photons, {a} by rays");

@@ -58,7 +58,8 @@ pub fn choose(wanted: Option<&str>) -> Result<AdapterReport> {
     }
 }
 
-const NO_ADAPTER: &str = "no Vulkan, Metal or Direct3D 12 adapter was found; install a driver, or software Vulkan: \
+/// What to do where [`adapters`] finds none.
+pub const NO_ADAPTER: &str = "no Vulkan, Metal or Direct3D 12 adapter was found; install a driver, or software Vulkan: \
     Debian and Ubuntu `apt install libvulkan1 mesa-vulkan-drivers`, Fedora `dnf install vulkan-loader \
     mesa-vulkan-drivers`, Windows: the graphics driver of the GPU's maker, macOS: 10.15 or later (Metal is built in)";
 

@@ -7,7 +7,7 @@ pub mod shaders;
 
 use std::sync::{Arc, Mutex};
 
-pub use adapter::{AdapterReport, adapters};
+pub use adapter::{AdapterReport, NO_ADAPTER, adapters};
 pub use buffer::{Buffer, MemoryCount};
 pub use kernel::{Bindings, Kernel};
 

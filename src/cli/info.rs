@@ -1,0 +1,15 @@
+//! `caustica info`.
+
+use std::path::Path;
+
+use caustica::{Result, scene::Scene};
+
+use super::say::print;
+
+/// Says what a scene holds and how it will be read.
+pub fn info(path: &Path) -> Result<()> {
+    let scene = Scene::load(path)?;
+    let text = scene.describe().to_string();
+    print(&format!("{}\n", text.trim_end()));
+    Ok(())
+}

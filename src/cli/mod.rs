@@ -1,0 +1,41 @@
+//! The command line: arguments in, files and messages out. Uses the public library only.
+
+mod args;
+mod devices;
+mod info;
+mod progress;
+mod render;
+mod say;
+mod signals;
+mod values;
+
+use std::process::ExitCode;
+
+use caustica::{Error, Result};
+use clap::Parser;
+
+use args::{Args, Command};
+
+/// Does what the arguments say. Exit codes: 0 success, 1 failure of the work, 2 wrong usage, 128 + signal when
+/// stopped.
+pub fn run() -> ExitCode {
+    let args = Args::parse();
+    signals::watch();
+    match work(args.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Error::Stopped) => ExitCode::from(signals::exit_code()),
+        Err(error) => {
+            // One line, whatever a driver's message holds.
+            say::say(&format!("error: {}", error.to_string().lines().collect::<Vec<_>>().join(" ")));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn work(command: Command) -> Result<()> {
+    match command {
+        Command::Render(args) => render::render(&args),
+        Command::Devices => devices::devices(),
+        Command::Info { scene } => info::info(&scene),
+    }
+}

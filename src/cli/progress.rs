@@ -1,0 +1,167 @@
+//! How far a render is, on stderr: a bar on a terminal, plain lines elsewhere.
+
+use std::{
+    io::IsTerminal,
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use caustica::progress::{Progress, Stage};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::{say::say, signals};
+
+/// Where the progress goes.
+#[derive(Debug)]
+enum Target {
+    Nowhere,
+    /// The tenths that each stage has been told of.
+    Lines(Mutex<Vec<(Stage, u64)>>),
+    /// The bar, and the stage that it shows.
+    Bar(ProgressBar, Mutex<Option<Stage>>),
+}
+
+/// Listener that shows a render to the user and hands signals on to it.
+#[derive(Debug)]
+pub struct Display(Target);
+
+impl Display {
+    /// `quiet` shows nothing; `plain` writes lines even on a terminal.
+    pub fn new(quiet: bool, plain: bool) -> Self {
+        Self(if quiet {
+            Target::Nowhere
+        } else if plain || !std::io::stderr().is_terminal() {
+            Target::Lines(Mutex::default())
+        } else {
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+            Target::Bar(bar, Mutex::default())
+        })
+    }
+
+    /// A line for the user; nothing when quiet.
+    pub fn note(&self, line: &str) {
+        match &self.0 {
+            Target::Nowhere => {}
+            Target::Lines(_) => say(line),
+            Target::Bar(bar, _) => bar.suspend(|| say(line)),
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Target::Bar(bar, _) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Progress for Display {
+    fn report(&self, stage: Stage, done: u64, total: u64) {
+        match &self.0 {
+            Target::Nowhere => {}
+            Target::Lines(told) => {
+                if let Some(line) = next_line(&mut lock(told), stage, done, total) {
+                    say(&line);
+                }
+            }
+            Target::Bar(bar, shown) => {
+                if lock(shown).replace(stage) != Some(stage) {
+                    bar.reset();
+                    bar.set_style(style(stage));
+                    bar.set_message(name(stage));
+                }
+                bar.set_length(total);
+                bar.set_position(done);
+            }
+        }
+    }
+
+    fn stop_requested(&self) -> bool {
+        signals::stop_requested()
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The line to write now: the first of a stage, then one whenever a further tenth is done.
+fn next_line(told: &mut Vec<(Stage, u64)>, stage: Stage, done: u64, total: u64) -> Option<String> {
+    let part = |units: u64| (u128::from(done.min(total)) * u128::from(units) / u128::from(total.max(1))) as u64;
+    let tenth = part(10);
+    match told.iter_mut().find(|(s, _)| *s == stage) {
+        Some((_, last)) if tenth <= *last => return None,
+        Some((_, last)) => *last = tenth,
+        None => told.push((stage, tenth)),
+    }
+    let (name, percent) = (name(stage), part(100));
+    Some(match unit(stage) {
+        Some(unit) if total > 0 => format!("{name}: {percent} % of {total} {unit}"),
+        _ => name.to_string(),
+    })
+}
+
+fn name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Load => "load",
+        Stage::Bvh => "bvh",
+        Stage::Photons => "photons",
+        Stage::Grid => "grid",
+        Stage::Camera => "camera",
+    }
+}
+
+/// What a stage is counted in; `None`: it is not counted.
+fn unit(stage: Stage) -> Option<&'static str> {
+    match stage {
+        Stage::Photons => Some("photons"),
+        Stage::Camera => Some("tiles"),
+        Stage::Load | Stage::Bvh | Stage::Grid => None,
+    }
+}
+
+fn style(stage: Stage) -> ProgressStyle {
+    let template = match unit(stage) {
+        Some(unit) => format!("{{msg:8}} {{bar:32}} {{human_pos}} of {{human_len}} {unit}, {{eta}} left"),
+        None => "{msg}".to_string(),
+    };
+    ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_few_whatever_the_number_of_reports() {
+        let mut told = Vec::new();
+        let lines: Vec<_> = (0..=5000).filter_map(|done| next_line(&mut told, Stage::Photons, done, 5000)).collect();
+        assert_eq!(lines.len(), 11);
+        assert_eq!(lines[0], "photons: 0 % of 5000 photons");
+        assert_eq!(lines[10], "photons: 100 % of 5000 photons");
+    }
+
+    #[test]
+    fn stages_that_alternate_or_go_back_are_not_told_again() {
+        let mut told = Vec::new();
+        let mut line = |stage, done| next_line(&mut told, stage, done, 100);
+        assert_eq!(line(Stage::Grid, 0).as_deref(), Some("grid"));
+        assert!(line(Stage::Camera, 50).is_some());
+        assert!(line(Stage::Grid, 0).is_none());
+        assert!(line(Stage::Camera, 20).is_none());
+        assert!(line(Stage::Camera, 61).is_some());
+    }
+
+    #[test]
+    fn an_unknown_total_is_no_error() {
+        assert_eq!(next_line(&mut Vec::new(), Stage::Camera, 3, 0).as_deref(), Some("camera"));
+        assert!(next_line(&mut Vec::new(), Stage::Camera, 9, 4).is_some_and(|l| l.contains("100 %")));
+    }
+
+    #[test]
+    fn the_bar_takes_its_templates() {
+        for stage in [Stage::Photons, Stage::Grid] {
+            assert!(ProgressStyle::with_template("{unclosed").is_err());
+            let _ = style(stage);
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! `caustica render`.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use caustica::{
+    Error, Result,
+    gpu::Gpu,
+    image::{Frame, Origin, check_output, write_exr, write_file, write_png},
+    progress::{Progress, Stage},
+    renderer,
+    scene::Scene,
+    settings::{LightUnit, Settings},
+    stats::{Stats, timed},
+};
+
+use super::{args::RenderArgs, progress::Display, values::extension};
+
+/// Loads, renders and writes.
+pub fn render(args: &RenderArgs) -> Result<()> {
+    let started = Instant::now();
+    if args.verbose {
+        log_library();
+    }
+    let display = Display::new(args.quiet, args.verbose);
+    check_files(args)?;
+    let settings = args.settings();
+
+    let mut load_seconds = 0.0;
+    display.report(Stage::Load, 0, 0);
+    let scene = timed(&mut load_seconds, || Scene::load(&args.scene))?;
+    display.check()?;
+    display.note(&light_unit_line(&settings));
+    for warning in &scene.warnings {
+        display.note(&format!("warning: {warning}"));
+    }
+
+    let gpu = Gpu::open(args.device.as_deref())?;
+    display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
+    let result = renderer::render(&gpu, &scene, &settings, &display);
+    display.finish();
+    let renderer::Render { frame, mut stats } = result?;
+    for warning in stats.warnings.iter().filter(|w| !scene.warnings.contains(w)) {
+        display.note(&format!("warning: {warning}"));
+    }
+    let mut warnings = scene.warnings.clone();
+    warnings.extend(stats.warnings.iter().filter(|w| !scene.warnings.contains(w)).cloned());
+    stats.warnings = warnings;
+
+    let origin = Origin { scene: &scene.file_name, scene_hash: &scene.hash, settings: &settings, stats: &stats };
+    for path in &args.outputs {
+        display.check()?;
+        write_picture(path, &frame, &origin, args)?;
+        display.note(&format!("wrote {}", path.display()));
+    }
+    stats.seconds.load = load_seconds;
+    stats.seconds.total = started.elapsed().as_secs_f64();
+    if args.verbose {
+        display.note(&summary(&stats));
+    }
+    args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats))
+}
+
+/// Finds out before the work that no output would fail or overwrite another file of the same run.
+fn check_files(args: &RenderArgs) -> Result<()> {
+    let mut seen = vec![(identity(&args.scene), "the scene")];
+    for path in args.outputs.iter().chain(&args.stats) {
+        let identity = identity(path);
+        if let Some((_, what)) = seen.iter().find(|(other, _)| *other == identity) {
+            let source = io::Error::new(io::ErrorKind::InvalidInput, format!("is {what} as well"));
+            return Err(Error::Io { path: path.clone(), source });
+        }
+        check_output(path)?;
+        seen.push((identity, "another output"));
+    }
+    Ok(())
+}
+
+/// The same for all ways to write the path of one file, whether it exists or not.
+fn identity(path: &Path) -> PathBuf {
+    let of_new_file = || {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(of_new_file).unwrap_or_else(|| path.to_path_buf())
+}
+
+fn write_picture(path: &Path, frame: &Frame, origin: &Origin, args: &RenderArgs) -> Result<()> {
+    match extension(path).as_str() {
+        "png" => write_png(path, frame, args.exposure, args.tonemap.into()),
+        _ => write_exr(path, frame, origin),
+    }
+}
+
+fn write_stats(path: &Path, stats: &Stats) -> Result<()> {
+    let mut text = serde_json::to_string_pretty(stats)
+        .map_err(|e| Error::Io { path: path.to_path_buf(), source: io::Error::other(e) })?;
+    text.push('\n');
+    write_file(path, text.as_bytes())
+}
+
+fn light_unit_line(settings: &Settings) -> String {
+    match settings.light_unit {
+        LightUnit::Radiometric => "light unit: radiometric (candela read as W/sr in each channel)".to_string(),
+        LightUnit::Photometric => "light unit: photometric (candela divided by 683 lm/W)".to_string(),
+    }
+}
+
+fn summary(stats: &Stats) -> String {
+    let (s, global, caustic) = (&stats.seconds, stats.photons.global, stats.photons.caustic);
+    format!(
+        "seconds: load {:.2}, bvh {:.2}, photons {:.2}, grid {:.2}, camera {:.2}, direct {:.2}, gather {:.2}, \
+         total {:.2}\nglobal map: {} photons of {} paths\ncaustic map: {} photons of {} paths\nrays: {}\n\
+         peak device memory: {:.1} MiB",
+        s.load,
+        s.bvh,
+        s.photons,
+        s.grid,
+        s.camera,
+        s.direct,
+        s.gather,
+        s.total,
+        global.stored,
+        global.emitted,
+        caustic.stored,
+        caustic.emitted,
+        stats.rays,
+        stats.peak_device_bytes as f64 / f64::from(1 << 20),
+    )
+}
+
+/// Sends what the library logs to stderr.
+fn log_library() {
+    let _ = tracing_subscriber::fmt()
+        .with_writer(io::stderr)
+        .with_max_level(tracing_subscriber::filter::LevelFilter::DEBUG)
+        .without_time()
+        .try_init();
+}

@@ -1,0 +1,47 @@
+//! Ctrl-C and SIGTERM: ask the work to stop, and leave in time even if it does not.
+
+use std::{
+    sync::{
+        Arc, LazyLock,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+    time::Duration,
+};
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+/// How long the work may take to stop by itself. With the polling below the process is gone in under two seconds.
+const GRACE: Duration = Duration::from_millis(1500);
+const POLLING: Duration = Duration::from_millis(20);
+
+/// Number of the signal that came last; 0 while none has.
+static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
+
+/// Listens from here on.
+pub fn watch() {
+    for signal in [SIGINT, SIGTERM] {
+        // Fails only for signals that no process may catch.
+        let _ = signal_hook::flag::register_usize(signal, Arc::clone(&SIGNAL), signal as usize);
+    }
+    thread::spawn(|| {
+        while !stop_requested() {
+            thread::sleep(POLLING);
+        }
+        // The main thread ends the process before this, unless it waits for the device or the disk.
+        thread::sleep(GRACE);
+        caustica::image::close_files();
+        // Without exit handlers: drivers hang in theirs while the device is busy.
+        signal_hook::low_level::exit(exit_code().into());
+    });
+}
+
+/// A signal has come.
+pub fn stop_requested() -> bool {
+    SIGNAL.load(Ordering::Relaxed) != 0
+}
+
+/// What a shell reports of a process that the signal ended: 130 for SIGINT, 143 for SIGTERM.
+pub fn exit_code() -> u8 {
+    128 + SIGNAL.load(Ordering::Relaxed) as u8
+}

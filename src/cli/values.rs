@@ -1,0 +1,113 @@
+//! Values of options: text to number, with what is allowed in the message.
+
+use std::path::PathBuf;
+
+/// A whole number of at least 1 with an optional suffix: `250`, `200k`, `1.5M`.
+pub fn count(text: &str) -> Result<u64, String> {
+    let wrong = || "a number of at least 1, as 250, 200k or 1.5M".to_string();
+    let (digits, zeros) = match text.strip_suffix(['k', 'K']) {
+        Some(digits) => (digits, 3),
+        None => text.strip_suffix(['m', 'M']).map_or((text, 0), |digits| (digits, 6)),
+    };
+    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
+    let all_digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
+    if whole.is_empty() || !all_digits(whole) || !all_digits(fraction) || digits.ends_with('.') {
+        return Err(wrong());
+    }
+    // Exact in decimal: the fraction's digits take the place of the suffix's zeros.
+    if fraction.len() > zeros {
+        return Err(format!("not a whole number; {}", wrong()));
+    }
+    let shifted = format!("{whole}{fraction}{}", "0".repeat(zeros - fraction.len()));
+    match shifted.parse::<u64>() {
+        Ok(0) => Err(wrong()),
+        Ok(number) => Ok(number),
+        Err(_) => Err("too large".to_string()),
+    }
+}
+
+/// A count that a photon map can be asked to hold.
+pub fn photons(text: &str) -> Result<u32, String> {
+    u32::try_from(count(text)?).map_err(|_| format!("too large; at most {}", u32::MAX))
+}
+
+/// `WxH` in pixels.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
+    let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=65535).contains(n));
+    let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
+    parts.ok_or_else(|| "width x height in pixels, as 1024x768, each 1 to 65535".to_string())
+}
+
+/// Constant of the cone filter.
+pub fn cone_constant(text: &str) -> Result<f32, String> {
+    number(text).filter(|c| *c >= 1.0).ok_or_else(|| "a number of at least 1".to_string())
+}
+
+/// A radius in metres.
+pub fn radius(text: &str) -> Result<f32, String> {
+    number(text).filter(|r| *r > 0.0).ok_or_else(|| "a length in metres, more than 0".to_string())
+}
+
+/// Stops of exposure.
+pub fn exposure(text: &str) -> Result<f32, String> {
+    number(text).filter(|e| e.abs() <= 100.0).ok_or_else(|| "a number of stops, -100 to 100".to_string())
+}
+
+fn number(text: &str) -> Option<f32> {
+    text.parse::<f32>().ok().filter(|x| x.is_finite())
+}
+
+/// A file that we know how to write.
+pub fn output(path: PathBuf) -> Result<PathBuf, String> {
+    match extension(&path).as_str() {
+        "exr" | "png" => Ok(path),
+        _ => Err("the name ends in neither .exr nor .png".to_string()),
+    }
+}
+
+/// Extension in lower case, empty if there is none.
+pub fn extension(path: &std::path::Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_take_suffixes() {
+        for (text, number) in [
+            ("1", 1),
+            ("250", 250),
+            ("200k", 200_000),
+            ("1.5M", 1_500_000),
+            ("0.1k", 100),
+            ("2K", 2000),
+            ("3m", 3_000_000),
+            ("18446744073709551615", u64::MAX),
+        ] {
+            assert_eq!(count(text), Ok(number), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_count_is_refused() {
+        for text in ["", "k", "0", "0k", "-1", "+1", "1e5", "1.5", "1.0005k", "1.", "1.k", ".5k", "1kk", "1 k", "x"] {
+            assert!(count(text).is_err(), "{text}");
+        }
+        assert_eq!(count("18446744073709551616"), Err("too large".to_string()));
+        assert!(photons("4294967296").is_err() && photons("4294967295").is_ok());
+    }
+
+    #[test]
+    fn sizes_radii_and_names_have_their_ranges() {
+        assert_eq!(size("640x480"), Ok((640, 480)));
+        for text in ["640", "0x4", "4x0", "x", "4x", "4x-4", "4x4x4", "65536x1", "4.5x4"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+        assert!(cone_constant("0.99").is_err() && cone_constant("1").is_ok() && cone_constant("inf").is_err());
+        assert!(radius("0").is_err() && radius("NaN").is_err() && radius("1e-3").is_ok());
+        assert!(exposure("-2.5").is_ok() && exposure("101").is_err());
+        assert!(output("a.EXR".into()).is_ok() && output("a.jpg".into()).is_err() && output("exr".into()).is_err());
+    }
+}

@@ -1,0 +1,323 @@
+//! The command line: messages, exit codes and what is left in the folder.
+
+use std::{fs, path::Path, process::Command};
+
+use tempfile::TempDir;
+
+/// One triangle below a point light; `POSITIONS` is filled in.
+const SCENE: &str = r#"{
+  "asset": {"version": "2.0"},
+  "extensionsUsed": ["KHR_lights_punctual"],
+  "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 5}]}},
+  "scene": 0,
+  "scenes": [{"nodes": [0, 1]}],
+  "nodes": [{"mesh": 0}, {"translation": [0, 1, 0], "extensions": {"KHR_lights_punctual": {"light": 0}}}],
+  "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+  "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+    "min": [-1, 0, -1], "max": [1, 0, 1]}],
+  "bufferViews": [{"buffer": 0, "byteLength": 36}],
+  "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,POSITIONS"}]
+}"#;
+/// (-1, 0, -1), (0, 0, 1), (1, 0, -1).
+const TRIANGLE: &str = "AACAvwAAAAAAAIC/AAAAAAAAAAAAAIA/AACAPwAAAAAAAIC/";
+/// The same with NaN for the first coordinate.
+const NAN_TRIANGLE: &str = "AADAfwAAAAAAAIC/AAAAAAAAAAAAAIA/AACAPwAAAAAAAIC/";
+
+/// A folder with `scene.gltf` and a few files that are no scenes.
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let write = |name: &str, text: String| fs::write(folder.path().join(name), text).expect("can be written");
+    let scene = SCENE.replace("POSITIONS", TRIANGLE);
+    write("scene.gltf", scene.clone());
+    write("nan.gltf", SCENE.replace("POSITIONS", NAN_TRIANGLE));
+    write("dark.gltf", scene.replace(r#""nodes": [0, 1]"#, r#""nodes": [0]"#));
+    write("empty.gltf", scene.replace(r#""nodes": [0, 1]"#, r#""nodes": [1]"#));
+    write("text.gltf", "no scene at all".to_string());
+    write("old.exr", "old".to_string());
+    folder
+}
+
+/// `caustica` with these words, in the folder.
+fn command(folder: &Path, line: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_caustica"));
+    command.current_dir(folder).args(line.split_whitespace()).env_remove("CAUSTICA_DEVICE");
+    command
+}
+
+/// A process that has ended.
+struct Ended {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+impl Ended {
+    /// Checks the exit code and that stderr is one line `error: …`, which is returned.
+    fn failed(self) -> String {
+        assert_eq!((self.code, self.stdout.as_str()), (Some(1), ""), "{}", self.stderr);
+        assert!(self.stderr.starts_with("error: ") && self.stderr.lines().count() == 1, "{}", self.stderr);
+        self.stderr
+    }
+}
+
+fn run(command: &mut Command) -> Ended {
+    let output = command.output().expect("it starts");
+    let text = |bytes| String::from_utf8(bytes).expect("messages are text");
+    Ended { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+fn caustica(folder: &Path, line: &str) -> Ended {
+    run(&mut command(folder, line))
+}
+
+/// A small render of the scene, with further words.
+fn render(folder: &Path, words: &str) -> Ended {
+    caustica(folder, &format!("render scene.gltf --size 16x16 --spp 1 --photons 1k -k 10 {words}"))
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("can be listed");
+    let mut names: Vec<_> =
+        entries.map(|e| e.expect("can be listed").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2_and_says_what_is_right() {
+    let folder = folder();
+    for (words, said) in [
+        ("", "Usage: caustica"),
+        ("paint", "unrecognized subcommand"),
+        ("render", "SCENE"),
+        ("render scene.gltf", "--output"),
+        ("render scene.gltf -o a.jpg", ".exr nor .png"),
+        ("render scene.gltf -o a", ".exr nor .png"),
+        ("render scene.gltf -o a.exr --sharpen", "--sharpen"),
+        ("render scene.gltf -o a.exr --mode fast", "direct-rays"),
+        ("render scene.gltf -o a.exr --mode 5", "direct-rays"),
+        ("render scene.gltf -o a.exr --size 0x4", "1024x768"),
+        ("render scene.gltf -o a.exr --size big", "1024x768"),
+        ("render scene.gltf -o a.exr --photons 0", "at least 1"),
+        ("render scene.gltf -o a.exr --photons 2G", "1.5M"),
+        ("render scene.gltf -o a.exr --photons 5000M", "too large"),
+        ("render scene.gltf -o a.exr --max-paths -3", "max-paths"),
+        ("render scene.gltf -o a.exr -k 0", "1..=1000"),
+        ("render scene.gltf -o a.exr -k 1001", "1..=1000"),
+        ("render scene.gltf -o a.exr --cone-constant 0.5", "at least 1"),
+        ("render scene.gltf -o a.exr --max-radius 0", "more than 0"),
+        ("render scene.gltf -o a.exr --max-bounces -1", "max-bounces"),
+        ("render scene.gltf -o a.exr --spp 0", "0 is not in"),
+        ("render scene.gltf -o a.exr --seed x", "invalid digit"),
+        ("render scene.gltf -o a.exr --light-sampling all", "uniform"),
+        ("render scene.gltf -o a.exr --light-unit lumen", "photometric"),
+        ("render scene.gltf -o a.exr --tonemap film", "reinhard"),
+        ("render scene.gltf -o a.exr --exposure nan", "stops"),
+        ("render scene.gltf -o a.exr -q -v", "cannot be used with"),
+        ("info", "SCENE"),
+    ] {
+        let ended = caustica(folder.path(), words);
+        assert_eq!((ended.code, ended.stdout.as_str()), (Some(2), ""), "{words}");
+        assert!(ended.stderr.contains(said) && ended.stderr.contains("--help"), "{words}: {}", ended.stderr);
+    }
+}
+
+#[test]
+fn failures_are_exit_code_1_and_one_line_with_the_place() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("folder.exr")).expect("can be made");
+    for (words, said) in [
+        ("render none.gltf -o a.exr", "none.gltf"),
+        ("render text.gltf -o a.exr", "text.gltf"),
+        ("render nan.gltf -o a.exr", "nan.gltf"),
+        ("render dark.gltf -o a.exr", "light"),
+        ("render empty.gltf -o a.exr", "empty.gltf"),
+        ("render scene.gltf -o a.exr --camera none", "none"),
+        ("render scene.gltf -o a.exr --device no-such-adapter", "no-such-adapter"),
+        ("render scene.gltf -o folder.exr", "folder.exr: is a folder"),
+        ("render scene.gltf -o nowhere/a.exr", "the folder nowhere does not exist"),
+        ("render scene.gltf -o a.exr -o a.exr", "another output"),
+        ("render scene.gltf -o a.exr -o ./a.exr", "another output"),
+        ("render scene.gltf -o a.exr --stats a.exr", "another output"),
+        ("render scene.gltf -o a.exr --stats scene.gltf", "scene.gltf: is the scene"),
+        ("render scene.gltf -o a.exr --stats nowhere/a.json", "nowhere"),
+        ("info none.gltf", "none.gltf"),
+        ("info text.gltf", "text.gltf"),
+    ] {
+        let quiet = if words.starts_with("render") { "-q" } else { "" };
+        let message = caustica(folder.path(), &format!("{words} {quiet}")).failed();
+        assert!(message.contains(said), "{words}: {message}");
+    }
+    let left = ["dark.gltf", "empty.gltf", "folder.exr", "nan.gltf", "old.exr", "scene.gltf", "text.gltf"];
+    assert_eq!(names(folder.path()), left);
+}
+
+#[test]
+fn help_and_version_go_to_stdout() {
+    let folder = folder();
+    let help = |words: &str| {
+        let ended = caustica(folder.path(), words);
+        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{words}");
+        ended.stdout
+    };
+    assert_eq!(help("--version"), format!("caustica {}\n", env!("CARGO_PKG_VERSION")));
+    let general = help("--help");
+    assert!(["render", "devices", "info", "Exit codes"].iter().all(|said| general.contains(said)), "{general}");
+    let of_render = help("render --help");
+    for option in [
+        "--mode",
+        "--photons",
+        "--global-photons",
+        "--caustic-photons",
+        "--max-paths",
+        "-k, --neighbors",
+        "--cone-constant",
+        "--max-radius",
+        "--max-bounces",
+        "--spp",
+        "--size",
+        "--camera",
+        "--seed",
+        "--device",
+        "CAUSTICA_DEVICE",
+        "--light-sampling",
+        "--light-unit",
+        "--exposure",
+        "--tonemap",
+        "--stats",
+        "-q, --quiet",
+        "-v, --verbose",
+        "-o, --output",
+        "Examples:",
+    ] {
+        assert!(of_render.contains(option), "{option}");
+    }
+    assert!(!of_render.contains("--sharpen"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn without_an_adapter_the_error_names_what_to_install() {
+    let folder = folder();
+    for words in ["devices", "render scene.gltf -q -o a.exr"] {
+        let mut command = command(folder.path(), words);
+        let message =
+            run(command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent")).failed();
+        for said in ["apt install libvulkan1 mesa-vulkan-drivers", "dnf install", "Windows", "macOS"] {
+            assert!(message.contains(said), "{message}");
+        }
+    }
+}
+
+#[test]
+fn devices_lists_the_limits_and_says_nothing_else() {
+    let ended = caustica(folder().path(), "devices");
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    for said in ["0: ", "kind", "driver", "backend", "largest storage binding", "usable"] {
+        assert!(ended.stdout.contains(said), "{}", ended.stdout);
+    }
+}
+
+#[test]
+fn info_says_what_the_scene_holds() {
+    let ended = caustica(folder().path(), "info scene.gltf");
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    assert!(ended.stdout.contains("triangle") && ended.stdout.contains("light"), "{}", ended.stdout);
+}
+
+#[test]
+fn a_render_writes_all_that_was_asked_for() {
+    let folder = folder();
+    let ended = render(folder.path(), "-o old.exr -o b.png --stats s.json");
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(0), ""), "{}", ended.stderr);
+    for said in ["light unit: radiometric", "camera:", "wrote old.exr", "wrote b.png"] {
+        assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    }
+    assert!(!ended.stderr.contains(['\r', '\u{1b}']), "plain lines when piped: {}", ended.stderr);
+    let frame = caustica::image::read_exr(&folder.path().join("old.exr")).expect("an EXR");
+    assert_eq!((frame.width, frame.height, frame.radiance.len()), (16, 16, 256));
+    assert!(frame.radiance.iter().any(|p| p[0] > 0.0));
+    let png = image::open(folder.path().join("b.png")).expect("a PNG").into_rgb8();
+    assert_eq!(png.dimensions(), (16, 16));
+    let text = fs::read_to_string(folder.path().join("s.json")).expect("statistics");
+    let stats: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    for pointer in [
+        "/device/name",
+        "/seconds/load",
+        "/seconds/bvh",
+        "/seconds/photons",
+        "/seconds/grid",
+        "/seconds/camera",
+        "/seconds/direct",
+        "/seconds/gather",
+        "/seconds/total",
+        "/photons/global/emitted",
+        "/photons/global/stored",
+        "/photons/caustic/emitted",
+        "/photons/caustic/stored",
+        "/rays",
+        "/peak_device_bytes",
+        "/warnings",
+    ] {
+        assert!(stats.pointer(pointer).is_some(), "{pointer} is not in {text}");
+    }
+    assert!(stats.pointer("/seconds/nothing").is_none());
+}
+
+#[test]
+fn quiet_says_nothing_and_equal_runs_give_equal_files() {
+    let folder = folder();
+    let read = |name: &str| fs::read(folder.path().join(name)).expect("was written");
+    for words in ["-q -o a.exr", "-q -o b.exr -o b.png", "-q -o c.exr --seed 1"] {
+        let ended = render(folder.path(), words);
+        assert_eq!((ended.code, ended.stdout.as_str(), ended.stderr.as_str()), (Some(0), "", ""));
+    }
+    assert!(read("a.exr") == read("b.exr"));
+    let radiance = |name: &str| caustica::image::read_exr(&folder.path().join(name)).expect("an EXR").radiance;
+    assert!(radiance("a.exr") != radiance("c.exr"));
+}
+
+/// Sends a signal in the middle of a render that would take an hour.
+#[cfg(unix)]
+fn stopped_by(signal: &str, code: i32) {
+    use std::{
+        io::{BufRead, BufReader},
+        process::Stdio,
+        thread::sleep,
+        time::{Duration, Instant},
+    };
+    let folder = folder();
+    let line = "render scene.gltf --size 64x64 --spp 1000000 --photons 1k -o old.exr -o a.png --stats s.json";
+    let mut child = command(folder.path(), line).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut lines = BufReader::new(child.stderr.take().expect("it is piped")).lines();
+    let started = lines.find(|l| l.as_ref().is_ok_and(|l| l.starts_with("camera")));
+    assert!(started.is_some(), "the render did not begin");
+    Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status().expect("kill runs");
+    // The promise is two seconds; a machine under load is given time, a render that goes on is not.
+    let deadline = Instant::now() + Duration::from_secs(30);
+    let status = loop {
+        match child.try_wait().expect("it can be waited for") {
+            Some(status) => break status,
+            None if Instant::now() > deadline => {
+                child.kill().expect("it can be killed");
+                panic!("it goes on after SIG{signal}");
+            }
+            None => sleep(Duration::from_millis(10)),
+        }
+    };
+    assert_eq!(status.code(), Some(code));
+    assert_eq!(names(folder.path()), ["dark.gltf", "empty.gltf", "nan.gltf", "old.exr", "scene.gltf", "text.gltf"]);
+    assert_eq!(fs::read(folder.path().join("old.exr")).expect("it is there"), b"old");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_a_render_and_leaves_no_file() {
+    stopped_by("INT", 130);
+}
+
+#[cfg(unix)]
+#[test]
+fn sigterm_ends_a_render_and_leaves_no_file() {
+    stopped_by("TERM", 143);
+}

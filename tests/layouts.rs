@@ -1,0 +1,239 @@
+//! Every struct that crosses to the GPU has the same fields in the same places on both sides, and every shared
+//! constant the same value: the shaders are reflected with naga and compared with `layout.rs`.
+
+use std::{any::type_name, mem::offset_of};
+
+use caustica::{gpu::shaders::SHADERS, layout};
+use naga::{AddressSpace, ArraySize, Expression, Handle, Literal, Module, ScalarKind, Type, TypeInner};
+
+/// Name, byte offset and type of a field, in Rust's words.
+type Field = (String, u32, String);
+
+/// A struct of `layout.rs`.
+struct Twin {
+    name: &'static str,
+    size: u32,
+    fields: Vec<Field>,
+}
+
+/// Describes structs of `layout.rs`; a field that is left out does not compile.
+macro_rules! twins {
+    ($($name:ident { $($field:ident),+ $(,)? })+) => {
+        vec![$({
+            fn type_of<F>(_: impl Fn(layout::$name) -> F) -> String {
+                type_name::<F>().replace("caustica::layout::", "")
+            }
+            let _all = |layout::$name { $($field: _),+ }: layout::$name| ();
+            Twin {
+                name: stringify!($name),
+                size: size_of::<layout::$name>() as u32,
+                fields: vec![$((
+                    stringify!($field).to_string(),
+                    offset_of!(layout::$name, $field) as u32,
+                    type_of(|value| value.$field),
+                )),+],
+            }
+        }),+]
+    };
+}
+
+fn twins() -> Vec<Twin> {
+    twins! {
+        BvhNode { left_min, left_first, left_max, left_count, right_min, right_first, right_max, right_count }
+        Primitive { v0, material, e1, id, e2, pad }
+        Normals { n0, n1, n2, flat_shaded }
+        Material { color, kind, ior, pad0, pad1, pad2 }
+        Light { position, cdf, intensity, probability }
+        Path { origin, flags, direction, bounces, beta, media_count, media }
+        Photon { position, wi, flux, key }
+        VisiblePoint { position, valid, weight, offset, ng, pad0, ns, pad1 }
+        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
+        PhotonBatch { seed, first_path, first_path_high, paths, light_count, first_light, max_bounces, rules, staging_capacity, lost_scale, pad0, pad1 }
+        Store { staged, paths, global_capacity, caustic_capacity }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_pixel, pixels, first_sample, samples, max_bounces, pad0, pad1, pad2 }
+        FirstHit { normal, depth, albedo, alpha }
+        TilePixel { radiance, alpha, normal, depth, albedo, pad }
+        DirectLight { light, points, pad0, pad1 }
+    }
+}
+
+macro_rules! constants {
+    ($($name:ident),+ $(,)?) => { [$((stringify!($name), layout::$name as u64)),+] };
+}
+
+fn constants() -> Vec<(&'static str, u64)> {
+    constants![
+        WORKGROUP_SIZE,
+        BVH_STACK,
+        MEDIA_DEPTH,
+        SPHERE_BIT,
+        DIFFUSE,
+        MIRROR,
+        GLASS,
+        PANE,
+        NO_TURN,
+        STORE_GLOBAL,
+        STORE_DIRECT,
+        STORE_CAUSTIC,
+        FOLLOW_DIFFUSE
+    ]
+    .to_vec()
+}
+
+/// What of a kernel's text disagrees with `layout.rs`, one line each.
+fn disagreements(wgsl: &str) -> Vec<String> {
+    let module = naga::front::wgsl::parse_str(wgsl).expect("composed shaders are valid");
+    let mut found = Vec::new();
+    for handle in bound_structs(&module) {
+        found.extend(compare_struct(&module, handle));
+    }
+    for (name, value) in named_values(&module) {
+        if let Some((_, expected)) = constants().iter().find(|(n, _)| *n == name)
+            && value != Some(*expected)
+        {
+            found.push(format!("{name} is {value:?} in the shader and {expected} in layout.rs"));
+        }
+    }
+    for entry in &module.entry_points {
+        if entry.workgroup_size != [layout::WORKGROUP_SIZE, 1, 1] {
+            found.push(format!("{} has workgroups of {:?}", entry.name, entry.workgroup_size));
+        }
+    }
+    found
+}
+
+/// Structs that lie in storage or uniform buffers, also inside of others.
+fn bound_structs(module: &Module) -> Vec<Handle<Type>> {
+    let in_buffer = |space| matches!(space, AddressSpace::Storage { .. } | AddressSpace::Uniform);
+    let mut open: Vec<_> =
+        module.global_variables.iter().filter(|(_, v)| in_buffer(v.space)).map(|(_, v)| v.ty).collect();
+    let mut found = Vec::new();
+    while let Some(handle) = open.pop() {
+        match &module.types[handle].inner {
+            TypeInner::Array { base, .. } => open.push(*base),
+            TypeInner::Struct { members, .. } if !found.contains(&handle) => {
+                found.push(handle);
+                open.extend(members.iter().map(|m| m.ty));
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+fn compare_struct(module: &Module, handle: Handle<Type>) -> Vec<String> {
+    let Type { name, inner: TypeInner::Struct { members, span } } = &module.types[handle] else { return Vec::new() };
+    let name = name.as_deref().unwrap_or("a nameless struct");
+    let Some(twin) = twins().into_iter().find(|t| t.name == name) else {
+        return vec![format!("{name} lies in a buffer and is not among the twins of this test")];
+    };
+    let field = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), m.offset, rust_type(module, m.ty));
+    let fields: Vec<Field> = members.iter().map(field).collect();
+    let mut found = Vec::new();
+    if fields != twin.fields {
+        found.push(format!("{name} is {fields:?} in the shader and {:?} in layout.rs", twin.fields));
+    }
+    if *span != twin.size {
+        found.push(format!("{name} takes {span} bytes in the shader and {} in layout.rs", twin.size));
+    }
+    found
+}
+
+/// The Rust type that holds a WGSL type of a buffer.
+fn rust_type(module: &Module, handle: Handle<Type>) -> String {
+    let scalar = |s: naga::Scalar| {
+        let kind = match s.kind {
+            ScalarKind::Float => "f",
+            ScalarKind::Uint => "u",
+            ScalarKind::Sint => "i",
+            _ => "?",
+        };
+        format!("{kind}{}", s.width * 8)
+    };
+    match &module.types[handle].inner {
+        TypeInner::Scalar(s) | TypeInner::Atomic(s) => scalar(*s),
+        TypeInner::Vector { size, scalar: s } => format!("[{}; {}]", scalar(*s), *size as u32),
+        TypeInner::Array { base, size: ArraySize::Constant(n), .. } => format!("[{}; {n}]", rust_type(module, *base)),
+        TypeInner::Struct { .. } => module.types[handle].name.clone().unwrap_or_default(),
+        other => format!("{other:?}"),
+    }
+}
+
+/// Constants and overrides of the module with their whole-number values; `None` where the value is none.
+fn named_values(module: &Module) -> Vec<(String, Option<u64>)> {
+    let number = |init: Handle<Expression>| match module.global_expressions[init] {
+        Expression::Literal(Literal::U32(n)) => Some(u64::from(n)),
+        Expression::Literal(Literal::I32(n)) => u64::try_from(n).ok(),
+        Expression::Literal(Literal::AbstractInt(n)) => u64::try_from(n).ok(),
+        _ => None,
+    };
+    let constants = module.constants.iter().map(|(_, c)| (c.name.clone(), number(c.init)));
+    let overrides = module.overrides.iter().map(|(_, o)| (o.name.clone(), o.init.and_then(number)));
+    constants.chain(overrides).filter_map(|(name, value)| Some((name?, value))).collect()
+}
+
+#[test]
+fn shaders_and_host_agree() {
+    assert!(!SHADERS.is_empty());
+    let lines = |s: &caustica::gpu::shaders::Shader| {
+        disagreements(s.wgsl).into_iter().map(|line| format!("{}: {line}", s.stem)).collect::<Vec<_>>()
+    };
+    let found: Vec<_> = SHADERS.iter().flat_map(lines).collect();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn this_test_knows_every_struct_and_constant_of_the_host() {
+    let source = include_str!("../src/layout.rs");
+    let named = |prefix: &str, end: char| -> Vec<&str> {
+        source.lines().filter_map(|l| l.strip_prefix(prefix)?.split_once(end)).map(|(name, _)| name.trim()).collect()
+    };
+    let (structs, values) = (named("pub struct ", '{'), named("pub const ", ':'));
+    assert!(structs.len() > 5 && values.len() > 5, "{structs:?} {values:?}");
+    let missing: Vec<_> = structs
+        .into_iter()
+        .filter(|name| twins().iter().all(|t| t.name != *name))
+        .chain(values.into_iter().filter(|name| constants().iter().all(|(n, _)| n != name)))
+        .collect();
+    assert!(missing.is_empty(), "add to this test: {missing:?}");
+}
+
+/// A kernel that agrees with the host.
+const GOOD: &str = "
+    const WORKGROUP_SIZE: u32 = 64u;
+    const SPHERE_BIT = 1u << 31u;
+    struct Photon { position: vec3f, wi: u32, flux: vec3f, key: u32 }
+    struct Path {
+        origin: vec3f, flags: u32, direction: vec3f, bounces: u32, beta: vec3f, media_count: u32, media: array<u32, 4>,
+    }
+    @group(1) @binding(0) var<storage, read> photons: array<Photon>;
+    @group(2) @binding(0) var<storage, read_write> paths: array<Path>;
+    @compute @workgroup_size(WORKGROUP_SIZE)
+    fn probe() { paths[0].flags = photons[0].key | SPHERE_BIT; }
+";
+
+#[test]
+fn a_kernel_that_agrees_passes() {
+    assert_eq!(disagreements(GOOD), Vec::<String>::new());
+}
+
+#[test]
+fn each_kind_of_disagreement_is_reported() {
+    for (from, to, said) in [
+        ("position: vec3f, wi: u32, flux: vec3f", "flux: vec3f, wi: u32, position: vec3f", "Photon is"),
+        ("wi: u32", "wi: f32", "Photon is"),
+        ("flux: vec3f", "flow: vec3f", "Photon is"),
+        ("flux: vec3f", "flux: vec4f", "Photon takes"),
+        ("media: array<u32, 4>", "media: array<u32, 8>", "Path takes"),
+        (", key: u32 }", ", key: u32, more: u32 }", "Photon takes"),
+        ("SPHERE_BIT = 1u << 31u", "SPHERE_BIT = 1u << 30u", "SPHERE_BIT is"),
+        ("= 64u", "= 32u", "WORKGROUP_SIZE is"),
+        ("@workgroup_size(WORKGROUP_SIZE)", "@workgroup_size(8, 8)", "workgroups of"),
+        ("media: array<u32, 4>", "media: array<Medium, 4>", "Medium lies in a buffer"),
+    ] {
+        assert!(GOOD.contains(from));
+        let bad = format!("struct Medium {{ material: u32 }}\n{}", GOOD.replace(from, to));
+        let found = disagreements(&bad);
+        assert!(found.iter().any(|line| line.contains(said)), "{to}: {found:?}");
+    }
+}
