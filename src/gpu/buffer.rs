@@ -39,7 +39,7 @@ impl MemoryCount {
     }
 }
 
-/// A buffer on the device; its memory is given back when it is dropped.
+/// A buffer on the device; its memory is given back when it is dropped and no submitted work needs it any more.
 #[derive(Debug)]
 pub struct Buffer {
     pub(super) inner: wgpu::Buffer,
@@ -55,7 +55,6 @@ impl Deref for Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        self.inner.destroy();
         self.memory.now.fetch_sub(self.inner.size(), Ordering::Relaxed);
     }
 }

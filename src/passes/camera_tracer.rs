@@ -194,8 +194,8 @@ impl CameraTracer {
                 ]),
             );
             self.direct.dispatch(&mut encoder, &bindings, u64::from(points));
-            gpu.submit(std::mem::replace(&mut encoder, gpu.encoder()));
         }
+        gpu.submit(encoder);
         let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
         Ok(StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) })
     }
