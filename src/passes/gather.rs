@@ -1,7 +1,5 @@
 //! Radiance from the k nearest photons. Kernels: `key_points`, `find_radius`, `gather`.
 
-use std::mem::size_of;
-
 use super::{photon_map::PhotonMap, radix_sort::RadixSort, sort_photons::KEY_BITS};
 use crate::{
     error::Result,
