@@ -38,6 +38,7 @@ impl BuildGrid {
         let total = sizes.iter().sum();
         let cells = gpu.storage::<Cell>("cells", u64::from(total))?;
         let mut encoder = gpu.encoder();
+        let mut steps = Vec::new();
         for (&size, level) in sizes.iter().zip(0..) {
             // The finest level reads photons, window by window; the others read cells.
             let windows = if level == 0 { places.len() } else { 1 };
@@ -50,6 +51,7 @@ impl BuildGrid {
                 let step = gpu.uniform("grid step", &step);
                 let buffers = [("places", place), ("grid_cells", &cells), ("grid_step", &step)];
                 self.0.dispatch(&mut encoder, &self.0.bind(gpu, &buffers), cell_count.into());
+                steps.push(step);
             }
         }
         gpu.submit(encoder);
