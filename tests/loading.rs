@@ -120,6 +120,34 @@ fn files_that_are_not_there_or_not_gltf_are_refused() {
     assert!(no_base64.starts_with("buffers[0].uri: not base64: "), "{no_base64}");
 }
 
+/// A GLB of chunks.
+fn glb(chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
+    let word = |n: usize| (n as u32).to_le_bytes();
+    let body: Vec<u8> =
+        chunks.iter().flat_map(|(kind, data)| [&word(data.len())[..], &kind[..], data].concat()).collect();
+    [b"glTF", &word(2)[..], &word(12 + body.len()), &body].concat()
+}
+
+#[test]
+fn glb_chunks_are_read_and_unknown_ones_skipped() {
+    let mut gltf = triangle();
+    gltf["buffers"][0].as_object_mut().expect("a buffer").remove("uri");
+    let no_data = message(load(&gltf));
+    assert_eq!(no_data, "buffers[0]: has no uri, and there is no binary chunk for it");
+    let data = [floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]), vec![0, 0, 1, 0, 2, 0, 0, 0]].concat();
+    let text = gltf.to_string();
+    let whole = glb(&[(b"JSON", text.as_bytes()), (b"note", b"1234"), (b"BIN\0", &data)]);
+    let scene = load_bytes(&whole).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.triangles, loaded(&triangle()).triangles);
+    for length in 0..whole.len() {
+        assert!(load_bytes(&whole[..length]).is_err(), "cut to {length} bytes");
+    }
+    assert_eq!(message(load_bytes(&glb(&[(b"BIN\0", &data)]))), "GLB chunk: the first chunk is not JSON");
+    let mut long = whole.clone();
+    long[12] += 200;
+    assert!(load_bytes(&long).is_err());
+}
+
 #[test]
 fn scenes_without_light_or_shape_say_what_they_hold() {
     let refused = |gltf: &Value| {

@@ -106,11 +106,11 @@ fn tetrahedron(node: Value) -> Value {
     gltf
 }
 
-/// Triangles whose plane or one of whose corners' normals looks towards the middle of the scene.
+/// Triangles that look towards the middle of the scene, with their plane or with a corner's normal.
 fn inward(triangles: &[Triangle]) -> usize {
     let looks_in = |t: &Triangle| {
         let out = t.positions.iter().sum::<Vec3>();
-        t.geometric_normal().dot(out) <= 0.0 || t.normals.iter().any(|n| n.dot(t.geometric_normal()) <= 0.0)
+        t.geometric_normal().dot(out) <= 0.0 || t.normals.iter().zip(t.positions).any(|(n, p)| n.dot(p) <= 0.0)
     };
     triangles.iter().filter(|t| looks_in(t)).count()
 }
