@@ -1,4 +1,5 @@
 //! Small glTF files made on the spot.
+#![allow(dead_code, reason = "no test uses all of them")]
 
 use base64::Engine as _;
 use caustica::scene::Scene;
