@@ -178,7 +178,7 @@ fn a_shrunken_box_is_found() {
     assert!(fault(&twice).is_some());
 }
 
-/// Each triangle is a tenth of the next one and lies in its corner: the area heuristic peels one off at each level.
+/// Triangles that grow by a factor from one corner: the area heuristic peels one off at each level.
 #[test]
 fn depth_stays_within_the_stack() {
     let mut scene = Scene::default();

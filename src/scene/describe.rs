@@ -88,10 +88,11 @@ impl Scene {
     }
 }
 
-/// Three numbers with about six digits.
+/// Three numbers with about six digits of the largest.
 fn triple(v: [f64; 3]) -> String {
+    let largest = v.into_iter().map(f64::abs).fold(1e-6, f64::max);
+    let digits = (5.0 - largest.log10().floor()).clamp(0.0, 9.0) as usize;
     v.map(|x| {
-        let digits = (5.0 - x.abs().max(1e-6).log10().floor()).clamp(0.0, 9.0) as usize;
         let text = format!("{x:.digits$}");
         let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
         if text == "-0" { "0".to_owned() } else { text.to_owned() }

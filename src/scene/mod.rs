@@ -111,7 +111,7 @@ impl Scene {
             let problem = if unread.is_empty() {
                 "no light: add a point light (KHR_lights_punctual)".to_owned()
             } else {
-                format!("no light: it holds {}, which are not read yet; add a point light", unread.join(" and "))
+                format!("no light that is read yet: it holds {}; add a point light", unread.join(" and "))
             };
             return Err(error("scene", problem));
         }

@@ -92,8 +92,12 @@ impl<'a> Document<'a> {
         self.decode(index, |bytes| unsigned(bytes, component))
     }
 
-    /// Checks all accessors, also those that nothing uses: ranges, references, and that floats are finite.
+    /// Checks all views and accessors, also those that nothing uses: ranges, references, and that floats are finite.
     pub(super) fn check(&self) -> Read<()> {
+        let plain = |view: &json::buffer::View| view.extensions.as_ref().is_none_or(|e| e.others.is_empty());
+        for (i, _) in self.root.buffer_views.iter().enumerate().filter(|(_, view)| plain(view)) {
+            self.view(i, "")?;
+        }
         for (i, accessor) in self.root.accessors.iter().enumerate() {
             let place = format!("accessors[{i}]");
             let float =
@@ -177,7 +181,11 @@ impl<'a> Document<'a> {
         let new =
             self.elements(new.buffer_view.value(), new.byte_offset.0, count, size, &format!("{place}.sparse.values"))?;
         let known = values.len();
+        let mut previous = None;
         for (index, bytes) in list.iter().map(|bytes| unsigned(bytes, component.0)).zip(new.iter()) {
+            if previous.replace(index).is_some_and(|previous| previous >= index) {
+                return fault(at, format!("index {index} does not come after the one before it"));
+            }
             match values.get_mut(index as usize) {
                 Some(value) => *value = element(bytes),
                 None => return fault(at, format!("index {index} of {known} elements")),

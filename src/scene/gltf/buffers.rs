@@ -25,8 +25,10 @@ pub(super) fn read<'a>(
     for (i, buffer) in root.buffers.iter().enumerate() {
         let place = format!("buffers[{i}]");
         let length = buffer.byte_length.0;
+        let is_plain = buffer.extensions.as_ref().is_none_or(|extensions| extensions.others.is_empty());
         let bytes = match &buffer.uri {
             None if i == 0 && bin.is_some() => bin.map(Cow::Borrowed),
+            None if is_plain => return fault(place, "has no uri, and there is no binary chunk for it"),
             None => None,
             Some(uri) if uri.starts_with("data:") => Some(Cow::Owned(decode_data_uri(uri, &place)?)),
             Some(uri) => {
@@ -51,6 +53,9 @@ fn decode_data_uri(uri: &str, place: &str) -> Read<Vec<u8>> {
     let Some((header, data)) = uri.split_once(',') else {
         return fault(place, "data URI without a comma");
     };
+    if header.split(';').skip(1).any(str::is_empty) {
+        return fault(place, format!("{header:?} is not a media type"));
+    }
     if header.ends_with(";base64") {
         let lenient = GeneralPurposeConfig::new()
             .with_decode_padding_mode(DecodePaddingMode::Indifferent)

@@ -10,7 +10,7 @@ use glam::DVec3;
 use gltf::json;
 use sha2::{Digest as _, Sha256};
 
-use super::{Camera, Light, Scene, Sphere};
+use super::{Bounds, Camera, Light, Scene, Sphere};
 use crate::{Error, Result};
 
 mod accessor;
@@ -153,8 +153,11 @@ impl Carried {
         scene.cameras = self.cameras.into_iter().map(|(_, p, camera)| Camera { position: at(p), ..camera }).collect();
         self.unread_lights.iter().for_each(|kind| *scene.unread_lights.entry(kind).or_default() += 1);
         if scene.cameras.is_empty() {
-            notes.add("no perspective camera: one is made that frames the whole scene");
-            scene.cameras.push(Camera::framing(scene.bounds()));
+            let bounds = scene.bounds();
+            if bounds != Bounds::EMPTY {
+                notes.add("no perspective camera: one is made that frames the whole scene");
+            }
+            scene.cameras.push(Camera::framing(bounds));
         }
     }
 }

@@ -160,7 +160,8 @@ pub(super) fn sphere(root: &json::Root, placed: &Placed, notes: &mut Notes) -> R
         return fault(at, "scales its sphere differently along its axes, or not at all; spheres take a uniform scale");
     };
     let radius = scale * shape.sphere.radius;
-    if !(radius.is_finite() && radius > 0.0) {
+    // In f32, as it is rendered: neither zero nor infinite.
+    if !(radius as f32).is_normal() || radius < 0.0 {
         return fault(format!("{place}.sphere.radius"), format!("{} is not a positive number", shape.sphere.radius));
     }
     let material = match &node.extras {

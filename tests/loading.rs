@@ -1,0 +1,218 @@
+//! What is refused, and with which words.
+
+mod gltf;
+
+use caustica::scene::Scene;
+use gltf::{add_accessor, data_uri, floats, load, load_bytes, loaded, message, triangle};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+/// The whole line that a change of the triangle is refused with.
+fn refusal(change: impl FnOnce(&mut Value)) -> String {
+    let mut gltf = triangle();
+    assert!(load(&gltf).is_ok(), "the unchanged file loads");
+    change(&mut gltf);
+    message(load(&gltf))
+}
+
+#[test]
+fn faults_are_named_with_their_place() {
+    let check = |change: fn(&mut Value), expected: &str| assert_eq!(refusal(change), expected);
+    check(|g| g["asset"]["version"] = "1.0".into(), "asset.version: glTF 1.0 is not read, only 2.0");
+    check(|g| g["asset"]["minVersion"] = "2.1".into(), "asset.minVersion: the file needs glTF 2.1, only 2.0 is read");
+    check(
+        |g| g["extensionsRequired"] = json!(["KHR_lights_punctual", "KHR_draco_mesh_compression"]),
+        "extensionsRequired[1]: KHR_draco_mesh_compression is not supported",
+    );
+    check(|g| g["scene"] = 3.into(), "scene: 3 of 1");
+    check(|g| g["nodes"][0]["mesh"] = 7.into(), "nodes[0].mesh: 7 of 1");
+    check(|g| g["nodes"][0]["children"] = json!([0]), "nodes[0]: is its own ancestor");
+    check(|g| g["nodes"][0]["children"] = json!([1]), "scenes[0].nodes: reach node 1 twice");
+    check(|g| g["nodes"][0]["rotation"] = json!([0, 0, 0, 0]), "nodes[0].rotation: [0, 0, 0, 0] is not a rotation");
+    check(|g| g["nodes"][2]["scale"] = json!([0, 0, 0]), "nodes[2]: its transform leaves its camera no direction");
+    check(
+        |g| g["cameras"][0]["perspective"]["yfov"] = 4.into(),
+        "cameras[0].perspective.yfov: 4 is not between 0 and pi",
+    );
+    check(|g| g["meshes"][0]["primitives"][0]["material"] = 2.into(), "meshes[0].primitives[0].material: 2 of 1");
+    check(|g| g["meshes"][0]["primitives"][0]["mode"] = 9.into(), "meshes[0].primitives[0].mode: is not one of glTF's");
+    check(
+        |g| g["accessors"][0]["type"] = "VEC2".into(),
+        "meshes[0].primitives[0].attributes.POSITION: is Vec2 of F32, not Vec3 of F32",
+    );
+    check(
+        |g| g["accessors"][1]["componentType"] = 5126.into(),
+        "meshes[0].primitives[0].indices: is Scalar of F32, not Scalar of U8, U16 or U32",
+    );
+    check(|g| g["accessors"][0]["bufferView"] = 5.into(), "accessors[0].bufferView: 5 of 2");
+    check(
+        |g| g["accessors"][0]["count"] = 4_294_967_295_u32.into(),
+        "accessors[0]: 4294967295 elements at byte 0 run past bufferViews[0], which has 36 bytes",
+    );
+    check(
+        |g| g["accessors"][0]["byteOffset"] = u64::MAX.into(),
+        "accessors[0]: 3 elements at byte 18446744073709551615 run past bufferViews[0], which has 36 bytes",
+    );
+    check(
+        |g| g["bufferViews"][0]["byteStride"] = 8.into(),
+        "bufferViews[0].byteStride: 8 is less than the 12 bytes of an element of accessors[0]",
+    );
+    check(
+        |g| g["bufferViews"][1]["byteLength"] = 9.into(),
+        "bufferViews[1]: 9 bytes at 36 run past buffers[0], which has 44",
+    );
+    check(|g| g["buffers"][0]["byteLength"] = 45.into(), "buffers[0]: byteLength is 45, but there are 44 bytes");
+    check(
+        |g| g["buffers"][0]["uri"] = "../secret.bin".into(),
+        r#"buffers[0].uri: "../secret.bin": only data URIs and files in the scene's own folder are read"#,
+    );
+    check(
+        |g| g["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"] = json!(-1),
+        "extensions.KHR_lights_punctual.lights[0]: intensity -1 times color [1.0, 1.0, 1.0] is not a positive number",
+    );
+    check(
+        |g| g["nodes"][1]["extensions"]["KHR_lights_punctual"]["light"] = 1.into(),
+        "nodes[1].extensions.KHR_lights_punctual.light: 1 of 1",
+    );
+}
+
+#[test]
+fn vertices_that_are_not_there_or_not_numbers_are_refused() {
+    let nan = refusal(|g| {
+        let positions = add_accessor(g, &floats(&[0.0, 0.0, 0.0, 1.0, f32::NAN, 0.0, 0.0, 1.0, 0.0]), 5126, 3, "VEC3");
+        g["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = positions.into();
+    });
+    assert_eq!(nan, "meshes[0].primitives[0].attributes.POSITION: vertex 1 is not finite: [1, NaN, 0]");
+    let index = refusal(|g| {
+        let indices = add_accessor(g, &[0, 1, 3], 5121, 3, "SCALAR");
+        g["meshes"][0]["primitives"][0]["indices"] = indices.into();
+    });
+    assert_eq!(index, "meshes[0].primitives[0].indices: index 3 at 2, but there are 3 vertices");
+    let normals = refusal(|g| {
+        let normals = add_accessor(g, &floats(&[0.0; 6]), 5126, 2, "VEC3");
+        g["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals.into();
+    });
+    assert_eq!(normals, "meshes[0].primitives[0].attributes.NORMAL: has 2 elements, other attributes have 3");
+    let sparse = refusal(|g| {
+        g["accessors"][0]["sparse"] = json!({
+            "count": 1,
+            "indices": { "bufferView": 1, "byteOffset": 2, "componentType": 5125 },
+            "values": { "bufferView": 0 },
+        });
+    });
+    assert_eq!(sparse, "accessors[0].sparse.indices: index 131073 of 3 elements");
+}
+
+#[test]
+fn files_that_are_not_there_or_not_gltf_are_refused() {
+    let missing = Scene::load(std::path::Path::new("no/such/scene.gltf")).expect_err("no such file").to_string();
+    assert!(missing.starts_with("no/such/scene.gltf: "), "{missing}");
+    assert_eq!(message(load_bytes(b"")), "file: is neither glTF JSON nor a GLB container");
+    assert_eq!(message(load_bytes(b"\x89PNG\r\n")), "file: is neither glTF JSON nor a GLB container");
+    assert_eq!(message(load_bytes(b"{\"asset\"")), "JSON: EOF while parsing an object at line 1 column 8");
+    assert_eq!(message(load_bytes(b"glTF\x02\0\0\0")), "GLB header: needs 12 bytes, the file has 8");
+    assert_eq!(message(load_bytes(b"glTF\x02\0\0\0\x07\0\0\0")), "GLB header: says 7 bytes, the file has 12");
+    let no_file = refusal(|g| g["buffers"][0]["uri"] = "gone.bin".into());
+    assert!(no_file.starts_with(r#"buffers[0].uri: "gone.bin": "#), "{no_file}");
+    let no_base64 = refusal(|g| g["buffers"][0]["uri"] = "data:;base64,!".into());
+    assert!(no_base64.starts_with("buffers[0].uri: not base64: "), "{no_base64}");
+}
+
+/// A GLB of chunks.
+fn glb(chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
+    let word = |n: usize| (n as u32).to_le_bytes();
+    let body: Vec<u8> =
+        chunks.iter().flat_map(|(kind, data)| [&word(data.len())[..], &kind[..], data].concat()).collect();
+    [b"glTF", &word(2)[..], &word(12 + body.len()), &body].concat()
+}
+
+#[test]
+fn glb_chunks_are_read_and_unknown_ones_skipped() {
+    let mut gltf = triangle();
+    gltf["buffers"][0].as_object_mut().expect("a buffer").remove("uri");
+    let no_data = message(load(&gltf));
+    assert_eq!(no_data, "buffers[0]: has no uri, and there is no binary chunk for it");
+    let data = [floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]), vec![0, 0, 1, 0, 2, 0, 0, 0]].concat();
+    let text = gltf.to_string();
+    let whole = glb(&[(b"JSON", text.as_bytes()), (b"note", b"1234"), (b"BIN\0", &data)]);
+    let scene = load_bytes(&whole).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.triangles, loaded(&triangle()).triangles);
+    for length in 0..whole.len() {
+        assert!(load_bytes(&whole[..length]).is_err(), "cut to {length} bytes");
+    }
+    assert_eq!(message(load_bytes(&glb(&[(b"BIN\0", &data)]))), "GLB chunk: the first chunk is not JSON");
+    let mut long = whole.clone();
+    long[12] += 200;
+    assert!(load_bytes(&long).is_err());
+}
+
+#[test]
+fn scenes_without_light_or_shape_say_what_they_hold() {
+    let refused = |gltf: &Value| {
+        let error = loaded(gltf).check_renderable().expect_err("nothing to render").to_string();
+        error.split_once("test.gltf: ").expect("the file is named").1.to_owned()
+    };
+    assert!(loaded(&triangle()).check_renderable().is_ok());
+    let mut gltf = triangle();
+    gltf["extensions"]["KHR_lights_punctual"]["lights"] =
+        json!([{ "type": "spot", "spot": {} }, { "type": "directional" }]);
+    gltf["nodes"][0]["extensions"] = json!({ "KHR_lights_punctual": { "light": 1 } });
+    let expected = "scene: no light that is read yet: it holds 1 directional light and 1 spot light; add a point light";
+    assert_eq!(refused(&gltf), expected);
+    gltf["scenes"][0]["nodes"] = json!([0, 2]);
+    gltf["nodes"][0].as_object_mut().expect("a node").remove("extensions");
+    assert_eq!(refused(&gltf), "scene: no light: add a point light (KHR_lights_punctual)");
+    gltf["meshes"][0]["primitives"][0]["mode"] = 1.into();
+    assert_eq!(
+        refused(&gltf),
+        "scene: nothing to draw: it holds no triangle and no sphere (points and lines are not drawn)"
+    );
+}
+
+#[test]
+fn the_hash_covers_the_files_beside_the_scene() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut gltf = triangle();
+    gltf["buffers"][0]["uri"] = "my%20data.bin".into();
+    let path = folder.path().join("test.gltf");
+    std::fs::write(&path, gltf.to_string()).expect("a temporary file");
+    let hash = |last: u8| {
+        let mut bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        bytes.extend([0, 0, 1, 0, 2, 0, 0, last]);
+        std::fs::write(folder.path().join("my data.bin"), bytes).expect("a temporary file");
+        Scene::load(&path).unwrap_or_else(|error| panic!("{error}")).hash
+    };
+    assert_eq!(hash(0), hash(0));
+    assert_ne!(hash(0), hash(1));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever happens to the bytes, the file loads or is refused; nothing panics and nothing is not a number.
+    #[test]
+    fn damaged_files_never_panic(changes in prop::collection::vec((0_usize..10_000, any::<u8>()), 1..4), cut in 0_usize..20_000) {
+        let mut bytes = triangle().to_string().into_bytes();
+        let length = bytes.len();
+        for (at, value) in changes {
+            // Mostly digits and structure, which leave the JSON whole more often than any byte.
+            bytes[at % length] = if value < 200 { b"0123456789-.e,:[]{}\"x"[value as usize % 21] } else { value };
+        }
+        bytes.truncate(cut.max(1));
+        if let Ok(scene) = load_bytes(&bytes) {
+            prop_assert!(scene.triangles.iter().all(|t| t.positions.iter().chain(&t.normals).all(|v| v.is_finite())));
+            prop_assert!(!scene.cameras.is_empty());
+            let _ = (scene.check_renderable(), scene.describe().to_string(), caustica::bvh::Bvh::build(&scene));
+        }
+    }
+
+    /// The same for what the data hold.
+    #[test]
+    fn damaged_data_never_panic(bytes in prop::collection::vec(any::<u8>(), 44)) {
+        let mut gltf = triangle();
+        gltf["buffers"][0]["uri"] = data_uri(&bytes).into();
+        if let Ok(scene) = load(&gltf) {
+            prop_assert!(scene.triangles.iter().all(|t| t.positions.iter().chain(&t.normals).all(|v| v.is_finite())));
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! How triangles and spheres come out of meshes, nodes and transforms.
+
+mod gltf;
+
+use caustica::scene::{Scene, Triangle};
+use glam::{Mat4, Quat, Vec3};
+use gltf::{add_accessor, data_uri, floats, load, loaded, message, triangle};
+use serde_json::{Value, json};
+
+/// Corners of a unit square in the plane z = 0, in an order that suits a strip.
+const SQUARE: [f32; 12] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0];
+
+/// The triangle's file with another primitive: positions, mode, indices of the given type.
+fn with_primitive(positions: &[f32], mode: u32, indices: Option<(u32, Vec<u8>, usize)>) -> Value {
+    let mut gltf = triangle();
+    let positions = add_accessor(&mut gltf, &floats(positions), 5126, positions.len() / 3, "VEC3");
+    let mut primitive = json!({ "attributes": { "POSITION": positions }, "mode": mode, "material": 0 });
+    if let Some((component, bytes, count)) = indices {
+        primitive["indices"] = add_accessor(&mut gltf, &bytes, component, count, "SCALAR").into();
+    }
+    gltf["meshes"][0]["primitives"] = json!([primitive]);
+    gltf
+}
+
+/// Triangles as sets of corners, each starting at its smallest: equal for equal surfaces with equal outsides.
+fn surface(scene: &Scene) -> Vec<[[i32; 3]; 3]> {
+    let corner = |p: Vec3| (p * 1000.0).round().as_ivec3().to_array();
+    let mut surface: Vec<_> = scene
+        .triangles
+        .iter()
+        .map(|triangle| {
+            let mut corners = triangle.positions.map(corner);
+            let first = (0..3).min_by_key(|i| corners[*i]).expect("three corners");
+            corners.rotate_left(first);
+            corners
+        })
+        .collect();
+    surface.sort_unstable();
+    surface
+}
+
+#[test]
+fn lists_strips_and_fans_give_the_same_surface() {
+    let bytes = |indices: &[u32], size: usize| indices.iter().flat_map(|i| i.to_le_bytes()[..size].to_vec()).collect();
+    let list = [0, 1, 2, 2, 1, 3];
+    let expected = surface(&loaded(&with_primitive(&SQUARE, 4, Some((5125, bytes(&list, 4), 6)))));
+    assert_eq!(expected.len(), 2);
+    for (component, size) in [(5121, 1), (5123, 2)] {
+        assert_eq!(surface(&loaded(&with_primitive(&SQUARE, 4, Some((component, bytes(&list, size), 6))))), expected);
+    }
+    assert_eq!(surface(&loaded(&with_primitive(&SQUARE, 5, None))), expected);
+    // The fan goes round: its diagonal must be the strip's.
+    let fan = bytes(&[1, 3, 2, 0], 1);
+    assert_eq!(surface(&loaded(&with_primitive(&SQUARE, 6, Some((5121, fan, 4))))), expected);
+    let corners: Vec<f32> = list.iter().flat_map(|i| SQUARE[3 * *i as usize..][..3].to_vec()).collect();
+    assert_eq!(surface(&loaded(&with_primitive(&corners, 4, None))), expected);
+    // Negative control: the other winding is another surface.
+    let turned = bytes(&[0, 2, 1, 2, 3, 1], 1);
+    assert_ne!(surface(&loaded(&with_primitive(&SQUARE, 4, Some((5121, turned, 6))))), expected);
+}
+
+#[test]
+fn interleaved_sparse_and_quantized_positions_are_read() {
+    let expected = surface(&loaded(&triangle()));
+    let mut interleaved = triangle();
+    let vertices = floats(&[0.0, 0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 9.0, 0.0, 1.0, 0.0, 9.0]);
+    let accessor = add_accessor(&mut interleaved, &vertices, 5126, 3, "VEC3");
+    interleaved["bufferViews"][2]["byteStride"] = 16.into();
+    interleaved["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = accessor.into();
+    assert_eq!(surface(&loaded(&interleaved)), expected);
+
+    let mut sparse = triangle();
+    let bytes = [vec![1, 2, 0, 0], floats(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0])].concat();
+    sparse["buffers"].as_array_mut().expect("a list").push(json!({ "byteLength": 28, "uri": data_uri(&bytes) }));
+    sparse["bufferViews"].as_array_mut().expect("a list").push(json!({ "buffer": 1, "byteLength": 28 }));
+    sparse["accessors"][0] = json!({ "componentType": 5126, "count": 3, "type": "VEC3", "sparse": {
+        "count": 2,
+        "indices": { "bufferView": 2, "componentType": 5121 },
+        "values": { "bufferView": 2, "byteOffset": 4 },
+    } });
+    assert_eq!(surface(&loaded(&sparse)), expected);
+
+    let mut quantized = triangle();
+    let vertices = [0, 0, 0, 0, 255, 0, 0, 0, 0, 255, 0, 0];
+    let accessor = add_accessor(&mut quantized, &vertices, 5121, 3, "VEC3");
+    quantized["accessors"][accessor]["normalized"] = true.into();
+    quantized["bufferViews"][2]["byteStride"] = 4.into();
+    quantized["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = accessor.into();
+    let undeclared = message(load(&quantized));
+    assert!(undeclared.ends_with("is Vec3 of normalized U8, not Vec3 of F32"), "{undeclared}");
+    quantized["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+    quantized["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
+    assert_eq!(surface(&loaded(&quantized)), expected);
+}
+
+/// A tetrahedron around the origin with its outside out, and normals that point from the centre.
+fn tetrahedron(node: Value) -> Value {
+    let corners = [[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0]];
+    let indices = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3];
+    let mut gltf = with_primitive(&corners.concat(), 4, Some((5121, indices.to_vec(), 12)));
+    let normals: Vec<f32> = corners.iter().flat_map(|c: &[f32; 3]| Vec3::from(*c).normalize().to_array()).collect();
+    let normals = add_accessor(&mut gltf, &floats(&normals), 5126, 4, "VEC3");
+    gltf["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals.into();
+    gltf["nodes"][0] = node;
+    gltf["nodes"][0]["mesh"] = 0.into();
+    gltf
+}
+
+/// Triangles that look towards the middle of the scene, with their plane or with a corner's normal.
+fn inward(triangles: &[Triangle]) -> usize {
+    let looks_in = |t: &Triangle| {
+        let out = t.positions.iter().sum::<Vec3>();
+        t.geometric_normal().dot(out) <= 0.0 || t.normals.iter().zip(t.positions).any(|(n, p)| n.dot(p) <= 0.0)
+    };
+    triangles.iter().filter(|t| looks_in(t)).count()
+}
+
+#[test]
+fn mirrored_and_stretched_solids_keep_their_outside() {
+    let stretched =
+        Mat4::from_scale_rotation_translation(Vec3::new(-3.0, 0.2, 1.0), Quat::from_rotation_z(1.0), Vec3::Y);
+    for node in [
+        json!({}),
+        json!({ "scale": [-1, 1, 1] }),
+        json!({ "scale": [-1, -1, -2], "rotation": [0.5, 0.5, 0.5, 0.5] }),
+        json!({ "scale": [1, 5, 0.1], "translation": [3, 4, 5] }),
+        json!({ "matrix": stretched.to_cols_array() }),
+    ] {
+        let scene = loaded(&tetrahedron(node.clone()));
+        assert_eq!(scene.triangles.len(), 4, "{node}");
+        assert_eq!(inward(&scene.triangles), 0, "{node}");
+        assert!(scene.triangles.iter().flat_map(|t| t.normals).all(|n| (n.length() - 1.0).abs() < 1e-5));
+    }
+    // Negative control: one triangle turned round is found.
+    let mut scene = loaded(&tetrahedron(json!({})));
+    scene.triangles[2].positions.swap(0, 1);
+    assert_eq!(inward(&scene.triangles), 1);
+}
+
+#[test]
+fn normals_are_perpendicular_after_stretching() {
+    // A plane x + y = const and its normal; stretched by 4 along x, the plane's normal is (1/4, 1, 0).
+    let mut gltf = with_primitive(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0], 4, None);
+    let normals = add_accessor(&mut gltf, &floats(&[1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]), 5126, 3, "VEC3");
+    gltf["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals.into();
+    gltf["nodes"][0]["scale"] = json!([4, 1, 1]);
+    let scene = loaded(&gltf);
+    let expected = Vec3::new(0.25, 1.0, 0.0).normalize();
+    let [a, b, zero] = scene.triangles[0].normals;
+    assert!((a - expected).length() < 1e-6 && (b - expected).length() < 1e-6, "{a} {b}");
+    assert_eq!(zero, scene.triangles[0].geometric_normal(), "a normal without length gives way to the plane's");
+}
+
+#[test]
+fn triangles_without_area_are_dropped_and_counted() {
+    let gltf = with_primitive(
+        &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+        4,
+        None,
+    );
+    let scene = loaded(&gltf);
+    assert_eq!(scene.triangles.len(), 1);
+    assert_eq!(scene.warnings, ["1 of 2 triangles have no area and are not drawn"]);
+    // Smallness alone is no reason.
+    let small = with_primitive(&[0.0, 0.0, 0.0, 1e-15, 0.0, 0.0, 0.0, 1e-15, 0.0], 4, None);
+    assert_eq!(loaded(&small).triangles.len(), 1);
+}
+
+#[test]
+fn far_from_the_origin_is_as_near_it() {
+    let at = |x: f64| {
+        let mut gltf = tetrahedron(json!({}));
+        let children = [0, 1, 2];
+        gltf["nodes"].as_array_mut().expect("a list").push(json!({ "translation": [x, -x, x], "children": children }));
+        gltf["scenes"][0]["nodes"] = json!([3]);
+        loaded(&gltf)
+    };
+    // A power of two, which f32 holds exactly: nothing but the loader could lose digits.
+    let (near, far) = (at(0.0), at(67_108_864.0));
+    assert_eq!(far.center.x, 67_108_864.0);
+    assert_eq!(near.triangles, far.triangles);
+    assert_eq!(near.lights, far.lights);
+    assert_eq!(near.cameras, far.cameras);
+    assert_eq!(far.describe().lights[0].position, [67_108_864.0, -67_108_864.0, 67_108_866.0]);
+    // Negative control: in f32 the same place has no room for the triangles.
+    assert_eq!(67_108_864.0_f32 + 1.0, 67_108_864.0);
+}
+
+#[test]
+fn deep_chains_of_nodes_do_not_overflow_the_stack() {
+    let mut gltf = triangle();
+    let nodes: Vec<Value> = (0..50_000).map(|i| json!({ "children": [i + 4], "translation": [0, 0, 1] })).collect();
+    let list = gltf["nodes"].as_array_mut().expect("a list");
+    list.extend(nodes);
+    list.insert(3, json!({ "children": [4] }));
+    list.push(json!({ "mesh": 0 }));
+    gltf["nodes"][3]["children"] = json!([4]);
+    gltf["scenes"][0]["nodes"] = json!([1, 3]);
+    // Node 3 leads to 4, and node i to i + 1.
+    for i in 4..50_004 {
+        gltf["nodes"][i]["children"] = json!([i + 1]);
+    }
+    assert_eq!(loaded(&gltf).center.z, 50_000.0);
+}
+
+#[test]
+fn spheres_are_exact_and_need_a_uniform_scale() {
+    let mut gltf = triangle();
+    gltf["extensions"]["KHR_implicit_shapes"] =
+        json!({ "shapes": [{ "type": "sphere", "sphere": { "radius": 0.4 } }, { "type": "box" }] });
+    gltf["materials"]
+        .as_array_mut()
+        .expect("a list")
+        .push(json!({ "name": "other", "pbrMetallicRoughness": { "roughnessFactor": 0 } }));
+    gltf["nodes"][0] = json!({
+        "translation": [1, 2, 3], "scale": [-2, 2, 2], "rotation": [0.5, 0.5, 0.5, 0.5],
+        "extensions": { "KHR_implicit_shapes": { "shape": 0 } }, "extras": { "material": 1 },
+    });
+    let scene = loaded(&gltf);
+    let sphere = scene.spheres[0];
+    assert_eq!((sphere.center, sphere.radius), (Vec3::ZERO, 0.8));
+    assert_eq!(scene.center.to_array(), [1.0, 2.0, 3.0]);
+    assert_eq!(scene.materials[sphere.material as usize].name, "other");
+
+    let mut oval = gltf.clone();
+    oval["nodes"][0]["scale"] = json!([2, 2, 2.1]);
+    let uneven = "nodes[0]: scales its sphere differently along its axes, or not at all; spheres take a uniform scale";
+    assert_eq!(message(load(&oval)), uneven);
+    let mut unknown = gltf.clone();
+    unknown["nodes"][0]["extensions"]["KHR_implicit_shapes"]["shape"] = 2.into();
+    assert_eq!(message(load(&unknown)), "nodes[0].extensions.KHR_implicit_shapes.shape: 2 of 2");
+    unknown["nodes"][0]["extensions"]["KHR_implicit_shapes"]["shape"] = 1.into();
+    assert_eq!(loaded(&unknown).warnings[0], r#"implicit shapes of type "box" are not drawn, only spheres"#);
+}
