@@ -65,7 +65,10 @@ fn shader_entry(stem: &str, wgsl: &str) -> String {
         )
         .expect("a String can be written");
     }
-    format!("    Shader {{ stem: {stem:?}, wgsl: {wgsl:?}, bindings: &[\n{bindings}    ] }},\n")
+    let overrides: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
+    format!(
+        "    Shader {{ stem: {stem:?}, wgsl: {wgsl:?}, overrides: &{overrides:?}, bindings: &[\n{bindings}    ] }},\n"
+    )
 }
 
 /// Stops the build with naga's message and the file and line that it stems from.

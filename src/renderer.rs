@@ -48,7 +48,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Prog
     gpu.memory.restart_peak();
 
     progress.report(Stage::Bvh, 0, 1);
-    let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene))?;
+    let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
     let buffers = SceneBuffers::new(gpu, scene, &bvh, settings)?;
     drop(bvh);
     let maps = photon_maps(gpu, scene, &buffers, settings, progress, &mut stats)?;
@@ -71,7 +71,7 @@ fn photon_maps(
     if !settings.mode.traces_photons() {
         return Ok(Vec::new());
     }
-    let caustics = scene.has_delta_surface();
+    let caustics = scene.has_delta();
     let traced = timed(&mut stats.seconds.photons, || {
         PhotonTracer::new(gpu, buffers).trace(gpu, buffers, settings, caustics, progress)
     })?;

@@ -54,10 +54,10 @@ fn closed_sphere_has_the_radiance_of_the_series() {
 /// Traces photons in mode 1 and returns them with the sum of their flux per channel, W.
 fn trace_photons(scene: &Scene, settings: &Settings) -> (TracedPhotons, [f64; 3]) {
     let gpu = gpu();
-    let bvh = Bvh::build(scene).expect("the scene has a tree");
+    let bvh = Bvh::build(scene);
     let buffers = SceneBuffers::new(gpu, scene, &bvh, settings).expect("the scene fits");
     let tracer = PhotonTracer::new(gpu, &buffers);
-    let traced = tracer.trace(gpu, &buffers, settings, scene.has_delta_surface(), &Silent).expect("photons trace");
+    let traced = tracer.trace(gpu, &buffers, settings, scene.has_delta(), &Silent).expect("photons trace");
     let photons: Vec<Photon> = traced.global.read(gpu).expect("photons read back");
     let sum = |c: usize| photons.iter().map(|p| f64::from(p.flux[c])).sum::<f64>() / traced.global.emitted as f64;
     let flux = [0, 1, 2].map(sum);

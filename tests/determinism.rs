@@ -66,7 +66,7 @@ fn emitted_directions(count: u32) -> Vec<Vec3> {
     let mut scene = scene(&[diffuse(0.5)]);
     scene.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
     scene.lights.push(point_light(Vec3::ZERO, 1.0));
-    let bvh = Bvh::build(&scene).expect("the scene has a tree");
+    let bvh = Bvh::build(&scene);
     let buffers = SceneBuffers::new(gpu, &scene, &bvh, &Settings::default()).expect("the scene fits");
     let emit = Kernel::new(gpu, "emit_photons", &[]);
     let batch =

@@ -18,7 +18,8 @@ pub struct Kernel {
 pub struct Bindings(Vec<(u32, wgpu::BindGroup)>);
 
 impl Kernel {
-    /// Compiles the kernel `stem`; `overrides` sets its `override` constants.
+    /// Compiles the kernel `stem`; `overrides` sets its `override` constants. Names that this kernel does not have are
+    /// passed over, so that one list serves several kernels.
     ///
     /// # Panics
     /// If no kernel has that stem.
@@ -29,6 +30,7 @@ impl Kernel {
             label: Some(stem),
             source: wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
         });
+        let constants: Vec<_> = overrides.iter().copied().filter(|(name, _)| shader.overrides.contains(name)).collect();
         let groups = shader.bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
         let layouts: Vec<_> = (0..groups).map(|g| group_layout(gpu, shader, g)).collect();
         let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -42,7 +44,7 @@ impl Kernel {
             module: &module,
             entry_point: Some(stem),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: overrides,
+                constants: &constants,
                 zero_initialize_workgroup_memory: false,
             },
             cache: None,

@@ -25,6 +25,8 @@ pub struct Shader {
     pub stem: &'static str,
     /// The composed text.
     pub wgsl: &'static str,
+    /// Names of its `override` constants.
+    pub overrides: &'static [&'static str],
     pub bindings: &'static [Binding],
 }
 

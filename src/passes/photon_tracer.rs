@@ -361,3 +361,13 @@ fn photon_batch(
         ..Default::default()
     }
 }
+
+impl RawMap {
+    /// The photons, read back in the order of their paths.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn read(&self, gpu: &Gpu) -> Result<Vec<Photon>> {
+        gpu.read(&self.photons, 0, self.stored)
+    }
+}

@@ -1,0 +1,42 @@
+//! The references at 128 x 128, made by other renderers; see `tests/references/README.md`.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | S1, S2 | relMSE and mean of the picture | scaled by 1.05; the other scene's reference |
+
+mod common;
+
+use std::path::Path;
+
+use caustica::{
+    image::{difference::rel_mse, read_exr},
+    scene::Scene,
+    settings::{Mode, Settings},
+};
+use common::*;
+
+/// relMSE and relative error of the mean of a default render against the reference of the same name.
+fn errors(name: &str, other: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
+    let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
+    let picture = render_scene(&scene, &Settings { spp: 4, ..settings(Mode::Hybrid, 200_000, 128) }).frame.radiance;
+    let reference = |name: &str| read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance;
+    let right = rel_mse(&picture, &reference(name), None);
+    assert!(right < 0.012, "{name}: relMSE {right}");
+    let wrong = rel_mse(&picture, &reference(other), None);
+    assert!(wrong > 0.1, "control: the picture of {name} passes for {other}, relMSE {wrong}");
+    let sum = |image: &[[f32; 3]]| image.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
+    let ratio = sum(&picture) / sum(&reference(name));
+    assert!((ratio - 1.0).abs() < 0.01, "{name}: mean {ratio} of the reference's");
+    assert!((ratio * 1.05 - 1.0).abs() > 0.01, "control: a picture 5 % brighter passes");
+}
+
+#[test]
+fn mirror_and_glass() {
+    errors("S1", "S2");
+}
+
+#[test]
+fn diffuse_only() {
+    errors("S2", "S1");
+}
