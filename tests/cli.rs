@@ -72,7 +72,7 @@ fn caustica(folder: &Path, line: &str) -> Ended {
 
 /// A small render of the scene, with further words.
 fn render(folder: &Path, words: &str) -> Ended {
-    caustica(folder, &format!("render scene.gltf --size 16x16 --spp 1 --photons 1k -k 10 {words}"))
+    caustica(folder, &format!("render scene.gltf --size 16x16 --spp 2 --photons 1k -k 10 {words}"))
 }
 
 fn names(folder: &Path) -> Vec<String> {
