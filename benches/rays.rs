@@ -18,7 +18,7 @@ use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris, ray::{Ray, RayH
 use rayon::prelude::*;
 
 const RAYS: usize = 1 << 20;
-const RUNS: usize = 5;
+const RUNS: usize = 3;
 
 fn main() {
     let gpu = Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("benches need an adapter");

@@ -199,14 +199,22 @@ pub const STORE_CAUSTIC: u32 = 4;
 /// Paths go on after a diffuse surface.
 pub const FOLLOW_DIFFUSE: u32 = 8;
 
+/// Set in the key of a staged photon that belongs to the caustic map.
+pub const CAUSTIC_BIT: u32 = 0x8000_0000;
+
 /// What `store_photons` needs to know; see there.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Store {
     pub staged: u32,
-    pub paths: u32,
-    pub global_capacity: u32,
-    pub caustic_capacity: u32,
+    pub first_place: u32,
+    pub first_photon: u32,
+    pub photons: u32,
+    /// [`CAUSTIC_BIT`] for the caustic map, else 0.
+    pub map_bit: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// A camera and the part of its samples that one tile holds; see `shaders/lib/camera_tile.wesl`.

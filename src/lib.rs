@@ -39,6 +39,7 @@
 #![deny(unsafe_code)]
 #![warn(missing_debug_implementations)]
 
+pub mod bvh;
 pub mod error;
 pub mod gpu;
 pub mod image;

@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use super::SceneBuffers;
+use super::{SceneBuffers, photon_map::PhotonStore};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
@@ -33,8 +33,7 @@ const LOST_UNIT: f64 = 1.0 / 4096.0;
 /// Photons in the order of their paths.
 #[derive(Debug)]
 pub struct RawMap {
-    /// Array of [`Photon`].
-    pub photons: Buffer,
+    pub photons: PhotonStore,
     pub capacity: u64,
     /// Photons in it.
     pub stored: u64,
@@ -111,8 +110,8 @@ impl PhotonTracer {
     ) -> Result<TracedPhotons> {
         let wants_global = settings.mode.stores_direct() || settings.mode.follows_diffuse();
         let mut traced = TracedPhotons {
-            global: RawMap::new(gpu, "global photons", u64::from(settings.global_photons), wants_global)?,
-            caustic: RawMap::new(gpu, "caustic photons", u64::from(settings.caustic_photons), caustics)?,
+            global: RawMap::new(gpu, settings.global_photons, wants_global)?,
+            caustic: RawMap::new(gpu, settings.caustic_photons, caustics)?,
             lost: 0.0,
             rays: 0,
             media_overflows: 0,
@@ -209,25 +208,26 @@ impl PhotonTracer {
         let mut places = traced.global.place(result.counts.iter().map(|c| c & 0xffff), first_path);
         places.extend(traced.caustic.place(result.counts.iter().map(|c| c >> 16), first_path));
         gpu.write(&buffers.places, 0, &places);
-        let store = Store {
-            staged: result.counters.staged,
-            paths: result.counts.len() as u32,
-            global_capacity: traced.global.capacity as u32,
-            caustic_capacity: traced.caustic.capacity as u32,
-        };
-        let uniform = gpu.uniform("store", &store);
-        let bindings = self.store.bind(
-            gpu,
-            &[
-                ("store", &uniform),
-                ("staged", &buffers.staged),
-                ("places", &buffers.places),
-                ("global_photons", &traced.global.photons),
-                ("caustic_photons", &traced.caustic.photons),
-            ],
-        );
         let mut encoder = gpu.encoder();
-        self.store.dispatch(&mut encoder, &bindings, u64::from(result.counters.staged));
+        for (map, map_bit, first_place) in
+            [(&traced.global, 0, 0), (&traced.caustic, layout::CAUSTIC_BIT, result.counts.len() as u32)]
+        {
+            for (window, first_photon, photons) in map.photons.parts(map.stored as u32) {
+                let staged = result.counters.staged;
+                let store = Store { staged, first_place, first_photon, photons, map_bit, ..Default::default() };
+                let uniform = gpu.uniform("store", &store);
+                let bindings = self.store.bind(
+                    gpu,
+                    &[
+                        ("store", &uniform),
+                        ("staged", &buffers.staged),
+                        ("places", &buffers.places),
+                        ("photons", window),
+                    ],
+                );
+                self.store.dispatch(&mut encoder, &bindings, u64::from(staged));
+            }
+        }
         gpu.submit(encoder);
         gpu.wait()
     }
@@ -251,10 +251,15 @@ impl BatchBuffers {
 
 impl RawMap {
     /// An empty map; without room if it is not `wanted`.
-    fn new(gpu: &Gpu, label: &str, capacity: u64, wanted: bool) -> Result<Self> {
+    fn new(gpu: &Gpu, capacity: u32, wanted: bool) -> Result<Self> {
         let capacity = if wanted { capacity } else { 0 };
-        let photons = gpu.storage::<Photon>(label, capacity)?;
-        Ok(Self { photons, capacity, stored: 0, emitted: 0, open: wanted })
+        Ok(Self {
+            photons: PhotonStore::new(gpu, capacity)?,
+            capacity: u64::from(capacity),
+            stored: 0,
+            emitted: 0,
+            open: wanted,
+        })
     }
 
     /// Place of the first photon of each path of a batch. The first path that does not fit closes the map, which is
@@ -277,6 +282,15 @@ impl RawMap {
                 place
             })
             .collect()
+    }
+
+    /// The photons, read back in the order of their paths.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn read(&self, gpu: &Gpu) -> Result<Vec<Photon>> {
+        let parts = self.photons.parts(self.stored as u32);
+        parts.map(|(window, _, count)| gpu.read(window, 0, u64::from(count))).collect::<Result<Vec<_>>>().map(|p| p.concat())
     }
 
     /// Paths that are likely to fill the map from here on.
@@ -359,15 +373,5 @@ fn photon_batch(
         staging_capacity: staging_capacity as u32,
         lost_scale: (1.0 / (LOST_UNIT * mean_flux(scene))) as f32,
         ..Default::default()
-    }
-}
-
-impl RawMap {
-    /// The photons, read back in the order of their paths.
-    ///
-    /// # Errors
-    /// Faults of the driver.
-    pub fn read(&self, gpu: &Gpu) -> Result<Vec<Photon>> {
-        gpu.read(&self.photons, 0, self.stored)
     }
 }

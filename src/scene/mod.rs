@@ -1,90 +1,36 @@
 //! What a file holds, in the renderer's own nouns. Coordinates are metres, right-handed, +Y up, relative to
 //! [`Scene::center`].
 
-use glam::{DVec3, Vec3};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+
+use crate::{Error, Result};
+
+mod camera;
+mod describe;
 mod gltf;
+mod light;
+mod material;
+mod shape;
 
-/// A triangle in scene coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Triangle {
-    pub positions: [Vec3; 3],
-    /// Unit normals at the corners, interpolated across the face.
-    pub normals: [Vec3; 3],
-    /// Index into [`Scene::materials`].
-    pub material: u32,
-}
-
-/// An exact sphere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sphere {
-    pub center: Vec3,
-    /// Metres, > 0.
-    pub radius: f32,
-    /// Index into [`Scene::materials`].
-    pub material: u32,
-}
-
-/// How a surface scatters light; colours are linear Rec.709, each channel 0 to 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Surface {
-    /// Lambert reflectance.
-    Diffuse { albedo: Vec3 },
-    /// Perfect mirror.
-    Mirror { tint: Vec3 },
-    /// Closed solid of smooth dielectric.
-    Glass { ior: f32, tint: Vec3 },
-    /// Thin smooth dielectric sheet, crossed in a straight line.
-    Pane { ior: f32, tint: Vec3 },
-}
-
-impl Surface {
-    /// Scatters into single directions only.
-    #[must_use]
-    pub fn is_delta(&self) -> bool {
-        !matches!(self, Surface::Diffuse { .. })
-    }
-}
-
-/// A named surface.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Material {
-    pub name: String,
-    pub surface: Surface,
-}
-
-/// A point light.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Light {
-    pub name: String,
-    pub position: Vec3,
-    /// Radiant intensity, W/sr in each channel, as the file's candela are read.
-    pub intensity: Vec3,
-}
-
-/// A perspective camera.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Camera {
-    pub name: String,
-    pub position: Vec3,
-    /// Unit axes: right, up, and the direction of view.
-    pub right: Vec3,
-    pub up: Vec3,
-    pub forward: Vec3,
-    /// Full vertical angle of view, radians.
-    pub yfov: f32,
-    /// Width over height, where the file says.
-    pub aspect: Option<f32>,
-}
+pub use camera::Camera;
+pub use describe::{CameraInfo, LightInfo, MaterialInfo, SceneInfo};
+pub use light::{LUMENS_PER_WATT, Light};
+pub use material::{Material, Surface};
+pub use shape::{Bounds, Sphere, Triangle};
 
 /// A scene ready to be traced.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
+    /// The file.
+    pub path: PathBuf,
     /// File name without folders.
     pub file_name: String,
-    /// Hash of the bytes of the file and of the buffers it names, in hexadecimal.
+    /// SHA-256 of the bytes of the file and of the buffers it names, in hexadecimal.
     pub hash: String,
-    /// What was subtracted from every world coordinate of the file.
+    /// What was subtracted from every world coordinate of the file: the middle of its geometry.
     pub center: DVec3,
     pub triangles: Vec<Triangle>,
     pub spheres: Vec<Sphere>,
@@ -96,4 +42,84 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// Number of meshes in the file.
     pub mesh_count: usize,
+    /// Kinds of light that the scene holds and that are not read, with their number.
+    pub unread_lights: BTreeMap<&'static str, usize>,
+}
+
+impl Scene {
+    /// Reads a `.gltf` or `.glb` file and the buffers beside it.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where the file cannot be read; [`Error::Scene`] with the JSON path of what is wrong in it.
+    pub fn load(path: &Path) -> Result<Self> {
+        gltf::load(path)
+    }
+
+    /// Smallest box around all geometry, in scene coordinates; [`Bounds::EMPTY`] without any.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let triangles = self.triangles.iter().map(Bounds::from);
+        triangles.chain(self.spheres.iter().map(Bounds::from)).fold(Bounds::EMPTY, Bounds::union)
+    }
+
+    /// Some surface scatters into single directions only, so that there can be caustics.
+    #[must_use]
+    pub fn has_delta(&self) -> bool {
+        let delta: Vec<bool> = self.materials.iter().map(|material| material.surface.is_delta()).collect();
+        let is_delta = |material: u32| delta.get(material as usize) == Some(&true);
+        self.triangles.iter().any(|triangle| is_delta(triangle.material))
+            || self.spheres.iter().any(|sphere| is_delta(sphere.material))
+    }
+
+    /// The camera of that name, or of that number in [`Scene::cameras`]; the first if none is asked for.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] that lists the cameras.
+    pub fn camera(&self, wanted: Option<&str>) -> Result<&Camera> {
+        let found = match wanted {
+            None => self.cameras.first(),
+            Some(wanted) => {
+                let named = self.cameras.iter().find(|camera| camera.name == wanted);
+                named.or_else(|| self.cameras.get(wanted.parse::<usize>().ok()?))
+            }
+        };
+        found.ok_or_else(|| {
+            let list: Vec<String> =
+                self.cameras.iter().enumerate().map(|(i, camera)| format!("{i} {:?}", camera.name)).collect();
+            Error::Setting {
+                name: "camera",
+                value: wanted.unwrap_or("0").to_owned(),
+                problem: format!("{} has the cameras {}", self.file_name, list.join(", ")),
+            }
+        })
+    }
+
+    /// Whether there is something to draw and light to see it by.
+    ///
+    /// # Errors
+    /// [`Error::Scene`] that says what is there but not read yet.
+    pub fn check_renderable(&self) -> Result<()> {
+        let error =
+            |place: &str, problem: String| Error::Scene { path: self.path.clone(), place: place.to_owned(), problem };
+        if self.triangles.is_empty() && self.spheres.is_empty() {
+            let notes =
+                if self.warnings.is_empty() { String::new() } else { format!(" ({})", self.warnings.join("; ")) };
+            return Err(error("scene", format!("nothing to draw: it holds no triangle and no sphere{notes}")));
+        }
+        if self.lights.is_empty() {
+            let unread: Vec<String> = self.unread_lights.iter().map(|(kind, n)| counted(*n, kind)).collect();
+            let problem = if unread.is_empty() {
+                "no light: add a point light (KHR_lights_punctual)".to_owned()
+            } else {
+                format!("no light: it holds {}, which are not read yet; add a point light", unread.join(" and "))
+            };
+            return Err(error("scene", problem));
+        }
+        Ok(())
+    }
+}
+
+/// "1 spot light", "2 spot lights".
+fn counted(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }

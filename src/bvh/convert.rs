@@ -1,0 +1,163 @@
+//! From one box per node to both children's boxes in their parent, no deeper than a traversal's stack.
+
+use obvhs::bvh2::Bvh2;
+
+use super::MAX_LEAF;
+use crate::layout::{BVH_STACK, BvhNode};
+use crate::scene::Bounds;
+
+/// A child before it is written into its parent.
+struct Child {
+    bounds: Bounds,
+    first: u32,
+    /// 0 for an interior node.
+    count: u32,
+}
+
+/// Nodes, and the primitives' indices in the order of the leaves. Needs two primitives or more.
+pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds]) -> (Vec<BvhNode>, Vec<u32>) {
+    let mut converter =
+        Converter { tree, bounds, subtrees: measure(tree), nodes: Vec::new(), order: Vec::with_capacity(bounds.len()) };
+    let root = converter.tree_node(0, 0);
+    if root.count > 0 {
+        // All primitives fit in one leaf: the root still needs two children.
+        let mut all = std::mem::take(&mut converter.order);
+        converter.even_halves(&mut all, 0);
+    }
+    (converter.nodes, converter.order)
+}
+
+/// Size of the part of the tree below a node.
+#[derive(Clone, Copy, Default)]
+struct Subtree {
+    primitives: u32,
+    /// Interior nodes on the longest way down.
+    height: u32,
+}
+
+/// Sizes of all subtrees.
+fn measure(tree: &Bvh2) -> Vec<Subtree> {
+    let mut subtrees = vec![Subtree::default(); tree.nodes.len()];
+    let mut parents_first = vec![0_u32];
+    let mut next = 0;
+    while next < parents_first.len() {
+        let node = &tree.nodes[parents_first[next] as usize];
+        if !node.is_leaf() {
+            parents_first.extend([node.first_index, node.first_index + 1]);
+        }
+        next += 1;
+    }
+    for &i in parents_first.iter().rev() {
+        let node = &tree.nodes[i as usize];
+        subtrees[i as usize] = if node.is_leaf() {
+            Subtree { primitives: node.prim_count, height: 0 }
+        } else {
+            let [l, r] = [0, 1].map(|side| subtrees[node.first_index as usize + side]);
+            Subtree { primitives: l.primitives + r.primitives, height: 1 + l.height.max(r.height) }
+        };
+    }
+    subtrees
+}
+
+/// Height of an evenly split tree over that many primitives.
+fn even_height(primitives: u32) -> u32 {
+    primitives.div_ceil(MAX_LEAF).next_power_of_two().trailing_zeros()
+}
+
+struct Converter<'a> {
+    tree: &'a Bvh2,
+    bounds: &'a [Bounds],
+    subtrees: Vec<Subtree>,
+    nodes: Vec<BvhNode>,
+    order: Vec<u32>,
+}
+
+impl Converter<'_> {
+    /// Converts the subtree of a node of the tree, below `depth` interior nodes. A subtree that is too deep is kept
+    /// as far as an even split further down still ends in time.
+    fn tree_node(&mut self, index: u32, depth: u32) -> Child {
+        let node = &self.tree.nodes[index as usize];
+        if node.is_leaf() {
+            let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+            let leaf = self.tree.primitive_indices[range].to_vec();
+            return self.leaf(&leaf);
+        }
+        let limit = BVH_STACK as u32;
+        let children = [node.first_index, node.first_index + 1];
+        let fits = depth + self.subtrees[index as usize].height <= limit;
+        let fits_later = |child: u32| depth + 1 + even_height(self.subtrees[child as usize].primitives) <= limit;
+        if !fits && !children.into_iter().all(fits_later) {
+            let mut below = self.primitives_below(index);
+            return self.even_node(&mut below, depth);
+        }
+        self.interior(|this| children.map(|child| this.tree_node(child, depth + 1)))
+    }
+
+    /// Writes a node whose children `convert` makes.
+    fn interior(&mut self, convert: impl FnOnce(&mut Self) -> [Child; 2]) -> Child {
+        let index = self.nodes.len();
+        self.nodes.push(BvhNode::default());
+        let [left, right] = convert(self);
+        self.nodes[index] = BvhNode {
+            left_min: left.bounds.min.to_array(),
+            left_first: left.first,
+            left_max: left.bounds.max.to_array(),
+            left_count: left.count,
+            right_min: right.bounds.min.to_array(),
+            right_first: right.first,
+            right_max: right.bounds.max.to_array(),
+            right_count: right.count,
+        };
+        Child { bounds: left.bounds.union(right.bounds), first: index as u32, count: 0 }
+    }
+
+    fn leaf(&mut self, primitives: &[u32]) -> Child {
+        let first = self.order.len() as u32;
+        self.order.extend_from_slice(primitives);
+        let bounds = primitives.iter().map(|i| self.bounds[*i as usize]).fold(Bounds::EMPTY, Bounds::union);
+        Child { bounds, first, count: primitives.len() as u32 }
+    }
+
+    /// All primitives below a node of the tree.
+    fn primitives_below(&self, index: u32) -> Vec<u32> {
+        let (mut open, mut below) = (vec![index], Vec::new());
+        while let Some(index) = open.pop() {
+            let node = &self.tree.nodes[index as usize];
+            if node.is_leaf() {
+                let first = node.first_index as usize;
+                below.extend_from_slice(&self.tree.primitive_indices[first..first + node.prim_count as usize]);
+            } else {
+                open.extend([node.first_index + 1, node.first_index]);
+            }
+        }
+        below
+    }
+
+    /// A leaf, or a node with half of the primitives on each side.
+    fn even_node(&mut self, primitives: &mut [u32], depth: u32) -> Child {
+        if primitives.len() <= MAX_LEAF as usize {
+            return self.leaf(primitives);
+        }
+        self.even_halves(primitives, depth)
+    }
+
+    /// A node with half of the primitives on each side of the middle of the longest axis.
+    fn even_halves(&mut self, primitives: &mut [u32], depth: u32) -> Child {
+        let middle = |i: u32| self.bounds[i as usize].min + self.bounds[i as usize].max;
+        let centers =
+            primitives.iter().map(|i| middle(*i)).fold(Bounds::EMPTY, |b, p| b.union(Bounds { min: p, max: p }));
+        let axis = (centers.max - centers.min).max_position();
+        // Whole leaves on the left, so that the halves are no higher than `even_height` says.
+        let leaves = primitives.len().div_ceil(MAX_LEAF as usize);
+        let half = if leaves > 1 { (leaves / 2 + leaves % 2) * MAX_LEAF as usize } else { primitives.len() / 2 };
+        primitives.select_nth_unstable_by(half, |a, b| middle(*a)[axis].total_cmp(&middle(*b)[axis]).then(a.cmp(b)));
+        let (left, right) = primitives.split_at_mut(half);
+        self.interior(|this| [this.even_node(left, depth + 1), this.even_node(right, depth + 1)])
+    }
+}
+
+/// Interior nodes on the longest way down the whole tree.
+#[cfg(test)]
+pub(super) fn height(tree: &Bvh2) -> usize {
+    measure(tree)[0].height as usize
+}

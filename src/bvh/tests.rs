@@ -1,0 +1,223 @@
+//! The tree holds every primitive once, in boxes that contain it, and finds what brute force finds.
+
+use glam::Vec3;
+
+use super::{Bvh, MAX_LEAF, bounds};
+use crate::layout::{BVH_STACK, BvhNode, Primitive, SPHERE_BIT};
+use crate::scene::{Bounds, Scene, Sphere, Triangle};
+
+/// Random numbers in 0..1 (PCG hash, Jarzynski and Olano 2020).
+struct Random(u32);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        let word = ((self.0 >> ((self.0 >> 28) + 4)) ^ self.0).wrapping_mul(277_803_737);
+        ((word >> 22) ^ word) as f32 / u32::MAX as f32
+    }
+
+    fn point(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next()) * 2.0 - 1.0
+    }
+}
+
+fn triangle(positions: [Vec3; 3]) -> Triangle {
+    let mut triangle = Triangle { positions, normals: [Vec3::ZERO; 3], material: 0 };
+    triangle.normals = [triangle.geometric_normal(); 3];
+    triangle
+}
+
+fn random_scene(triangles: usize, spheres: usize, size: f32, seed: u32) -> Scene {
+    let mut random = Random(seed);
+    let mut scene = Scene::default();
+    for _ in 0..triangles {
+        let at = random.point();
+        scene.triangles.push(triangle([at, at + random.point() * size, at + random.point() * size]));
+    }
+    for _ in 0..spheres {
+        scene.spheres.push(Sphere { center: random.point(), radius: (random.next() + 0.1) * size, material: 0 });
+    }
+    scene
+}
+
+/// Distance of the nearest hit beyond 0 with one primitive (Möller and Trumbore 1997).
+fn intersect(p: &Primitive, o: Vec3, d: Vec3) -> Option<f32> {
+    let [v0, e1, e2] = [p.v0, p.e1, p.e2].map(Vec3::from_array);
+    if p.material & SPHERE_BIT != 0 {
+        let (oc, r) = (o - v0, e1.x);
+        let (b, c) = (oc.dot(d), oc.length_squared() - r * r);
+        let root = (b * b - c).max(0.0).sqrt();
+        let t = if -b - root > 0.0 { -b - root } else { -b + root };
+        return (b * b >= c && t > 0.0).then_some(t);
+    }
+    let h = d.cross(e2);
+    let inverse = 1.0 / e1.dot(h);
+    let s = o - v0;
+    let (u, q) = (s.dot(h) * inverse, s.cross(e1));
+    let (v, t) = (d.dot(q) * inverse, e2.dot(q) * inverse);
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
+}
+
+fn brute_force(bvh: &Bvh, o: Vec3, d: Vec3) -> Option<(f32, u32)> {
+    let hits = bvh.primitives.iter().filter_map(|p| Some((intersect(p, o, d)?, p.id)));
+    hits.min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+fn enters(min: [f32; 3], max: [f32; 3], o: Vec3, d: Vec3, t_max: f32) -> bool {
+    let (a, b) = ((Vec3::from(min) - o) / d, (Vec3::from(max) - o) / d);
+    let (near, far) = (a.min(b).max_element().max(0.0), a.max(b).min_element().min(t_max));
+    near <= far * (1.0 + 4.0 * f32::EPSILON)
+}
+
+/// Children of a node: box, first, count.
+fn children(node: &BvhNode) -> [([f32; 3], [f32; 3], u32, u32); 2] {
+    [
+        (node.left_min, node.left_max, node.left_first, node.left_count),
+        (node.right_min, node.right_max, node.right_first, node.right_count),
+    ]
+}
+
+fn traverse(bvh: &Bvh, o: Vec3, d: Vec3) -> Option<(f32, u32)> {
+    let mut nearest: Option<(f32, u32)> = None;
+    let mut open = vec![0_u32];
+    while let Some(node) = open.pop() {
+        for (min, max, first, count) in children(&bvh.nodes[node as usize]) {
+            let t_max = nearest.map_or(f32::INFINITY, |hit| hit.0);
+            if !enters(min, max, o, d, t_max) {
+                continue;
+            }
+            if count == 0 {
+                open.push(first);
+                continue;
+            }
+            for p in &bvh.primitives[first as usize..(first + count) as usize] {
+                if let Some(t) = intersect(p, o, d).filter(|t| nearest.is_none_or(|hit| *t < hit.0)) {
+                    nearest = Some((t, p.id));
+                }
+            }
+        }
+    }
+    nearest
+}
+
+/// Rays of `count` whose nearest hit differs from brute force.
+fn mismatches(bvh: &Bvh, count: usize) -> usize {
+    let mut random = Random(7);
+    let mut rays = (0..count).map(|_| (random.point() * 1.5, random.point().normalize()));
+    let mut hits = 0;
+    let wrong = rays
+        .by_ref()
+        .filter(|(o, d)| {
+            let expected = brute_force(bvh, *o, *d);
+            hits += usize::from(expected.is_some());
+            traverse(bvh, *o, *d).map(|hit| hit.0) != expected.map(|hit| hit.0)
+        })
+        .count();
+    assert!(hits > count / 50, "the rays must hit something: {hits} of {count}");
+    wrong
+}
+
+/// What is wrong with the structure of a tree, if anything.
+fn fault(bvh: &Bvh) -> Option<String> {
+    let mut seen = vec![0; bvh.primitives.len()];
+    for (i, node) in bvh.nodes.iter().enumerate() {
+        for (min, max, first, count) in children(node) {
+            let outer = Bounds { min: min.into(), max: max.into() };
+            let inner = if count == 0 {
+                if first as usize <= i {
+                    return Some(format!("child {first} of node {i} comes before it"));
+                }
+                let [left, right] = children(&bvh.nodes[first as usize])
+                    .map(|(min, max, ..)| Bounds { min: min.into(), max: max.into() });
+                left.union(right)
+            } else {
+                let range = first as usize..(first + count) as usize;
+                seen[range.clone()].iter_mut().for_each(|n| *n += 1);
+                bvh.primitives[range].iter().map(bounds).fold(Bounds::EMPTY, Bounds::union)
+            };
+            if count > MAX_LEAF || outer.union(inner) != outer {
+                return Some(format!("a child of node {i} holds {count} or leaves its box"));
+            }
+        }
+    }
+    let mut ids: Vec<u32> = bvh.primitives.iter().map(|p| p.id).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    if seen.iter().any(|n| *n != 1) || (ids.len() != bvh.primitives.len() && bvh.primitives.len() > 2) {
+        return Some("a primitive is not in exactly one leaf".to_owned());
+    }
+    (bvh.depth() > BVH_STACK).then(|| format!("depth {}", bvh.depth()))
+}
+
+#[test]
+fn holds_all_and_finds_what_brute_force_finds() {
+    for (triangles, spheres, size) in
+        [(0, 0, 1.0), (1, 0, 1.0), (0, 1, 1.0), (2, 0, 1.0), (3, 1, 1.0), (5, 0, 1.0), (40, 9, 0.5), (3000, 200, 0.1)]
+    {
+        let bvh = Bvh::build(&random_scene(triangles, spheres, size, 1));
+        assert_eq!(fault(&bvh), None, "{triangles} triangles, {spheres} spheres");
+        assert_eq!(bvh.primitives.len(), (triangles + spheres).max(2));
+        assert_eq!(bvh.normals.len(), bvh.primitives.len());
+        if triangles + spheres > 3 {
+            assert_eq!(mismatches(&bvh, 2000), 0, "{triangles} triangles, {spheres} spheres");
+        }
+    }
+}
+
+/// Negative control: a box that has shrunk, and a primitive that is listed twice, are found.
+#[test]
+fn a_shrunken_box_is_found() {
+    let mut bvh = Bvh::build(&random_scene(3000, 200, 0.1, 1));
+    let whole = bvh.clone();
+    let node = &mut bvh.nodes[0];
+    node.left_max = (0.5 * (Vec3::from(node.left_min) + Vec3::from(node.left_max))).to_array();
+    assert!(fault(&bvh).is_some());
+    assert!(mismatches(&bvh, 2000) > 0);
+    let mut twice = whole;
+    twice.primitives[0] = twice.primitives[1];
+    assert!(fault(&twice).is_some());
+}
+
+/// Each triangle is a tenth of the next one and lies in its corner: the area heuristic peels one off at each level.
+#[test]
+fn depth_stays_within_the_stack() {
+    let mut scene = Scene::default();
+    for i in 0..4000 {
+        let s = 1.02_f32.powi(i - 2000);
+        scene.triangles.push(triangle([Vec3::ZERO, Vec3::new(s, 0.0, s), Vec3::new(0.0, s, s)]));
+    }
+    let deep = super::build_binary(&Bvh::build(&scene).primitives.iter().map(bounds).collect::<Vec<_>>());
+    assert!(
+        super::convert::height(&deep) > BVH_STACK,
+        "the scene must need the limit: {}",
+        super::convert::height(&deep)
+    );
+    let bvh = Bvh::build(&scene);
+    assert_eq!(fault(&bvh), None);
+    assert_eq!(mismatches(&bvh, 300), 0);
+}
+
+#[test]
+fn same_tree_on_any_number_of_threads() {
+    // Doubled triangles give equal keys to whatever sorts.
+    let mut scene = random_scene(30_000, 0, 0.01, 3);
+    scene.triangles.extend_from_within(..);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| Bvh::build(&scene))
+    };
+    let (one, four) = (on(1), on(4));
+    assert_eq!(one.nodes, four.nodes);
+    assert_eq!(one.primitives, four.primitives);
+    // Negative control: another scene gives another tree.
+    scene.triangles[0].positions[0].x += 1.0;
+    assert_ne!(one.nodes, Bvh::build(&scene).nodes);
+}
+
+#[test]
+fn flat_and_smooth_triangles_are_told_apart() {
+    let mut scene = random_scene(1, 1, 1.0, 5);
+    assert_eq!(Bvh::build(&scene).normals.iter().map(|n| n.flat_shaded).sum::<u32>(), 1);
+    scene.triangles[0].normals[1] = (scene.triangles[0].normals[1] + Vec3::splat(0.01)).normalize();
+    assert_eq!(Bvh::build(&scene).normals.iter().map(|n| n.flat_shaded).sum::<u32>(), 0);
+}

@@ -1,1 +1,0 @@
-//! glTF reader.

@@ -1,0 +1,40 @@
+//! What is wrong with a file, before the file's name is known, and what was ignored in it.
+
+use std::path::Path;
+
+use crate::Error;
+
+/// A fault in the file: `place` is a JSON path or a part of the container.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    place: String,
+    problem: String,
+}
+
+/// Result of reading a part of a file.
+pub(crate) type Read<T> = Result<T, Fault>;
+
+/// Shorthand for an `Err` of [`Read`].
+pub(crate) fn fault<T>(place: impl Into<String>, problem: impl Into<String>) -> Read<T> {
+    Err(Fault { place: place.into(), problem: problem.into() })
+}
+
+impl Fault {
+    /// The error that a user sees.
+    pub(crate) fn of(self, path: &Path) -> Error {
+        Error::Scene { path: path.to_owned(), place: self.place, problem: self.problem }
+    }
+}
+
+/// What was ignored or read in a special way: each line once, in the order of its first appearance.
+#[derive(Debug, Default)]
+pub(crate) struct Notes(pub(crate) Vec<String>);
+
+impl Notes {
+    pub(crate) fn add(&mut self, note: impl Into<String>) {
+        let note = note.into();
+        if !self.0.contains(&note) {
+            self.0.push(note);
+        }
+    }
+}

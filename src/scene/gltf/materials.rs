@@ -1,0 +1,148 @@
+//! Materials: read as the nearest of the four surfaces, and what that loses is said.
+
+use glam::Vec3;
+use gltf::json;
+use json::validation::Checked;
+
+use super::fault::{Notes, Read, fault};
+use crate::scene::{Material, Surface};
+
+/// Below this roughness, a lobe is narrower than a pixel and read as a single direction.
+const DELTA_ROUGHNESS: f32 = 0.03;
+
+/// glTF's index of refraction where the file says none.
+const DEFAULT_IOR: f32 = 1.5;
+
+/// Name of a file's material.
+fn name(material: &json::Material, index: usize) -> String {
+    material.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("material {index}"))
+}
+
+/// Material of primitives that name none (glTF 2.0, 3.9.6).
+pub(super) fn default_material(notes: &mut Notes) -> Read<Material> {
+    let name = "default material".to_owned();
+    let surface = surface(&json::Material::default(), &name, "materials", notes)?;
+    Ok(Material { name, surface })
+}
+
+/// A material of the file.
+pub(super) fn read(root: &json::Root, index: usize, notes: &mut Notes) -> Read<Material> {
+    let material = &root.materials[index];
+    let name = name(material, index);
+    let surface = surface(material, &name, &format!("materials[{index}]"), notes)?;
+    note_unread(material, &name, notes);
+    Ok(Material { name, surface })
+}
+
+/// The surface that comes nearest.
+fn surface(material: &json::Material, name: &str, place: &str, notes: &mut Notes) -> Read<Surface> {
+    let pbr = &material.pbr_metallic_roughness;
+    let (metallic, roughness) = (pbr.metallic_factor.0, pbr.roughness_factor.0);
+    let extensions = material.extensions.as_ref();
+    let transmission = extensions.and_then(|e| e.transmission.as_ref()).map_or(0.0, |t| t.transmission_factor.0);
+    let thickness = extensions.and_then(|e| e.volume.as_ref()).map_or(0.0, |volume| volume.thickness_factor.0);
+    let [r, g, b, _] = pbr.base_color_factor.0;
+    let given = Vec3::new(r, g, b);
+    let color = given.clamp(Vec3::ZERO, Vec3::ONE);
+    if ![metallic, roughness, transmission, thickness].iter().all(|x| x.is_finite()) || !given.is_finite() {
+        return fault(place, "a factor is not finite");
+    }
+    if color != given {
+        notes.add(format!("material {name:?}: base colour {r} {g} {b} is clamped to 0..1"));
+    }
+    if metallic < 0.5 && transmission >= 0.5 {
+        if transmission < 1.0 {
+            notes.add(format!("material {name:?}: transmission {transmission} is read as 1"));
+        }
+        note_roughness(roughness, name, notes);
+        let ior = ior(material, place)?;
+        return Ok(if thickness > 0.0 {
+            Surface::Glass { ior, tint: color }
+        } else {
+            Surface::Pane { ior, tint: color }
+        });
+    }
+    if transmission > 0.0 {
+        notes.add(format!("material {name:?}: transmission {transmission} is read as 0"));
+    }
+    if metallic >= 0.5 && roughness < DELTA_ROUGHNESS {
+        if metallic < 1.0 {
+            notes.add(format!("material {name:?}: metallic {metallic} is read as 1"));
+        }
+        note_roughness(roughness, name, notes);
+        return Ok(Surface::Mirror { tint: color });
+    }
+    if metallic > 0.0 {
+        let what = format!("metallic {metallic}, roughness {roughness}");
+        notes.add(format!("material {name:?} ({what}) is read as diffuse until rough materials come"));
+    } else if specular_factor(material) != 0.0 {
+        notes.add("the specular coat of dielectrics is not read yet: their base colour alone is diffuse");
+    }
+    Ok(Surface::Diffuse { albedo: color })
+}
+
+/// Says what becomes of the roughness of a mirror or glass.
+fn note_roughness(roughness: f32, name: &str, notes: &mut Notes) {
+    if roughness >= DELTA_ROUGHNESS {
+        notes.add(format!("material {name:?}: roughness {roughness} is read as 0 until rough materials come"));
+    } else if roughness > 0.0 {
+        notes.add(format!("material {name:?}: roughness {roughness} is small enough to be perfectly smooth"));
+    }
+}
+
+fn specular_factor(material: &json::Material) -> f32 {
+    let specular = material.extensions.as_ref().and_then(|extensions| extensions.specular.as_ref());
+    specular.map_or(1.0, |specular| specular.specular_factor.0)
+}
+
+/// Index of refraction, ≥ 1.
+fn ior(material: &json::Material, place: &str) -> Read<f32> {
+    let ior = material.extensions.as_ref().and_then(|extensions| extensions.ior.as_ref());
+    let ior = ior.map_or(DEFAULT_IOR, |ior| ior.ior.0);
+    if ior.is_finite() && ior >= 1.0 {
+        Ok(ior)
+    } else {
+        fault(
+            format!("{place}.extensions.KHR_materials_ior.ior"),
+            format!("{ior} is not an index of refraction from 1"),
+        )
+    }
+}
+
+/// The material gives light, which is not read yet.
+pub(super) fn is_emissive(material: &json::Material) -> bool {
+    material.emissive_factor.0.iter().any(|factor| *factor > 0.0)
+}
+
+/// Names what the material has beyond its factors.
+fn note_unread(material: &json::Material, name: &str, notes: &mut Notes) {
+    let pbr = &material.pbr_metallic_roughness;
+    let extensions = material.extensions.as_ref();
+    let transmission = extensions.and_then(|e| e.transmission.as_ref());
+    let volume = extensions.and_then(|e| e.volume.as_ref());
+    let specular = extensions.and_then(|e| e.specular.as_ref());
+    let textured = pbr.base_color_texture.is_some()
+        || pbr.metallic_roughness_texture.is_some()
+        || material.normal_texture.is_some()
+        || material.occlusion_texture.is_some()
+        || material.emissive_texture.is_some()
+        || transmission.is_some_and(|transmission| transmission.transmission_texture.is_some())
+        || volume.is_some_and(|volume| volume.thickness_texture.is_some())
+        || specular.is_some_and(|s| s.specular_texture.is_some() || s.specular_color_texture.is_some());
+    if textured {
+        notes.add("textures are not read yet: factors alone are used");
+    }
+    if is_emissive(material) {
+        notes.add(format!("material {name:?}: emission is not read yet"));
+    }
+    if volume.is_some_and(|volume| volume.attenuation_distance.0.is_finite() && volume.attenuation_color.0 != [1.0; 3])
+    {
+        notes.add("attenuation in volumes is not read yet");
+    }
+    if !matches!(material.alpha_mode, Checked::Valid(json::material::AlphaMode::Opaque)) {
+        notes.add("alpha is not read yet: all surfaces are opaque or as their transmission says");
+    }
+    if extensions.is_some_and(|extensions| extensions.others.contains_key("KHR_materials_unlit")) {
+        notes.add("unlit materials are lit like any other");
+    }
+}

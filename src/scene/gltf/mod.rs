@@ -1,0 +1,176 @@
+//! glTF reader, the only user of the gltf crate.
+//!
+//! The crate parses the JSON and validates nothing. What is read from it is checked here before it indexes anything,
+//! in this order: container, buffers, graph, accessors, meshes; then the nodes of the scene are placed.
+
+use std::io;
+use std::path::Path;
+
+use glam::DVec3;
+use gltf::json;
+use sha2::{Digest as _, Sha256};
+
+use super::{Camera, Light, Scene, Sphere};
+use crate::{Error, Result};
+
+mod accessor;
+mod buffers;
+mod container;
+mod fault;
+mod materials;
+mod meshes;
+mod nodes;
+mod objects;
+mod placing;
+
+use accessor::Document;
+use fault::{Notes, Read, fault};
+use objects::{PlacedLight, PlacedSphere};
+use placing::{Shown, TOO_FAR, WorldBounds};
+
+/// Reads a file into a scene.
+pub(super) fn load(path: &Path) -> Result<Scene> {
+    let io_error = |source: io::Error| Error::Io { path: path.to_owned(), source };
+    let bytes = std::fs::read(path).map_err(io_error)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut scene = read(&bytes, folder).map_err(|fault| fault.of(path))?;
+    scene.path = path.to_owned();
+    scene.file_name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+    Ok(scene)
+}
+
+/// Reads the bytes of a file whose other files lie in `folder`.
+fn read(bytes: &[u8], folder: &Path) -> Read<Scene> {
+    let mut notes = Notes::default();
+    let mut hash = Sha256::new();
+    hash.update(bytes);
+    let (text, bin) = container::split(bytes)?;
+    let root = container::parse(text, &mut notes)?;
+    nodes::check(&root)?;
+    let document = Document { root: &root, buffers: buffers::read(&root, bin, folder, &mut hash)? };
+    let meshes = meshes::read(&document, &mut notes)?;
+    document.check()?;
+    drop(document);
+    note_unread(&root, &mut notes);
+
+    let placed = nodes::flatten(&root)?;
+    let shown: Vec<Shown<'_>> = placed
+        .iter()
+        .filter_map(|placed| {
+            let mesh = root.nodes[placed.node].mesh?.value();
+            Some(Shown { placed: *placed, parts: &meshes[mesh] })
+        })
+        .collect();
+    let carried = Carried::read(&root, &placed, &mut notes)?;
+    let mut bounds = WorldBounds::EMPTY;
+    placing::measure(&shown, &mut bounds)?;
+    carried.spheres.iter().for_each(|sphere| bounds.add(sphere.center, sphere.radius));
+    let center = bounds.center();
+    let mut reach = bounds;
+    carried
+        .lights
+        .iter()
+        .map(|(at, _)| at)
+        .chain(carried.cameras.iter().map(|(_, at, _)| at))
+        .for_each(|at| reach.add(*at, 0.0));
+    if !reach.fits() {
+        return fault("scene", format!("a sphere, light or camera {TOO_FAR}"));
+    }
+
+    let mut scene = Scene { center, mesh_count: root.meshes.len(), ..Scene::default() };
+    let slots = read_materials(&root, &shown, &carried.spheres, &mut scene, &mut notes)?;
+    let slot = |material: Option<usize>| slots[material.unwrap_or(root.materials.len())];
+    scene.triangles = placing::place(&shown, center, slot, &mut notes)?;
+    scene.spheres = carried.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
+    carried.finish(&mut scene, &mut notes);
+    scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    scene.warnings = notes.0;
+    Ok(scene)
+}
+
+/// Reads the materials that something shows. Returns for each of the file's, and for the default one after them, its
+/// index in the scene.
+fn read_materials(
+    root: &json::Root,
+    shown: &[Shown<'_>],
+    spheres: &[PlacedSphere],
+    scene: &mut Scene,
+    notes: &mut Notes,
+) -> Read<Vec<u32>> {
+    let default = root.materials.len();
+    let mut used = vec![false; default + 1];
+    let parts = shown.iter().flat_map(|shown| shown.parts).map(|part| part.material);
+    parts.chain(spheres.iter().map(|sphere| sphere.material)).for_each(|i| used[i.unwrap_or(default)] = true);
+    let mut slots = vec![0; default + 1];
+    for (i, _) in used.iter().enumerate().filter(|(_, used)| **used) {
+        slots[i] = scene.materials.len() as u32;
+        if i == default {
+            scene.materials.push(materials::default_material(notes)?);
+            continue;
+        }
+        scene.materials.push(materials::read(root, i, notes)?);
+        if materials::is_emissive(&root.materials[i]) {
+            *scene.unread_lights.entry("emissive material").or_default() += 1;
+        }
+    }
+    Ok(slots)
+}
+
+/// What the nodes carry besides meshes, in the world.
+#[derive(Default)]
+struct Carried {
+    lights: Vec<(DVec3, Light)>,
+    /// With the number in the file, which decides their order.
+    cameras: Vec<(usize, DVec3, Camera)>,
+    spheres: Vec<PlacedSphere>,
+    unread_lights: Vec<&'static str>,
+}
+
+impl Carried {
+    fn read(root: &json::Root, placed: &[nodes::Placed], notes: &mut Notes) -> Read<Self> {
+        let mut carried = Self::default();
+        for placed in placed {
+            match objects::light(root, placed, notes)? {
+                Some(PlacedLight::Point(position, light)) => carried.lights.push((position, light)),
+                Some(PlacedLight::Unread(kind)) => {
+                    notes.add(format!("{kind}s are not read yet"));
+                    carried.unread_lights.push(kind);
+                }
+                Some(PlacedLight::Dark) | None => {}
+            }
+            carried.cameras.extend(objects::camera(root, placed, notes)?);
+            carried.spheres.extend(objects::sphere(root, placed, notes)?);
+        }
+        carried.cameras.sort_by_key(|(index, ..)| *index);
+        Ok(carried)
+    }
+
+    /// Moves lights and cameras into the scene; a framing camera stands in where there is none.
+    fn finish(self, scene: &mut Scene, notes: &mut Notes) {
+        let center = scene.center;
+        let at = |position: DVec3| (position - center).as_vec3();
+        scene.lights = self.lights.into_iter().map(|(p, light)| Light { position: at(p), ..light }).collect();
+        scene.cameras = self.cameras.into_iter().map(|(_, p, camera)| Camera { position: at(p), ..camera }).collect();
+        self.unread_lights.iter().for_each(|kind| *scene.unread_lights.entry(kind).or_default() += 1);
+        if scene.cameras.is_empty() {
+            notes.add("no perspective camera: one is made that frames the whole scene");
+            scene.cameras.push(Camera::framing(scene.bounds()));
+        }
+    }
+}
+
+impl PlacedSphere {
+    fn relative_to(&self, center: DVec3, slot: &impl Fn(Option<usize>) -> u32) -> Sphere {
+        Sphere { center: (self.center - center).as_vec3(), radius: self.radius as f32, material: slot(self.material) }
+    }
+}
+
+/// Names what the file has beyond what is read.
+fn note_unread(root: &json::Root, notes: &mut Notes) {
+    if !root.animations.is_empty() {
+        notes.add("animations are not read: nodes stand as in the file");
+    }
+    if root.nodes.iter().any(|node| node.skin.is_some()) {
+        notes.add("skins are not read: meshes are drawn as they stand");
+    }
+}

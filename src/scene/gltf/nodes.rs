@@ -1,0 +1,105 @@
+//! The graph of nodes: checked for cycles, flattened in the order of the file, transforms accumulated in f64.
+
+use glam::{DMat4, DQuat, DVec3};
+use gltf::json;
+use json::scene::Node;
+
+use super::fault::{Read, fault};
+
+/// A node with its place in the world.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    pub(super) node: usize,
+    pub(super) world: DMat4,
+}
+
+/// Checks what nodes and scenes refer to, and that the nodes are a forest.
+pub(super) fn check(root: &json::Root) -> Read<()> {
+    let known = |index: Option<usize>, count: usize, place: &dyn Fn() -> String| match index {
+        Some(index) if index >= count => fault(place(), format!("{index} of {count}")),
+        _ => Ok(()),
+    };
+    let mut parents = vec![0_u32; root.nodes.len()];
+    for (i, node) in root.nodes.iter().enumerate() {
+        known(node.mesh.map(|mesh| mesh.value()), root.meshes.len(), &|| format!("nodes[{i}].mesh"))?;
+        known(node.camera.map(|camera| camera.value()), root.cameras.len(), &|| format!("nodes[{i}].camera"))?;
+        known(node.skin.map(|skin| skin.value()), root.skins.len(), &|| format!("nodes[{i}].skin"))?;
+        for (j, child) in node.children.iter().flatten().enumerate() {
+            let place = || format!("nodes[{i}].children[{j}]");
+            known(Some(child.value()), root.nodes.len(), &place)?;
+            parents[child.value()] += 1;
+            if parents[child.value()] > 1 {
+                return fault(place(), format!("node {} has two parents", child.value()));
+            }
+        }
+    }
+    for (i, scene) in root.scenes.iter().enumerate() {
+        for (j, node) in scene.nodes.iter().enumerate() {
+            known(Some(node.value()), root.nodes.len(), &|| format!("scenes[{i}].nodes[{j}]"))?;
+        }
+    }
+    known(root.scene.map(|scene| scene.value()), root.scenes.len(), &|| "scene".to_owned())?;
+
+    // With one parent each, the nodes that no root reaches are those of cycles.
+    let mut reached: Vec<bool> = parents.iter().map(|count| *count == 0).collect();
+    let mut open: Vec<usize> = (0..root.nodes.len()).filter(|i| reached[*i]).collect();
+    while let Some(node) = open.pop() {
+        for child in root.nodes[node].children.iter().flatten() {
+            reached[child.value()] = true;
+            open.push(child.value());
+        }
+    }
+    match reached.iter().position(|reached| !reached) {
+        Some(node) => fault(format!("nodes[{node}]"), "is its own ancestor"),
+        None => Ok(()),
+    }
+}
+
+/// Nodes of the default scene (else the first, else all roots), parents first. Needs [`check`].
+pub(super) fn flatten(root: &json::Root) -> Read<Vec<Placed>> {
+    let scene = root.scene.map_or(0, |scene| scene.value());
+    let roots: Vec<usize> = match root.scenes.get(scene) {
+        Some(scene) => scene.nodes.iter().map(|node| node.value()).collect(),
+        None => {
+            let mut is_root = vec![true; root.nodes.len()];
+            let children = root.nodes.iter().filter_map(|node| node.children.as_ref()).flatten();
+            children.for_each(|child| is_root[child.value()] = false);
+            (0..root.nodes.len()).filter(|i| is_root[*i]).collect()
+        }
+    };
+    let mut seen = vec![false; root.nodes.len()];
+    let mut placed = Vec::new();
+    let mut open: Vec<(usize, DMat4)> = roots.iter().rev().map(|node| (*node, DMat4::IDENTITY)).collect();
+    while let Some((node, parent)) = open.pop() {
+        if std::mem::replace(&mut seen[node], true) {
+            return fault(format!("scenes[{scene}].nodes"), format!("reach node {node} twice"));
+        }
+        let world = parent * local(&root.nodes[node], node)?;
+        if !world.is_finite() {
+            return fault(format!("nodes[{node}]"), "its transform in the world is not finite");
+        }
+        placed.push(Placed { node, world });
+        open.extend(root.nodes[node].children.iter().flatten().rev().map(|child| (child.value(), world)));
+    }
+    Ok(placed)
+}
+
+/// A node's own transform.
+fn local(node: &Node, index: usize) -> Read<DMat4> {
+    if let Some(matrix) = node.matrix {
+        return Ok(DMat4::from_cols_array(&matrix.map(f64::from)));
+    }
+    let scale = node.scale.map_or(DVec3::ONE, |scale| DVec3::from_array(scale.map(f64::from)));
+    let translation = node.translation.map_or(DVec3::ZERO, |by| DVec3::from_array(by.map(f64::from)));
+    let rotation = node.rotation.map_or(DQuat::IDENTITY, |quaternion| DQuat::from_array(quaternion.0.map(f64::from)));
+    let length = rotation.length();
+    if !(length.is_finite() && length > 0.0) {
+        return fault(format!("nodes[{index}].rotation"), format!("{rotation} is not a rotation"));
+    }
+    Ok(DMat4::from_scale_rotation_translation(scale, rotation / length, translation))
+}
+
+/// What to call a node in messages and lists.
+pub(super) fn name(node: &Node, fallback: &str, index: usize) -> String {
+    node.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("{fallback} {index}"))
+}

@@ -1,0 +1,70 @@
+//! What light meets: triangles and exact spheres.
+
+use glam::Vec3;
+
+/// A triangle in scene coordinates; its outside is where the corners run counterclockwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    pub positions: [Vec3; 3],
+    /// Unit normals at the corners, interpolated across the face.
+    pub normals: [Vec3; 3],
+    /// Index into [`Scene::materials`](super::Scene::materials).
+    pub material: u32,
+}
+
+impl Triangle {
+    /// Unit normal of the plane, to the outside; zero for a triangle without area.
+    #[must_use]
+    pub fn geometric_normal(&self) -> Vec3 {
+        // In f64, as the product of two edges of a small triangle leaves the range of f32.
+        let [a, b, c] = self.positions.map(Vec3::as_dvec3);
+        (b - a).cross(c - a).normalize_or_zero().as_vec3()
+    }
+}
+
+/// An exact sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    pub center: Vec3,
+    /// Metres, > 0.
+    pub radius: f32,
+    /// Index into [`Scene::materials`](super::Scene::materials).
+    pub material: u32,
+}
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    pub min: Vec3,
+    pub max: Vec3,
+}
+
+impl Bounds {
+    /// The box that holds nothing: any union with it gives the other.
+    pub const EMPTY: Bounds = Bounds { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    /// Smallest box around both.
+    #[must_use]
+    pub fn union(self, other: Bounds) -> Bounds {
+        Bounds { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Length of the diagonal, metres; 0 for the empty box.
+    #[must_use]
+    pub fn diagonal(&self) -> f32 {
+        (self.max - self.min).max(Vec3::ZERO).length()
+    }
+}
+
+impl From<&Triangle> for Bounds {
+    fn from(triangle: &Triangle) -> Self {
+        let [a, b, c] = triangle.positions;
+        Bounds { min: a.min(b).min(c), max: a.max(b).max(c) }
+    }
+}
+
+impl From<&Sphere> for Bounds {
+    fn from(sphere: &Sphere) -> Self {
+        Bounds { min: sphere.center - sphere.radius, max: sphere.center + sphere.radius }
+    }
+}
