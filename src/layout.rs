@@ -280,6 +280,87 @@ pub struct DirectLight {
     pub pad1: u32,
 }
 
+/// Photons of a finest cell of the photon grid; cells of a coarser one.
+pub const CELL_PHOTONS: u32 = 32;
+pub const CELL_FAN: u32 = 8;
+
+/// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along the Morton curve, or
+/// [`CELL_FAN`] cells of the next finer level. Cells lie in depth-first order: the first finer cell follows its owner.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Cell {
+    /// Smallest box around the photons, metres.
+    pub lo: [f32; 3],
+    /// Index of the next cell that is not part of this one.
+    pub skip: u32,
+    pub hi: [f32; 3],
+    /// Finest cell: index of its first photon, with the highest bit set. Else: number of its photons.
+    pub content: u32,
+}
+
+/// Position of a sorted photon and where it came from: all that a search needs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PhotonPlace {
+    /// Metres.
+    pub position: [f32; 3],
+    /// Direction to where the photon came from, octahedral.
+    pub wi: u32,
+}
+
+/// What a sorted photon carries.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct PhotonFlux {
+    /// Flux in W, before the division by the number of emitted paths.
+    pub flux: [f32; 3],
+    /// Index of the photon before sorting.
+    pub index: u32,
+}
+
+/// Sizes of a photon map.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct MapInfo {
+    /// Photons.
+    pub count: u32,
+    /// Cells of all levels.
+    pub cells: u32,
+    /// Index of the first photon of the second window.
+    pub split: u32,
+    pub pad: u32,
+}
+
+/// Settings of one batch of a gather.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct GatherInfo {
+    /// Queries of the batch, valid or not.
+    pub count: u32,
+    /// Index of the batch's first point.
+    pub first: u32,
+    /// k.
+    pub neighbors: u32,
+    /// C of the cone filter.
+    pub cone_constant: f32,
+    /// Square of the largest radius, m²; negative if there is none.
+    pub max_radius_squared: f32,
+    /// 1 / number of emitted paths.
+    pub per_path: f32,
+    pub pad0: u32,
+    pub pad1: u32,
+}
+
+/// What a query found.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Gathered {
+    /// Square of the radius of the estimate, m²: of the nearest photon that is not summed, or the largest radius.
+    pub radius_squared: f32,
+    /// Photons summed.
+    pub count: u32,
+}
+
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of
 /// Efficient Representations for Independent Unit Vectors"); x in the low half. Twin of `encode_octahedral` in
 /// `shaders/lib/octahedral.wesl`.

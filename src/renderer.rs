@@ -10,7 +10,10 @@ use crate::{
     gpu::Gpu,
     image::Frame,
     layout::TilePixel,
-    passes::{CameraTracer, Gather, GatherSettings, PhotonMap, PhotonMapBuilder, PhotonTracer, RawMap, SceneBuffers, StepCount, Tile},
+    passes::{
+        CameraTracer, Gather, GatherOptions, GatherSettings, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers,
+        StepCount, Tile,
+    },
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::Settings,
@@ -83,9 +86,10 @@ fn photon_maps(
     stats.warnings.extend(traced.warnings);
     progress.report(Stage::Grid, 0, 1);
     timed(&mut stats.seconds.grid, || {
-        let builder = PhotonMapBuilder::new(gpu);
-        let build = |map: RawMap| builder.build(gpu, map);
-        Ok([build(traced.global)?, build(traced.caustic)?].into_iter().flatten().collect())
+        let kernels = MapKernels::new(gpu);
+        let maps = [traced.global, traced.caustic].into_iter().filter(|map| map.stored > 0);
+        let build = |map: RawMap| PhotonMap::build(gpu, &kernels, map.photons, map.stored as u32, map.emitted);
+        maps.map(build).collect()
     })
 }
 
@@ -102,8 +106,12 @@ fn picture(
     stats: &mut Stats,
 ) -> Result<Frame> {
     let tracer = CameraTracer::new(gpu, buffers, camera, size, settings)?;
-    let gather = Gather::new(gpu)?;
-    let gather_settings = GatherSettings::from(settings);
+    let mut gather = Gather::new(gpu, GatherOptions::default());
+    let estimate = GatherSettings {
+        neighbors: settings.neighbors,
+        cone_constant: settings.cone_constant,
+        max_radius: settings.max_radius,
+    };
     let mut film = Film::new(size);
     let tiles = tracer.tiles();
     for (done, tile) in tiles.iter().enumerate() {
@@ -118,7 +126,8 @@ fn picture(
         for map in maps {
             timed(&mut stats.seconds.gather, || {
                 let points = CameraTracer::point_count(tile);
-                gather.run(gpu, map, &tracer.points, points, &gather_settings, &tracer.radiance, progress)
+                let results = (&tracer.radiance, &tracer.gathered);
+                gather.run(gpu, map, &tracer.points, points, &estimate, results, progress)
             })?;
         }
         film.add(&tracer, tile, &tracer.resolve(gpu, tile)?);

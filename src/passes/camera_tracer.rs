@@ -5,7 +5,7 @@ use super::SceneBuffers;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CameraTile, Counters, DirectLight, FirstHit, Path, TilePixel, VisiblePoint},
+    layout::{CameraTile, Counters, DirectLight, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
     scene::Camera,
     settings::Settings,
 };
@@ -46,6 +46,8 @@ pub struct CameraTracer {
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
     pub radiance: Buffer,
+    /// What the last gather found at each visible point, [`Gathered`].
+    pub gathered: Buffer,
     first_hits: Buffer,
     pixels: Buffer,
     view: CameraTile,
@@ -83,6 +85,7 @@ impl CameraTracer {
             dispatch_arguments: gpu.storage::<[u32; 3]>("camera dispatch arguments", 1)?,
             points: gpu.storage::<VisiblePoint>("visible points", 2 * TILE_SAMPLES)?,
             radiance: gpu.storage::<[f32; 4]>("radiance", 2 * TILE_SAMPLES)?,
+            gathered: gpu.storage::<Gathered>("gathered", 2 * TILE_SAMPLES)?,
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_SAMPLES)?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_SAMPLES)?,
             view: view(camera, size, settings),

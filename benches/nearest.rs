@@ -1,0 +1,104 @@
+//! Exact k nearest photons: this renderer's grid on the device against kiddo's immutable tree with rayon on the same
+//! machine. `cargo bench --bench nearest`. Photons: 70 % on the walls of a box, 30 % in a caustic a thousand times
+//! denser; queries: points seen on the same surfaces, in Morton order for both. Neither side's building is counted;
+//! ours includes the sum over the photons found.
+
+#[path = "../tests/photons/mod.rs"]
+mod photons;
+
+use std::{num::NonZero, time::Instant};
+
+use caustica::{
+    gpu::Gpu,
+    layout::{Gathered, VisiblePoint},
+    passes::{
+        gather::{Gather, GatherOptions, GatherSettings, gathered_buffer},
+        photon_map::{MapKernels, PhotonMap, PhotonStore},
+    },
+    progress::Silent,
+};
+use glam::Vec3;
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use photons::{Random, caustic_box, in_caustic, on_walls};
+use rayon::prelude::*;
+
+const QUERIES: usize = 262_144;
+/// Share of the photons in the caustic, and its width for a thousand times the density of the six walls.
+const SHARE: f32 = 0.3;
+const WIDTH: f32 = 0.0507;
+
+fn main() {
+    let gpu = Gpu::open(None).expect("an adapter");
+    println!("{} ({}), {} CPU threads", gpu.name, gpu.driver, rayon::current_num_threads());
+    println!("{:>9} {:>5} {:>14} {:>14} {:>7} {:>10}", "photons", "k", "grid q/s", "kiddo q/s", "ratio", "differing");
+    let kernels = MapKernels::new(&gpu);
+    let mut gather = Gather::new(&gpu, GatherOptions { side_test: false, ..GatherOptions::default() });
+    let points = queries();
+    let device_points = gpu.storage_with("points", &points).expect("points fit");
+    for count in [100_000, 1_000_000] {
+        let photons = caustic_box(&mut Random(1), count, SHARE, WIDTH);
+        let positions: Vec<[f32; 3]> = photons.iter().map(|p| p.position).collect();
+        let tree: ImmutableKdTree<f32, u32, 3> = ImmutableKdTree::new_from_slice(&positions).expect("a tree");
+        let build = || {
+            let store = PhotonStore::with(&gpu, &photons).expect("photons fit");
+            gpu.wait().expect("the device works");
+            let start = Instant::now();
+            let map = PhotonMap::build(&gpu, &kernels, store, count as u32, 1).expect("a map");
+            (map, start.elapsed().as_secs_f64())
+        };
+        build();
+        let (map, seconds) = build();
+        println!("{count:>9} sorted and gridded in {:.1} ms", seconds * 1e3);
+        for k in [10, 50, 500] {
+            let (ours, radii) = grid_rate(&gpu, &mut gather, &map, &device_points, k);
+            let (theirs, expected) = kiddo_rate(&tree, &points, k);
+            let differing = radii.iter().zip(&expected).filter(|(a, b)| (**a - **b).abs() > 1e-6 * **b).count();
+            println!("{count:>9} {k:>5} {ours:>14.0} {theirs:>14.0} {:>7.2} {differing:>10}", ours / theirs);
+        }
+    }
+}
+
+/// Points on the photons' surfaces, half of them in and around the caustic's wall, in Morton order.
+fn queries() -> Vec<VisiblePoint> {
+    let mut random = Random(2);
+    let mut positions: Vec<Vec3> = (0..QUERIES)
+        .map(|i| if i % 10 < 3 { in_caustic(&mut random, WIDTH) } else { on_walls(&mut random) })
+        .collect();
+    let spread = |x: f32| (0..16).fold(0u64, |code, bit| code | (u64::from((x * 65535.0) as u32 >> bit & 1) << (3 * bit)));
+    positions.sort_by_key(|p| spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2);
+    let point = |p: Vec3| VisiblePoint { position: p.into(), valid: 1, weight: [1.0; 3], ..VisiblePoint::default() };
+    positions.into_iter().map(point).collect()
+}
+
+/// Queries per second, best of three, and squared radii.
+fn grid_rate(gpu: &Gpu, gather: &mut Gather, map: &PhotonMap, points: &caustica::gpu::Buffer, k: u32) -> (f64, Vec<f32>) {
+    let count = QUERIES as u32;
+    let settings = GatherSettings { neighbors: k, cone_constant: 2.0, max_radius: None };
+    let radiance = gpu.storage::<[f32; 4]>("radiance", count.into()).expect("it fits");
+    let gathered = gathered_buffer(gpu, count).expect("it fits");
+    let run = |gather: &mut Gather| {
+        let start = Instant::now();
+        gather.run(gpu, map, points, count, &settings, (&radiance, &gathered), &Silent).expect("a gather");
+        start.elapsed().as_secs_f64()
+    };
+    run(gather);
+    let best = (0..3).map(|_| run(gather)).fold(f64::INFINITY, f64::min);
+    let found: Vec<Gathered> = gpu.read(&gathered, 0, count.into()).expect("results");
+    (f64::from(count) / best, found.iter().map(|g| g.radius_squared).collect())
+}
+
+/// Queries per second, best of three, and squared distances of the (k+1)-th.
+fn kiddo_rate(tree: &ImmutableKdTree<f32, u32, 3>, points: &[VisiblePoint], k: u32) -> (f64, Vec<f32>) {
+    let n = NonZero::new(k as usize + 1).expect("k + 1 > 0");
+    let run = || -> (f64, Vec<f32>) {
+        let start = Instant::now();
+        let radii = points
+            .par_iter()
+            .map(|p| tree.query(&p.position).nearest_n::<SquaredEuclidean<f32>>(n).execute().last().map_or(0.0, |l| l.distance))
+            .collect();
+        (start.elapsed().as_secs_f64(), radii)
+    };
+    let (first, radii) = run();
+    let best = (0..2).map(|_| run().0).fold(first, f64::min);
+    (points.len() as f64 / best, radii)
+}

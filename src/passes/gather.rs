@@ -1,0 +1,199 @@
+//! Radiance from the k nearest photons. Kernels: `key_points`, `find_radius`, `gather`.
+
+use super::{photon_map::PhotonMap, radix_sort::RadixSort, sort_photons::KEY_BITS};
+use crate::{
+    error::Result,
+    gpu::{Buffer, Gpu, Kernel},
+    layout::{GatherInfo, Gathered},
+    progress::Progress,
+};
+
+/// Points that are searched together; more go in several batches.
+const BATCH: u32 = 65_536;
+/// Queries of one invocation.
+const PACKET: u32 = 4;
+/// Bytes of `SearchState` and `GatherState` in the shaders.
+const SEARCH_STATE: usize = 240;
+const GATHER_STATE: usize = 384;
+
+/// The radiance estimate that is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GatherSettings {
+    /// k, photons of an estimate, 1 to 1000.
+    pub neighbors: u32,
+    /// C of the cone filter, ≥ 1.
+    pub cone_constant: f32,
+    /// Largest radius, metres.
+    pub max_radius: Option<f32>,
+}
+
+/// How the kernels are compiled; for tests and benchmarks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GatherOptions {
+    /// Only photons that come from the viewer's side of the surface count. Without it the interpolated normal has no say either.
+    pub side_test: bool,
+    /// Cells that a query may visit in one round of a dispatch; what is left goes on in the next dispatch.
+    pub round_budget: u32,
+}
+
+impl Default for GatherOptions {
+    fn default() -> Self {
+        Self { side_test: true, round_budget: 150 }
+    }
+}
+
+/// What a gather did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GatherStats {
+    /// Dispatches until no query was open, over all batches.
+    pub dispatches: u32,
+}
+
+/// The compiled kernels and the memory of one batch.
+#[derive(Debug)]
+pub struct Gather {
+    options: GatherOptions,
+    key: Kernel,
+    radix: RadixSort,
+    /// Search and sum for maps of one window and of two, compiled when first needed.
+    search: [Option<(Kernel, Kernel)>; 2],
+    scratch: Option<Scratch>,
+}
+
+#[derive(Debug)]
+struct Scratch {
+    capacity: u32,
+    entries: [Buffer; 2],
+    states: Buffer,
+    sums: Buffer,
+    open: Buffer,
+}
+
+impl Gather {
+    /// Compiles the kernels.
+    #[must_use]
+    pub fn new(gpu: &Gpu, options: GatherOptions) -> Self {
+        let key = Kernel::new(gpu, "key_points", &[]);
+        let mut gather = Self { options, key, radix: RadixSort::new(gpu), search: [None, None], scratch: None };
+        gather.compile(gpu, 1);
+        gather
+    }
+
+    /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to `radiance` (`array<vec4f>`), and writes the
+    /// radius and number of photons of each valid one to `gathered` (`array<Gathered>`).
+    ///
+    /// # Errors
+    /// [`crate::Error::Stopped`] when `progress` says so, [`crate::Error::Gpu`] if the driver fails.
+    #[allow(clippy::too_many_arguments)]
+    pub fn run(
+        &mut self,
+        gpu: &Gpu,
+        map: &PhotonMap,
+        points: &Buffer,
+        count: u32,
+        settings: &GatherSettings,
+        (radiance, gathered): (&Buffer, &Buffer),
+        progress: &dyn Progress,
+    ) -> Result<GatherStats> {
+        self.compile(gpu, map.windows());
+        if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
+            self.scratch = Some(Scratch::new(gpu, count.min(BATCH))?);
+        }
+        let mut stats = GatherStats::default();
+        for first in (0..count).step_by(BATCH as usize) {
+            let info = GatherInfo {
+                count: BATCH.min(count - first),
+                first,
+                neighbors: settings.neighbors,
+                cone_constant: settings.cone_constant,
+                max_radius_squared: settings.max_radius.map_or(-1.0, |r| r * r),
+                per_path: (1.0 / map.emitted().max(1) as f64) as f32,
+                ..GatherInfo::default()
+            };
+            stats.dispatches += self.run_batch(gpu, map, &info, [points, radiance, gathered], progress)?;
+        }
+        Ok(stats)
+    }
+
+    /// One batch: sort, then search and sum until no query is open. Returns the number of dispatches.
+    fn run_batch(
+        &self,
+        gpu: &Gpu,
+        map: &PhotonMap,
+        info: &GatherInfo,
+        [points, radiance, gathered]: [&Buffer; 3],
+        progress: &dyn Progress,
+    ) -> Result<u32> {
+        let scratch = self.scratch.as_ref().expect("run has made it");
+        let (find, sum) = self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
+        let uniform = gpu.uniform("gather info", info);
+        let mut buffers = map.bindings().to_vec();
+        buffers.extend([
+            ("gather_info", &uniform),
+            ("points", points),
+            ("keyed", &scratch.entries[0]),
+            ("states", &scratch.states),
+            ("open_count", &scratch.open),
+            ("sums_left", &scratch.sums),
+            ("radiance", radiance),
+            ("gathered", gathered),
+        ]);
+        let mut encoder = gpu.encoder();
+        encoder.clear_buffer(&scratch.states, 0, None);
+        encoder.clear_buffer(&scratch.sums, 0, None);
+        self.key.dispatch(&mut encoder, &self.key.bind(gpu, &buffers), info.count.into());
+        gpu.submit(encoder);
+        let sorted = self.radix.sort(gpu, [&scratch.entries[0], &scratch.entries[1]], info.count, KEY_BITS)?;
+        buffers.push(("entries", &scratch.entries[sorted]));
+        let (find_bindings, sum_bindings) = (find.bind(gpu, &buffers), sum.bind(gpu, &buffers));
+        let packets = u64::from(info.count.div_ceil(PACKET));
+        let mut dispatches = 0;
+        loop {
+            progress.check()?;
+            let mut encoder = gpu.encoder();
+            encoder.clear_buffer(&scratch.open, 0, None);
+            find.dispatch(&mut encoder, &find_bindings, packets);
+            sum.dispatch(&mut encoder, &sum_bindings, packets);
+            gpu.submit(encoder);
+            dispatches += 1;
+            if gpu.read::<u32>(&scratch.open, 0, 1)?[0] == 0 {
+                return Ok(dispatches);
+            }
+        }
+    }
+
+    /// Compiles search and sum for maps of that many windows, once.
+    fn compile(&mut self, gpu: &Gpu, windows: u32) {
+        let common = [
+            ("WINDOWS", f64::from(windows)),
+            ("SIDE_TEST", f64::from(u8::from(self.options.side_test))),
+            ("ROUND_BUDGET", f64::from(self.options.round_budget)),
+        ];
+        self.search[windows as usize - 1]
+            .get_or_insert_with(|| (Kernel::new(gpu, "find_radius", &common), Kernel::new(gpu, "gather", &common)));
+    }
+}
+
+impl Scratch {
+    fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
+        let packets = u64::from(capacity.div_ceil(PACKET));
+        Ok(Self {
+            capacity,
+            entries: [
+                gpu.storage::<[u32; 2]>("query order", capacity.into())?,
+                gpu.storage::<[u32; 2]>("query order", capacity.into())?,
+            ],
+            states: gpu.storage::<[u8; SEARCH_STATE]>("search states", packets)?,
+            sums: gpu.storage::<[u8; GATHER_STATE]>("unfinished sums", packets)?,
+            open: gpu.storage::<u32>("open packets", 1)?,
+        })
+    }
+}
+
+/// A buffer for the results of `count` points.
+///
+/// # Errors
+/// [`crate::Error::Limit`] if one binding cannot hold them.
+pub fn gathered_buffer(gpu: &Gpu, count: u32) -> Result<Buffer> {
+    gpu.storage::<Gathered>("gathered", count.into())
+}

@@ -1,0 +1,196 @@
+//! A photon map on the device: bind group 1 of every kernel that reads one (`shaders/lib/photon_map.wesl`).
+//!
+//! Photons come unsorted in a [`PhotonStore`]: windows of `array<Photon>`, each within one binding (4,194,304 photons
+//! where a binding holds 128 MiB, so that up to that number there is one window). [`PhotonMap::build`] sorts them
+//! along a Morton curve of 20 bits per axis and splits them into what a search reads (`places`: position and
+//! direction, 16 bytes) and what an estimate reads besides (`fluxes`, 16 bytes); where these exceed a binding, into two windows.
+//!
+//! Over the sorted photons lies the grid: a finest cell is 32 photons that follow each other on the curve, a coarser
+//! one eight finer cells, each with its exact bounds. Cells thus follow the density of the photons at every scale: a
+//! caustic has small cells, an empty region none, and photons on one spot have cells of size zero.
+
+use super::{build_grid::BuildGrid, radix_sort::RadixSort, sort_photons::SortPhotons};
+use crate::{
+    error::{Error, Result},
+    gpu::{Buffer, Gpu},
+    layout::{MapInfo, Photon, PhotonFlux, PhotonPlace},
+};
+
+/// Unsorted photons in windows that one binding can hold.
+#[derive(Debug)]
+pub struct PhotonStore {
+    windows: Vec<Buffer>,
+    window_photons: u32,
+}
+
+impl PhotonStore {
+    /// Room for `capacity` photons, zeroed.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] if the device refuses a window.
+    pub fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
+        let window_photons = window_elements::<Photon>(gpu);
+        let windows = (0..capacity.div_ceil(window_photons).max(1))
+            .map(|w| gpu.storage::<Photon>("unsorted photons", u64::from(window_photons.min(capacity - w * window_photons))))
+            .collect::<Result<_>>()?;
+        Ok(Self { windows, window_photons })
+    }
+
+    /// Holds a copy of `photons`.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with(gpu: &Gpu, photons: &[Photon]) -> Result<Self> {
+        let count = u32::try_from(photons.len()).map_err(|_| too_many(gpu, photons.len() as u64))?;
+        let store = Self::new(gpu, count)?;
+        for (window, part) in store.windows.iter().zip(photons.chunks(store.window_photons as usize)) {
+            gpu.write(window, 0, part);
+            // Written in pieces: the staging memory of a write is given back with its submission.
+            gpu.submit(gpu.encoder());
+        }
+        Ok(store)
+    }
+
+    /// The buffers, `array<Photon>` each; photon `i` lies in window `i / window_photons`.
+    #[must_use]
+    pub fn windows(&self) -> &[Buffer] {
+        &self.windows
+    }
+
+    /// Photons per window, a power of two; the last window may be shorter.
+    #[must_use]
+    pub fn window_photons(&self) -> u32 {
+        self.window_photons
+    }
+
+    /// Photons of `count` in all that lie in each window: its first index and their number.
+    pub(super) fn parts(&self, count: u32) -> impl Iterator<Item = (&Buffer, u32, u32)> {
+        self.windows.iter().zip(0..).filter_map(move |(buffer, w)| {
+            let first = w * self.window_photons;
+            (first < count).then(|| (buffer, first, self.window_photons.min(count - first)))
+        })
+    }
+}
+
+/// The kernels that build a map.
+#[derive(Debug)]
+pub struct MapKernels {
+    sort: SortPhotons,
+    radix: RadixSort,
+    grid: BuildGrid,
+}
+
+impl MapKernels {
+    /// Compiles them.
+    #[must_use]
+    pub fn new(gpu: &Gpu) -> Self {
+        Self { sort: SortPhotons::new(gpu), radix: RadixSort::new(gpu), grid: BuildGrid::new(gpu) }
+    }
+}
+
+/// Sorted photons and the grid over them.
+#[derive(Debug)]
+pub struct PhotonMap {
+    count: u32,
+    emitted: u64,
+    info: Buffer,
+    cells: Buffer,
+    places: Vec<Buffer>,
+    fluxes: Vec<Buffer>,
+}
+
+/// Most windows of a sorted map; `shaders/lib/photon_map.wesl` binds that many.
+const MAX_WINDOWS: usize = 2;
+
+impl PhotonMap {
+    /// Sorts the first `count` photons of `photons` and builds the grid; `emitted` paths shot them. The same photons give the
+    /// same bits, whatever the device's schedule.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] if the map does not fit the device, [`Error::Gpu`] if the driver fails.
+    pub fn build(gpu: &Gpu, kernels: &MapKernels, photons: PhotonStore, count: u32, emitted: u64) -> Result<Self> {
+        let window = window_elements::<PhotonPlace>(gpu);
+        if count.div_ceil(window) as usize > MAX_WINDOWS {
+            return Err(too_many(gpu, count.into()));
+        }
+        let entries = kernels.sort.order(gpu, &kernels.radix, &photons, count)?;
+        let (mut places, mut fluxes) = (Vec::new(), Vec::new());
+        for first in (0..count.max(1)).step_by(window as usize) {
+            let size = u64::from(window.min(count - first));
+            places.push(gpu.storage::<PhotonPlace>("photon places", size)?);
+            fluxes.push(gpu.storage::<PhotonFlux>("photon fluxes", size)?);
+        }
+        kernels.sort.fetch(gpu, &entries, &photons, count, (&places, &fluxes, window));
+        drop(entries);
+        drop(photons);
+        let (cells, cell_count) = kernels.grid.build(gpu, &places, window, count)?;
+        let info = gpu.uniform("map info", &MapInfo { count, cells: cell_count, split: window, pad: 0 });
+        gpu.wait()?;
+        Ok(Self { count, emitted, info, cells, places, fluxes })
+    }
+
+    /// Photons in the map.
+    #[must_use]
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Paths that the flux is divided by.
+    #[must_use]
+    pub fn emitted(&self) -> u64 {
+        self.emitted
+    }
+
+    /// Windows that the photons lie in, 1 or 2: the kernels' override `WINDOWS`.
+    #[must_use]
+    pub fn windows(&self) -> u32 {
+        self.places.len() as u32
+    }
+
+    /// The buffers of bind group 1 by name.
+    #[must_use]
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 6] {
+        let high = self.places.len() - 1;
+        [
+            ("map_info", &self.info),
+            ("cells", &self.cells),
+            ("places_low", &self.places[0]),
+            ("places_high", &self.places[high]),
+            ("fluxes_low", &self.fluxes[0]),
+            ("fluxes_high", &self.fluxes[high]),
+        ]
+    }
+
+    /// Reads the sorted photons back.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if the driver fails.
+    pub fn read(&self, gpu: &Gpu) -> Result<(Vec<PhotonPlace>, Vec<PhotonFlux>)> {
+        let (mut places, mut fluxes) = (Vec::new(), Vec::new());
+        for (place, flux) in self.places.iter().zip(&self.fluxes) {
+            let left = u64::from(self.count) - places.len() as u64;
+            let size = left.min(place.size() / size_of::<PhotonPlace>() as u64);
+            places.extend(gpu.read::<PhotonPlace>(place, 0, size)?);
+            fluxes.extend(gpu.read::<PhotonFlux>(flux, 0, size)?);
+        }
+        Ok((places, fluxes))
+    }
+}
+
+/// Elements of a window: the largest power of two that one binding holds.
+fn window_elements<T>(gpu: &Gpu) -> u32 {
+    let most = (gpu.max_binding() / size_of::<T>() as u64).clamp(64, 1 << 30);
+    1 << most.ilog2()
+}
+
+fn too_many(gpu: &Gpu, count: u64) -> Error {
+    Error::Limit {
+        what: "a photon map".to_string(),
+        needed: count,
+        unit: "photons",
+        limit: "maxStorageBufferRange",
+        adapter: gpu.name.clone(),
+        allowed: MAX_WINDOWS as u64 * u64::from(window_elements::<PhotonPlace>(gpu)),
+        advice: "ask for fewer --photons or use another --device".to_string(),
+    }
+}
