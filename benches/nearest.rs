@@ -38,7 +38,7 @@ fn main() {
     for count in [100_000, 1_000_000] {
         let photons = caustic_box(&mut Random(1), count, SHARE, WIDTH);
         let positions: Vec<[f32; 3]> = photons.iter().map(|p| p.position).collect();
-        let tree: ImmutableKdTree<f32, u32, 3> = ImmutableKdTree::new_from_slice(&positions).expect("a tree");
+        let tree: ImmutableKdTree<f32, 3> = ImmutableKdTree::new_from_slice(&positions).expect("a tree");
         let build = || {
             let store = PhotonStore::with(&gpu, &photons).expect("photons fit");
             gpu.wait().expect("the device works");
@@ -61,17 +61,23 @@ fn main() {
 /// Points on the photons' surfaces, half of them in and around the caustic's wall, in Morton order.
 fn queries() -> Vec<VisiblePoint> {
     let mut random = Random(2);
-    let mut positions: Vec<Vec3> = (0..QUERIES)
-        .map(|i| if i % 10 < 3 { in_caustic(&mut random, WIDTH) } else { on_walls(&mut random) })
-        .collect();
-    let spread = |x: f32| (0..16).fold(0u64, |code, bit| code | (u64::from((x * 65535.0) as u32 >> bit & 1) << (3 * bit)));
+    let mut positions: Vec<Vec3> =
+        (0..QUERIES).map(|i| if i % 10 < 3 { in_caustic(&mut random, WIDTH) } else { on_walls(&mut random) }).collect();
+    let spread =
+        |x: f32| (0..16).fold(0u64, |code, bit| code | (u64::from((x * 65535.0) as u32 >> bit & 1) << (3 * bit)));
     positions.sort_by_key(|p| spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2);
     let point = |p: Vec3| VisiblePoint { position: p.into(), valid: 1, weight: [1.0; 3], ..VisiblePoint::default() };
     positions.into_iter().map(point).collect()
 }
 
 /// Queries per second, best of three, and squared radii.
-fn grid_rate(gpu: &Gpu, gather: &mut Gather, map: &PhotonMap, points: &caustica::gpu::Buffer, k: u32) -> (f64, Vec<f32>) {
+fn grid_rate(
+    gpu: &Gpu,
+    gather: &mut Gather,
+    map: &PhotonMap,
+    points: &caustica::gpu::Buffer,
+    k: u32,
+) -> (f64, Vec<f32>) {
     let count = QUERIES as u32;
     let settings = GatherSettings { neighbors: k, cone_constant: 2.0, max_radius: None };
     let radiance = gpu.storage::<[f32; 4]>("radiance", count.into()).expect("it fits");
@@ -88,13 +94,19 @@ fn grid_rate(gpu: &Gpu, gather: &mut Gather, map: &PhotonMap, points: &caustica:
 }
 
 /// Queries per second, best of three, and squared distances of the (k+1)-th.
-fn kiddo_rate(tree: &ImmutableKdTree<f32, u32, 3>, points: &[VisiblePoint], k: u32) -> (f64, Vec<f32>) {
+fn kiddo_rate(tree: &ImmutableKdTree<f32, 3>, points: &[VisiblePoint], k: u32) -> (f64, Vec<f32>) {
     let n = NonZero::new(k as usize + 1).expect("k + 1 > 0");
     let run = || -> (f64, Vec<f32>) {
         let start = Instant::now();
         let radii = points
             .par_iter()
-            .map(|p| tree.query(&p.position).nearest_n::<SquaredEuclidean<f32>>(n).execute().last().map_or(0.0, |l| l.distance))
+            .map(|p| {
+                tree.query(&p.position)
+                    .nearest_n::<SquaredEuclidean<f32>>(n)
+                    .execute()
+                    .last()
+                    .map_or(0.0, |l| l.distance)
+            })
             .collect();
         (start.elapsed().as_secs_f64(), radii)
     };

@@ -24,6 +24,7 @@ impl BuildGrid {
         let total = sizes.iter().sum();
         let cells = gpu.storage::<Cell>("cells", u64::from(total))?;
         let mut encoder = gpu.encoder();
+        let mut steps = Vec::new();
         for (&size, level) in sizes.iter().zip(0..) {
             // The finest level reads photons, window by window; the others read cells.
             let windows = if level == 0 { places.len() } else { 1 };
@@ -36,6 +37,7 @@ impl BuildGrid {
                 let step = gpu.uniform("grid step", &step);
                 let buffers = [("places", place), ("grid_cells", &cells), ("grid_step", &step)];
                 self.0.dispatch(&mut encoder, &self.0.bind(gpu, &buffers), cell_count.into());
+                steps.push(step);
             }
         }
         gpu.submit(encoder);
@@ -55,7 +57,7 @@ mod tests {
 
     #[test]
     fn levels_end_in_one_cell() {
-        assert_eq!(level_sizes(0), []);
+        assert!(level_sizes(0).is_empty());
         assert_eq!(level_sizes(1), [1]);
         assert_eq!(level_sizes(8), [8, 1]);
         assert_eq!(level_sizes(9), [9, 2, 1]);

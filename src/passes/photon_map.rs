@@ -31,7 +31,9 @@ impl PhotonStore {
     pub fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
         let window_photons = window_elements::<Photon>(gpu);
         let windows = (0..capacity.div_ceil(window_photons).max(1))
-            .map(|w| gpu.storage::<Photon>("unsorted photons", u64::from(window_photons.min(capacity - w * window_photons))))
+            .map(|w| {
+                gpu.storage::<Photon>("unsorted photons", u64::from(window_photons.min(capacity - w * window_photons)))
+            })
             .collect::<Result<_>>()?;
         Ok(Self { windows, window_photons })
     }

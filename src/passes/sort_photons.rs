@@ -42,12 +42,15 @@ impl SortPhotons {
         // By the fine half of the key first: the sort by the coarse half keeps that order among equals.
         for fine in [1, 0] {
             let mut encoder = gpu.encoder();
+            // A buffer may not be dropped before the commands that use it are submitted.
+            let mut steps = Vec::new();
             for (window, first, size) in photons.parts(count) {
                 let invocations = if fine == 1 { size } else { count };
                 let key_step = KeyStep { count: invocations, window_first: first, window_count: size, fine };
                 let step = gpu.uniform("key step", &key_step);
                 let buffers = [("photons", window), ("boxes", &bounds), ("entries", &entries[0]), ("key_step", &step)];
                 self.key.dispatch(&mut encoder, &self.key.bind(gpu, &buffers), invocations.into());
+                steps.push(step);
             }
             gpu.submit(encoder);
             if radix.sort(gpu, [&entries[0], &entries[1]], count, KEY_BITS)? == 1 {
@@ -63,10 +66,12 @@ impl SortPhotons {
         let windows = photons.parts(count).count() as u32;
         let boxes = gpu.storage::<Cell>("photon bounds", u64::from((windows * BOUND_LANES).max(1)))?;
         let mut encoder = gpu.encoder();
+        let mut steps = Vec::new();
         for ((window, _, size), w) in photons.parts(count).zip(0..) {
             let step = gpu.uniform("bound step", &BoundStep { count: size, first_box: w * BOUND_LANES });
             let buffers = [("photons", window), ("boxes", &boxes), ("bound_step", &step)];
             self.bound.dispatch(&mut encoder, &self.bound.bind(gpu, &buffers), BOUND_LANES.into());
+            steps.push(step);
         }
         self.merge.dispatch(&mut encoder, &self.merge.bind(gpu, &[("boxes", &boxes)]), 1);
         gpu.submit(encoder);
@@ -83,6 +88,7 @@ impl SortPhotons {
         (places, fluxes, window): (&[Buffer], &[Buffer], u32),
     ) {
         let mut encoder = gpu.encoder();
+        let mut steps = Vec::new();
         for ((place, flux), first) in places.iter().zip(fluxes).zip((0..).step_by(window as usize)) {
             let size = window.min(count - first);
             for (unsorted, from, part) in photons.parts(count) {
@@ -97,6 +103,7 @@ impl SortPhotons {
                     ("move_step", &step),
                 ];
                 self.fetch.dispatch(&mut encoder, &self.fetch.bind(gpu, &buffers), size.into());
+                steps.push(step);
             }
         }
         gpu.submit(encoder);
