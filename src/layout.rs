@@ -361,6 +361,85 @@ pub struct Gathered {
     pub count: u32,
 }
 
+/// Consecutive entries that one invocation of the radix sort walks.
+pub const RADIX_CHUNK: u32 = 256;
+/// Values of one digit of the radix sort.
+pub const RADIX_DIGITS: u32 = 256;
+/// Values that one invocation of a prefix sum adds up.
+pub const SCAN_SPAN: u32 = 256;
+
+/// One digit of the radix sort; see `shaders/lib/radix.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct SortStep {
+    /// Entries to sort.
+    pub count: u32,
+    /// Lowest bit of the digit.
+    pub shift: u32,
+    /// Distance of the counts of neighbouring digits.
+    pub stride: u32,
+    pub pad: u32,
+}
+
+/// Boxes per window of the first reduction of the photons' bounds.
+pub const BOUND_LANES: u32 = 1024;
+
+/// What `bound_photons` needs to know of its window.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BoundStep {
+    /// Photons of the window.
+    pub count: u32,
+    /// Index of its first box.
+    pub first_box: u32,
+}
+
+/// What `key_photons` needs to know.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct KeyStep {
+    /// Invocations.
+    pub count: u32,
+    /// Photons of the window that is bound: the first, and how many.
+    pub window_first: u32,
+    pub window_count: u32,
+    /// 1 for the fine half of the Morton key, 0 for the coarse one.
+    pub fine: u32,
+}
+
+/// What `sort_photons` needs to know.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct MoveStep {
+    /// Sorted photons of the window that is written: the first, and how many.
+    pub sorted_first: u32,
+    pub sorted_count: u32,
+    /// Unsorted photons of the window that is read: the first, and how many.
+    pub window_first: u32,
+    pub window_count: u32,
+}
+
+/// What `build_grid` needs to know of the cells that it makes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct GridStep {
+    /// Photons of the map.
+    pub photons: u32,
+    /// Number of finest cells.
+    pub finest: u32,
+    /// Level of the cells, 0 for the finest, and number of levels.
+    pub level: u32,
+    pub levels: u32,
+    /// The cells of this dispatch: the first in its level, and how many.
+    pub first_cell: u32,
+    pub cell_count: u32,
+}
+
+/// Bytes of `SearchState` in the shaders, in which a packet of queries waits for its next dispatch.
+pub const SEARCH_STATE_BYTES: usize = 240;
+/// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
+pub const GATHER_STATE_BYTES: usize = 384;
+
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of
 /// Efficient Representations for Independent Unit Vectors"); x in the low half. Twin of `encode_octahedral` in
 /// `shaders/lib/octahedral.wesl`.

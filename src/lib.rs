@@ -1,4 +1,41 @@
-//! Caustica: headless photon mapping on the GPU.
+//! Caustica renders glTF scenes by photon mapping on the GPU, without a screen.
+//!
+//! A [`scene::Scene`] is what a file holds: triangles and exact spheres, materials, point lights, cameras. A
+//! [`gpu::Gpu`] is an open device, real or software. [`renderer::render`] traces photons from the lights into two maps, a
+//! global one and one for caustics, then follows camera rays through mirrors and glass to the first diffuse surface
+//! and estimates the light there from the nearest photons and from shadow rays. [`settings::Settings`] say how many
+//! photons and samples, which [`settings::Mode`] of illumination, and the seed that decides all randomness. Out comes
+//! an [`image::Frame`] of scene-linear radiance, depth, normal and albedo, which [`image`] writes as OpenEXR or PNG, and
+//! [`stats::Stats`] of what happened. A [`progress::Progress`] listens meanwhile and can stop the work.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use caustica::{
+//!     gpu::Gpu,
+//!     image::{Origin, write_exr},
+//!     progress::Silent,
+//!     renderer,
+//!     scene::Scene,
+//!     settings::Settings,
+//! };
+//!
+//! fn main() -> caustica::Result<()> {
+//!     let scene = Scene::load(Path::new("scene.glb"))?;
+//!     let settings = Settings { global_photons: 1_000_000, ..Settings::default() };
+//!     let render = renderer::render(&Gpu::open(None)?, &scene, &settings, &Silent)?;
+//!     let origin = Origin {
+//!         scene: &scene.file_name,
+//!         scene_hash: &scene.hash,
+//!         settings: &settings,
+//!         stats: &render.stats,
+//!     };
+//!     write_exr(Path::new("out.exr"), &render.frame, &origin)
+//! }
+//! ```
+//!
+//! Units are metres, watts and steradians; colours are linear Rec.709. Every failure that input or machine can cause is
+//! an [`Error`] of one line. Equal scenes, settings, adapters and drivers give equal frames, bit for bit.
 #![deny(unsafe_code)]
 #![warn(missing_debug_implementations)]
 

@@ -72,7 +72,7 @@ fn caustica(folder: &Path, line: &str) -> Ended {
 
 /// A small render of the scene, with further words.
 fn render(folder: &Path, words: &str) -> Ended {
-    caustica(folder, &format!("render scene.gltf --size 16x16 --spp 1 --photons 1k -k 10 {words}"))
+    caustica(folder, &format!("render scene.gltf --size 16x16 --spp 2 --photons 1k -k 10 {words}"))
 }
 
 fn names(folder: &Path) -> Vec<String> {
@@ -101,12 +101,12 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_right() {
         ("render scene.gltf -o a.exr --photons 0", "at least 1"),
         ("render scene.gltf -o a.exr --photons 2G", "1.5M"),
         ("render scene.gltf -o a.exr --photons 5000M", "too large"),
-        ("render scene.gltf -o a.exr --max-paths -3", "max-paths"),
+        ("render scene.gltf -o a.exr --max-paths=-3", "max-paths"),
         ("render scene.gltf -o a.exr -k 0", "1..=1000"),
         ("render scene.gltf -o a.exr -k 1001", "1..=1000"),
         ("render scene.gltf -o a.exr --cone-constant 0.5", "at least 1"),
         ("render scene.gltf -o a.exr --max-radius 0", "more than 0"),
-        ("render scene.gltf -o a.exr --max-bounces -1", "max-bounces"),
+        ("render scene.gltf -o a.exr --max-bounces=-1", "max-bounces"),
         ("render scene.gltf -o a.exr --spp 0", "0 is not in"),
         ("render scene.gltf -o a.exr --seed x", "invalid digit"),
         ("render scene.gltf -o a.exr --light-sampling all", "uniform"),

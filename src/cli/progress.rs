@@ -156,12 +156,4 @@ mod tests {
         assert_eq!(next_line(&mut Vec::new(), Stage::Camera, 3, 0).as_deref(), Some("camera"));
         assert!(next_line(&mut Vec::new(), Stage::Camera, 9, 4).is_some_and(|l| l.contains("100 %")));
     }
-
-    #[test]
-    fn the_bar_takes_its_templates() {
-        for stage in [Stage::Photons, Stage::Grid] {
-            assert!(ProgressStyle::with_template("{unclosed").is_err());
-            let _ = style(stage);
-        }
-    }
 }

@@ -1,12 +1,11 @@
 //! Pictures: the film's frame, EXR and PNG files, tone mapping, difference measures.
 
-mod difference;
+pub mod difference;
 mod exr;
 mod file;
 mod png;
 mod tonemap;
 
-pub use difference::{mae, mean, rel_mse, rmse};
 pub use exr::{Origin, read_exr, read_exr_attributes, write_exr};
 pub use file::{check_output, close_files, write_file};
 pub use png::write_png;

@@ -1,24 +1,10 @@
 //! Builds the cells over sorted photons, finest level first. Kernel: `build_grid`.
 
-use bytemuck::{Pod, Zeroable};
-
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CELL_FAN, CELL_PHOTONS, Cell},
+    layout::{CELL_FAN, CELL_PHOTONS, Cell, GridStep},
 };
-
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-struct GridStep {
-    photons: u32,
-    finest: u32,
-    level: u32,
-    levels: u32,
-    first_cell: u32,
-    cell_count: u32,
-    pad: [u32; 2],
-}
 
 /// The compiled kernel.
 #[derive(Debug)]
@@ -47,7 +33,7 @@ impl BuildGrid {
                 let first_cell = w * per_window;
                 let cell_count = per_window.min(size - first_cell);
                 let levels = sizes.len() as u32;
-                let step = GridStep { photons: count, finest, level, levels, first_cell, cell_count, pad: [0; 2] };
+                let step = GridStep { photons: count, finest, level, levels, first_cell, cell_count };
                 let step = gpu.uniform("grid step", &step);
                 let buffers = [("places", place), ("grid_cells", &cells), ("grid_step", &step)];
                 self.0.dispatch(&mut encoder, &self.0.bind(gpu, &buffers), cell_count.into());
@@ -71,7 +57,7 @@ mod tests {
 
     #[test]
     fn levels_end_in_one_cell() {
-        assert_eq!(level_sizes(0), []);
+        assert!(level_sizes(0).is_empty());
         assert_eq!(level_sizes(1), [1]);
         assert_eq!(level_sizes(8), [8, 1]);
         assert_eq!(level_sizes(9), [9, 2, 1]);

@@ -4,7 +4,7 @@ use super::{photon_map::PhotonMap, radix_sort::RadixSort, sort_photons::KEY_BITS
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{GatherInfo, Gathered},
+    layout::{GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
     progress::Progress,
 };
 
@@ -12,9 +12,6 @@ use crate::{
 const BATCH: u32 = 65_536;
 /// Queries of one invocation.
 const PACKET: u32 = 4;
-/// Bytes of `SearchState` and `GatherState` in the shaders.
-const SEARCH_STATE: usize = 240;
-const GATHER_STATE: usize = 384;
 
 /// The radiance estimate that is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -183,8 +180,8 @@ impl Scratch {
                 gpu.storage::<[u32; 2]>("query order", capacity.into())?,
                 gpu.storage::<[u32; 2]>("query order", capacity.into())?,
             ],
-            states: gpu.storage::<[u8; SEARCH_STATE]>("search states", packets)?,
-            sums: gpu.storage::<[u8; GATHER_STATE]>("unfinished sums", packets)?,
+            states: gpu.storage::<[u8; SEARCH_STATE_BYTES]>("search states", packets)?,
+            sums: gpu.storage::<[u8; GATHER_STATE_BYTES]>("unfinished sums", packets)?,
             open: gpu.storage::<u32>("open packets", 1)?,
         })
     }

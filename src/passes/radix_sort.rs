@@ -1,27 +1,15 @@
 //! Stable radix sort of (key, index) pairs. Kernels: `count_digits`, `sum_spans`, `scan_spans`, `scatter_entries`.
 
-use bytemuck::{Pod, Zeroable};
-
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
+    layout::{RADIX_CHUNK, RADIX_DIGITS, SCAN_SPAN, SortStep},
 };
 
-/// Consecutive entries that one invocation walks; `RADIX_CHUNK` of the shaders.
-const CHUNK: u32 = 256;
-const DIGITS: u32 = 256;
-const DIGIT_BITS: u32 = 8;
-/// Values that one invocation adds up; `SCAN_SPAN` of the shaders.
-const SPAN: u64 = 256;
-
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-struct SortStep {
-    count: u32,
-    shift: u32,
-    stride: u32,
-    pad: u32,
-}
+const CHUNK: u32 = RADIX_CHUNK;
+const DIGITS: u32 = RADIX_DIGITS;
+const DIGIT_BITS: u32 = DIGITS.ilog2();
+const SPAN: u64 = SCAN_SPAN as u64;
 
 /// The compiled kernels of the sort.
 #[derive(Debug)]

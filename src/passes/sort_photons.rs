@@ -1,23 +1,14 @@
 //! Orders photons along a Morton curve. Kernels: `bound_photons`, `merge_bounds`, `key_photons`, `sort_photons`.
 
-use bytemuck::{Pod, Zeroable};
-
 use super::{photon_map::PhotonStore, radix_sort::RadixSort};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::Cell,
+    layout::{BOUND_LANES, BoundStep, Cell, KeyStep, MoveStep},
 };
 
-/// Boxes per window of the first reduction; `BOUND_LANES` of the shaders.
-const BOUND_LANES: u32 = 1024;
 /// Bits of each half of a Morton key.
 pub(super) const KEY_BITS: u32 = 30;
-
-/// The twin of `KeyStep` and `MoveStep` and, in its first two numbers, of `BoundStep`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-struct Step([u32; 4]);
 
 /// The compiled kernels.
 #[derive(Debug)]
@@ -55,7 +46,8 @@ impl SortPhotons {
             let mut steps = Vec::new();
             for (window, first, size) in photons.parts(count) {
                 let invocations = if fine == 1 { size } else { count };
-                let step = gpu.uniform("key step", &Step([invocations, first, size, fine]));
+                let key_step = KeyStep { count: invocations, window_first: first, window_count: size, fine };
+                let step = gpu.uniform("key step", &key_step);
                 let buffers = [("photons", window), ("boxes", &bounds), ("entries", &entries[0]), ("key_step", &step)];
                 self.key.dispatch(&mut encoder, &self.key.bind(gpu, &buffers), invocations.into());
                 steps.push(step);
@@ -76,7 +68,7 @@ impl SortPhotons {
         let mut encoder = gpu.encoder();
         let mut steps = Vec::new();
         for ((window, _, size), w) in photons.parts(count).zip(0..) {
-            let step = gpu.uniform("bound step", &Step([size, w * BOUND_LANES, 0, 0]));
+            let step = gpu.uniform("bound step", &BoundStep { count: size, first_box: w * BOUND_LANES });
             let buffers = [("photons", window), ("boxes", &boxes), ("bound_step", &step)];
             self.bound.dispatch(&mut encoder, &self.bound.bind(gpu, &buffers), BOUND_LANES.into());
             steps.push(step);
@@ -100,7 +92,9 @@ impl SortPhotons {
         for ((place, flux), first) in places.iter().zip(fluxes).zip((0..).step_by(window as usize)) {
             let size = window.min(count - first);
             for (unsorted, from, part) in photons.parts(count) {
-                let step = gpu.uniform("move step", &Step([first, size, from, part]));
+                let move_step =
+                    MoveStep { sorted_first: first, sorted_count: size, window_first: from, window_count: part };
+                let step = gpu.uniform("move step", &move_step);
                 let buffers = [
                     ("entries", entries),
                     ("photons", unsorted),
