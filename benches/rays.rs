@@ -14,7 +14,11 @@ use caustica::{
     settings::Settings,
 };
 use glam::{Vec3, vec3};
-use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris, ray::{Ray, RayHit}};
+use obvhs::{
+    BvhBuildParams,
+    bvh2::builder::build_bvh2_from_tris,
+    ray::{Ray, RayHit},
+};
 use rayon::prelude::*;
 
 const RAYS: usize = 1 << 20;
@@ -51,7 +55,8 @@ fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[(Vec3, Vec3)]) -> f64 {
     let paths = gpu.storage_with("paths", &rays.iter().map(path).collect::<Vec<_>>()).expect("fits");
     let queue = gpu.storage_with("queue", &(0..RAYS as u32).collect::<Vec<_>>()).expect("fits");
     let queue_out = gpu.storage::<u32>("queue out", count).expect("fits");
-    let counters = gpu.storage_with("counters", &[Counters { current: RAYS as u32, ..Default::default() }]).expect("fits");
+    let counters =
+        gpu.storage_with("counters", &[Counters { current: RAYS as u32, ..Default::default() }]).expect("fits");
     let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
     let first_hits = gpu.storage::<FirstHit>("first hits", count / 2).expect("fits");
     let tile = gpu.uniform("tile", &CameraTile { samples: 1, ..Default::default() });

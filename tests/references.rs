@@ -20,7 +20,8 @@ fn errors(name: &str, other: &str) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
     let picture = render_scene(&scene, &Settings { spp: 4, ..settings(Mode::Hybrid, 200_000, 128) }).frame.radiance;
-    let reference = |name: &str| read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance;
+    let reference =
+        |name: &str| read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance;
     let right = rel_mse(&picture, &reference(name), None);
     assert!(right < 0.012, "{name}: relMSE {right}");
     let wrong = rel_mse(&picture, &reference(other), None);

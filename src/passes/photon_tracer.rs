@@ -128,8 +128,7 @@ impl PhotonTracer {
         while first_path < max_paths && (traced.global.open || traced.caustic.open) {
             progress.check()?;
             let until_check = growth_window - first_path % growth_window;
-            let paths =
-                traced.paths_wanted(first_path).min(batch_limit).min(max_paths - first_path).min(until_check);
+            let paths = traced.paths_wanted(first_path).min(batch_limit).min(max_paths - first_path).min(until_check);
             let batch = photon_batch(scene, settings, &traced, first_path, paths, buffers.staging_capacity);
             let result = self.run_batch(gpu, scene, &buffers, &batch)?;
             let staged = u64::from(result.counters.staged);
@@ -290,7 +289,10 @@ impl RawMap {
     /// Faults of the driver.
     pub fn read(&self, gpu: &Gpu) -> Result<Vec<Photon>> {
         let parts = self.photons.parts(self.stored as u32);
-        parts.map(|(window, _, count)| gpu.read(window, 0, u64::from(count))).collect::<Result<Vec<_>>>().map(|p| p.concat())
+        parts
+            .map(|(window, _, count)| gpu.read(window, 0, u64::from(count)))
+            .collect::<Result<Vec<_>>>()
+            .map(|p| p.concat())
     }
 
     /// Paths that are likely to fill the map from here on.
