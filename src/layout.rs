@@ -211,8 +211,9 @@ pub struct GatherInfo {
     pub max_radius_squared: f32,
     /// 1 / number of emitted paths.
     pub per_path: f32,
-    pub pad0: u32,
-    pub pad1: u32,
+    /// Of how many packets of queries one is searched.
+    pub stride: u32,
+    pub pad: u32,
 }
 
 /// What a query found.
