@@ -347,8 +347,9 @@ pub struct GatherInfo {
     pub max_radius_squared: f32,
     /// 1 / number of emitted paths.
     pub per_path: f32,
-    pub pad0: u32,
-    pub pad1: u32,
+    /// Of how many packets of queries one is searched.
+    pub stride: u32,
+    pub pad: u32,
 }
 
 /// What a query found.
@@ -436,9 +437,9 @@ pub struct GridStep {
 }
 
 /// Bytes of `SearchState` in the shaders, in which a packet of queries waits for its next dispatch.
-pub const SEARCH_STATE_BYTES: usize = 240;
+pub const SEARCH_STATE_BYTES: usize = 256;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
-pub const GATHER_STATE_BYTES: usize = 384;
+pub const GATHER_STATE_BYTES: usize = 272;
 
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of
 /// Efficient Representations for Independent Unit Vectors"); x in the low half. Twin of `encode_octahedral` in

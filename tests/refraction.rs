@@ -38,32 +38,34 @@ fn edge_scene(slab: Option<Surface>) -> Scene {
     scene
 }
 
-/// Column, from 0 to 1, of the black-to-white edge in the middle row of a picture of the albedo behind the glass.
-fn edge_column(scene: &Scene) -> f64 {
+/// Height, as a fraction of the picture, of the black part below the edge in the middle column.
+fn edge_height(scene: &Scene) -> f64 {
     let settings = Settings { spp: 16, ..settings(Mode::DirectRays, 1000, 128) };
     let frame = render_scene(scene, &settings).frame;
-    let row = &frame.radiance[64 * 128..65 * 128];
-    row.iter().filter(|p| p[0] < 1e-3).count() as f64 / 128.0
+    let column = frame.radiance.iter().skip(64).step_by(128);
+    column.filter(|p| p[0] < 1e-3).count() as f64 / 128.0
 }
 
 #[test]
 fn a_slab_shifts_the_view_as_snell_says() {
-    let degrees = 45.0_f64;
     let eye = vec3(-4.0, 4.0, 0.0);
-    let shifted = |slab: Option<Surface>, x: f32| {
+    let edge_seen = |slab: Option<Surface>, x: f64| {
         let mut scene = edge_scene(slab);
-        scene.cameras.push(camera(eye, vec3(x, 0.0, 0.0), 6.0));
-        edge_column(&scene)
+        scene.cameras.push(camera(eye, vec3(x as f32, 0.0, 0.0), 6.0));
+        edge_height(&scene)
     };
-    let clear = shifted(None, 0.0);
-    assert!((clear - 0.5).abs() < 0.02, "without glass the edge is at column {clear}");
-    // Through a slab of thickness 1 the ray leaves nearer to the normal's foot: x moves by d (tan i − tan t).
-    let (sin_i, cos_i) = degrees.to_radians().sin_cos();
-    let tan_t = (sin_i / 1.5) / (1.0 - (sin_i / 1.5).powi(2)).sqrt();
-    let shift = (sin_i / cos_i - tan_t) as f32;
-    let moved = shifted(Some(glass()), shift);
-    assert!((moved - 0.5).abs() < 0.03, "the ray that should reach the edge sees it at column {moved}");
-    let control = shifted(Some(glass()), 0.0);
+    let clear = edge_seen(None, 0.0);
+    assert!((clear - 0.5).abs() < 0.02, "without glass the edge is at {clear}");
+    // Through a slab of thickness 1 a ray falls short of its aim by tan i − tan t: aim that much beyond the edge.
+    let mut aim = 0.0_f64;
+    for _ in 0..50 {
+        let tan_i = (4.0 + aim) / 4.0;
+        let sin_t = tan_i / (1.0 + tan_i * tan_i).sqrt() / 1.5;
+        aim = tan_i - sin_t / (1.0 - sin_t * sin_t).sqrt();
+    }
+    let moved = edge_seen(Some(glass()), aim);
+    assert!((moved - 0.5).abs() < 0.03, "aimed {aim} m beyond the edge, the camera sees it at {moved}");
+    let control = edge_seen(Some(glass()), 0.0);
     assert!((control - 0.5).abs() > 0.1, "control: the slab does not shift the view");
 }
 
@@ -81,14 +83,14 @@ fn irradiance_below(cover: Option<Surface>) -> f64 {
     scene.lights.push(point_light(vec3(0.0, 5.0, 0.0), 1.0));
     // Below the cover, so that the camera's own path stays clear.
     scene.cameras.push(camera(vec3(0.0, 0.4, 0.001), Vec3::ZERO, 100.0));
-    let settings = Settings { neighbors: 500, max_paths: Some(2_000_000), ..settings(Mode::DirectPhotons, 400_000, 8) };
+    let settings = Settings { neighbors: 500, ..settings(Mode::DirectPhotons, 1_000_000, 8) };
     mean(&render_scene(&scene, &settings)) * PI
 }
 
 #[test]
 fn slab_and_pane_pass_what_fresnel_leaves() {
     let clear = irradiance_below(None);
-    assert!(within(clear, 1.0 / 25.0, 0.03), "without a cover: {clear} W/m²");
+    assert!(within(clear, 1.0 / 25.0, 0.04), "without a cover: {clear} W/m²");
     let f = fresnel(1.0, 1.5);
     let right = 1.0 - 2.0 * f / (1.0 + f);
     let wrong = (1.0 - f).powi(3);
@@ -128,24 +130,22 @@ fn a_ball_in_glass_has_the_radiance_of_its_photons() {
 
 #[test]
 fn an_air_bubble_is_a_closed_surface_of_ior_one() {
-    // Looking through a slab that holds a bubble of ior 1 with the slab's own thickness to spare: straight through the
-    // bubble's centre nothing is bent, and a quarter of its radius off the axis the ray is.
-    let through = |ior: f32, x: f32| {
+    // A camera looks straight down, 0.4 m beside the axis of a ball in a slab, at a floor that is white on its side of
+    // the axis and black on the other.
+    let through = |ior: f32| {
         let mut scene = scene(&[diffuse(0.0), diffuse(1.0), glass(), Surface::Glass { ior, tint: Vec3::ONE }]);
         add_quad(&mut scene, vec3(-9.0, 0.0, 9.0), vec3(9.0, 0.0, 0.0), vec3(0.0, 0.0, -18.0), 0);
         add_quad(&mut scene, vec3(0.0, 0.0, 9.0), vec3(9.0, 0.0, 0.0), vec3(0.0, 0.0, -18.0), 1);
         add_box(&mut scene, vec3(-8.0, 1.0, -8.0), vec3(8.0, 5.0, 8.0), 2);
         scene.spheres.push(sphere(vec3(0.0, 3.0, 0.0), 1.5, 3));
         scene.lights.push(point_light(vec3(0.0, 0.5, 0.0), 1.0));
-        scene.cameras.push(camera(vec3(x, 8.0, 0.001), vec3(x, 0.0, 0.0), 1.0));
-        let settings = Settings { spp: 4, ..settings(Mode::DirectRays, 1000, 8) };
+        scene.cameras.push(camera(vec3(0.4, 8.0, 0.001), vec3(0.4, 0.0, 0.0), 1.0));
+        let settings = Settings { spp: 16, ..settings(Mode::DirectRays, 1000, 8) };
         mean(&render_scene(&scene, &settings))
     };
-    // A bubble spreads rays away from its axis: a ray at x = 0.4 moves to larger x and stays on white; glass of the
-    // slab's own index does nothing; a denser ball (ior 3) turns it over to black.
-    assert!(through(1.0, 0.4) > 0.01, "bubble");
-    assert!(through(1.5, 0.4) > 0.01, "same index");
-    assert!(through(3.0, 0.4) < 1e-6, "control: a denser ball turns the view over");
-    // And exactly: with the slab's own index the ball changes nothing at all but the losses at its surface.
-    assert!(through(1.5, 0.0) > 0.0);
+    // A bubble spreads the view away from the axis, a ball of the slab's own index leaves it: both see white, farther
+    // from the light and nearer to it. A denser ball turns the view over: black, but for stray reflections.
+    let (bubble, same, denser) = (through(1.0), through(1.5), through(3.0));
+    assert!(bubble > 0.001 && bubble < 0.5 * same, "bubble {bubble}, same index {same}");
+    assert!(denser < 0.1 * same, "control: a denser ball gives {denser}, the same index {same}");
 }
