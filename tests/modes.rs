@@ -66,7 +66,7 @@ fn hybrid_and_photons_agree_in_the_limit() {
 /// A coarse ball; `smooth`: with the normals of the sphere at its corners.
 fn coarse_ball(smooth: bool) -> Scene {
     let mut scene = scene(&[diffuse(0.7)]);
-    let (rows, columns) = (8, 12);
+    let (rows, columns) = (5, 8);
     let corner = |row: i32, column: i32| {
         let theta = std::f32::consts::PI * row as f32 / rows as f32;
         let phi = std::f32::consts::TAU * column as f32 / columns as f32;
@@ -91,20 +91,27 @@ fn coarse_ball(smooth: bool) -> Scene {
 #[test]
 fn modes_agree_on_a_smooth_shaded_ball() {
     let picture = |mode, smooth| {
-        let settings = Settings { neighbors: 60, ..settings(mode, 400_000, 48) };
+        let settings = Settings { neighbors: 150, ..settings(mode, 100_000, 40) };
         render_scene(&coarse_ball(smooth), &settings)
     };
-    // Away from the outline and the shadow's edge, where the disc of the estimate leaves the surface.
+    // Means over blocks of 4 x 4 pixels, against noise; away from the shadow's edge, where the disc of the estimate
+    // leaves the lit surface.
+    let blocks = |render: &Render| -> Vec<f64> {
+        let block = |b: usize| {
+            let pixels = (0..16).map(|i| ((b / 10) * 4 + i / 4) * 40 + (b % 10) * 4 + i % 4);
+            pixels.map(|p| f64::from(render.frame.radiance[p][0])).sum::<f64>() / 16.0
+        };
+        (0..100).map(block).collect()
+    };
     let rms = |a: &Render, b: &Render| {
-        let lit = |v: &[f32; 3]| v[0] > 0.05;
-        let pairs: Vec<_> = a.frame.radiance.iter().zip(&b.frame.radiance).filter(|(x, y)| lit(x) && lit(y)).collect();
-        let square = |(x, y): &(&[f32; 3], &[f32; 3])| f64::from((x[0] - y[0]) / x[0]).powi(2);
-        (pairs.iter().map(square).sum::<f64>() / pairs.len() as f64).sqrt()
+        let pairs: Vec<_> = blocks(a).into_iter().zip(blocks(b)).filter(|(x, y)| x.min(*y) > 0.1).collect();
+        assert!(pairs.len() > 15, "too few blocks are lit");
+        (pairs.iter().map(|(x, y)| ((x - y) / x).powi(2)).sum::<f64>() / pairs.len() as f64).sqrt()
     };
     let rays = picture(Mode::DirectRays, true);
     let (right, wrong) =
         (rms(&rays, &picture(Mode::DirectPhotons, true)), rms(&rays, &picture(Mode::DirectPhotons, false)));
-    assert!(right < 0.5 * wrong, "smooth photons differ from smooth rays by {right}, flat photons by {wrong}");
+    assert!(right < 0.6 * wrong, "smooth photons differ from smooth rays by {right}, flat photons by {wrong}");
     let (a, b) = (mean(&rays), mean(&picture(Mode::DirectPhotons, true)));
     assert!(within(b, a, 0.03), "mean {b} by photons, {a} by rays");
 }
