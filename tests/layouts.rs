@@ -39,7 +39,7 @@ macro_rules! twins {
 
 fn twins() -> Vec<Twin> {
     twins! {
-        BvhNode { left_min, left_first, left_max, left_count, right_min, right_first, right_max, right_count }
+        BvhNode { left_low, left_high, right_low, right_high }
         Primitive { v0, material, e1, id, e2, pad }
         Normals { n0, n1, n2, flat_shaded }
         Material { color, kind, ior, pad0, pad1, pad2 }

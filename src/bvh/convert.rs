@@ -3,7 +3,7 @@
 use obvhs::bvh2::Bvh2;
 
 use super::MAX_LEAF;
-use crate::layout::{BVH_STACK, BvhNode};
+use crate::layout::{BVH_STACK, BvhChild, BvhNode};
 use crate::scene::Bounds;
 
 /// A child before it is written into its parent.
@@ -98,16 +98,12 @@ impl Converter<'_> {
         let index = self.nodes.len();
         self.nodes.push(BvhNode::default());
         let [left, right] = convert(self);
-        self.nodes[index] = BvhNode {
-            left_min: left.bounds.min.to_array(),
-            left_first: left.first,
-            left_max: left.bounds.max.to_array(),
-            left_count: left.count,
-            right_min: right.bounds.min.to_array(),
-            right_first: right.first,
-            right_max: right.bounds.max.to_array(),
-            right_count: right.count,
-        };
+        self.nodes[index] = BvhNode::new([&left, &right].map(|child| BvhChild {
+            min: child.bounds.min.to_array(),
+            max: child.bounds.max.to_array(),
+            first: child.first,
+            count: child.count,
+        }));
         Child { bounds: left.bounds.union(right.bounds), first: index as u32, count: 0 }
     }
 

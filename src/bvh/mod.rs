@@ -61,9 +61,9 @@ impl Bvh {
     pub fn depth(&self) -> usize {
         let mut depths = vec![1_usize; self.nodes.len()];
         for (i, node) in self.nodes.iter().enumerate() {
-            for (first, count) in [(node.left_first, node.left_count), (node.right_first, node.right_count)] {
-                if count == 0 {
-                    depths[first as usize] = depths[i] + 1;
+            for child in node.children() {
+                if child.count == 0 {
+                    depths[child.first as usize] = depths[i] + 1;
                 }
             }
         }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{Bvh, MAX_LEAF, bounds};
-use crate::layout::{BVH_STACK, BvhNode, Primitive, SPHERE_BIT};
+use crate::layout::{BVH_STACK, BvhChild, BvhNode, Primitive, SPHERE_BIT};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
 /// Random numbers in 0..1 (PCG hash, Jarzynski and Olano 2020).
@@ -69,19 +69,11 @@ fn enters(min: [f32; 3], max: [f32; 3], o: Vec3, d: Vec3, t_max: f32) -> bool {
     near <= far * (1.0 + 4.0 * f32::EPSILON)
 }
 
-/// Children of a node: box, first, count.
-fn children(node: &BvhNode) -> [([f32; 3], [f32; 3], u32, u32); 2] {
-    [
-        (node.left_min, node.left_max, node.left_first, node.left_count),
-        (node.right_min, node.right_max, node.right_first, node.right_count),
-    ]
-}
-
 fn traverse(bvh: &Bvh, o: Vec3, d: Vec3) -> Option<(f32, u32)> {
     let mut nearest: Option<(f32, u32)> = None;
     let mut open = vec![0_u32];
     while let Some(node) = open.pop() {
-        for (min, max, first, count) in children(&bvh.nodes[node as usize]) {
+        for BvhChild { min, max, first, count } in bvh.nodes[node as usize].children() {
             let t_max = nearest.map_or(f32::INFINITY, |hit| hit.0);
             if !enters(min, max, o, d, t_max) {
                 continue;
@@ -121,7 +113,7 @@ fn mismatches(bvh: &Bvh, count: usize) -> usize {
 fn fault(bvh: &Bvh) -> Option<String> {
     let mut seen = vec![0; bvh.primitives.len()];
     for (i, node) in bvh.nodes.iter().enumerate() {
-        for (min, max, first, count) in children(node) {
+        for BvhChild { min, max, first, count } in node.children() {
             let outer = Bounds { min: min.into(), max: max.into() };
             let inner = if count == 0 {
                 if first as usize <= i {
@@ -169,8 +161,9 @@ fn holds_all_and_finds_what_brute_force_finds() {
 fn a_shrunken_box_is_found() {
     let mut bvh = Bvh::build(&random_scene(3000, 200, 0.1, 1));
     let whole = bvh.clone();
-    let node = &mut bvh.nodes[0];
-    node.left_max = (0.5 * (Vec3::from(node.left_min) + Vec3::from(node.left_max))).to_array();
+    let [left, right] = bvh.nodes[0].children();
+    let shrunk = (0.5 * (Vec3::from(left.min) + Vec3::from(left.max))).to_array();
+    bvh.nodes[0] = BvhNode::new([BvhChild { max: shrunk, ..left }, right]);
     assert!(fault(&bvh).is_some());
     assert!(mismatches(&bvh, 2000) > 0);
     let mut twice = whole;

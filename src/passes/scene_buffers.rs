@@ -22,6 +22,7 @@ pub struct SceneBuffers {
     normals: Buffer,
     materials: Buffer,
     lights: Buffer,
+    has_spheres: bool,
     /// The lights as uploaded.
     pub light_table: Vec<layout::Light>,
 }
@@ -49,6 +50,7 @@ impl SceneBuffers {
             normals: gpu.storage_with("normals", &bvh.normals)?,
             materials: gpu.storage_with("materials", &materials)?,
             lights: gpu.storage_with("lights", &light_table)?,
+            has_spheres: !scene.spheres.is_empty(),
             light_table,
         })
     }
@@ -57,6 +59,7 @@ impl SceneBuffers {
     #[must_use]
     pub fn kernel(&self, gpu: &Gpu, stem: &str) -> Kernel {
         let overrides = [
+            ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
             ("SPLIT", f64::from(u8::from(self.nodes.window + self.primitives.window > 0))),
             ("NODE_WINDOW", window_or_all(self.nodes.window)),
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),

@@ -1,0 +1,138 @@
+//! Bounds of memory and loops.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | windows | a device with tiny bindings gives the same picture: all that exceeds one is split | a larger binding is not split |
+//! | refusal | what two bindings cannot hold is refused by the limit's name | it renders where they can |
+//! | budget | a ray that outruns its loop budget is counted, not lost in silence | the full budget counts none |
+//! | memory | the peak is at most 96 bytes a photon of capacity and 32 MiB | a tenth of that does not hold it |
+//! | tiles | device memory does not grow with samples or size | it grows with photons |
+
+mod common;
+
+use caustica::{
+    Error,
+    bvh::Bvh,
+    gpu::{Gpu, Kernel},
+    layout::{CameraTile, Counters, FirstHit, Path, VisiblePoint},
+    passes::SceneBuffers,
+    progress::Silent,
+    renderer::render,
+    scene::Scene,
+    settings::{Mode, Settings},
+};
+use common::*;
+use glam::vec3;
+
+/// A closed room with a height field of 2 · side² triangles, a glass ball and a light.
+fn room(side: i32) -> Scene {
+    let mut scene = scene(&[diffuse(0.6), glass()]);
+    add_box(&mut scene, vec3(-1.0, -0.5, -1.0), vec3(1.0, 2.0, 1.0), 0);
+    let at = |i: i32, j: i32| {
+        let (x, z) = (2.0 * i as f32 / side as f32 - 1.0, 2.0 * j as f32 / side as f32 - 1.0);
+        vec3(x, 0.1 * (5.0 * x).sin() * (4.0 * z).cos(), z)
+    };
+    for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
+        for [a, b, c] in [[at(i, j), at(i, j + 1), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i + 1, j)]] {
+            let normals = [(b - a).cross(c - a).normalize(); 3];
+            scene.triangles.push(caustica::scene::Triangle { positions: [a, b, c], normals, material: 0 });
+        }
+    }
+    scene.spheres.push(sphere(vec3(0.2, 0.6, 0.0), 0.35, 1));
+    scene.lights.push(point_light(vec3(0.0, 1.8, 0.0), 3.0));
+    scene.cameras.push(camera(vec3(0.0, 1.2, 0.95), vec3(0.0, 0.2, 0.0), 80.0));
+    scene
+}
+
+/// A device that pretends to have bindings of that many bytes.
+fn device_with_bindings(bytes: u64) -> Gpu {
+    let mut gpu = Gpu::open(None).expect("tests need an adapter");
+    gpu.limits.max_storage_buffer_binding_size = bytes;
+    gpu
+}
+
+#[test]
+fn what_exceeds_a_binding_is_split() {
+    let scene = room(360);
+    let primitives = scene.triangles.len() as u64 * 48;
+    let settings = settings(Mode::Hybrid, 300_000, 24);
+    let picture = |gpu: &Gpu| render(gpu, &scene, &settings, &Silent).map(|r| r.frame);
+    let whole = picture(gpu()).expect("the scene renders");
+    // The primitives and the photons of a map need two windows each; nothing else scales with the scene.
+    let split = picture(&device_with_bindings(primitives * 55 / 100)).expect("what exceeds a binding is split");
+    assert!(split == whole, "the split scene gives another picture");
+    let refused = picture(&device_with_bindings(primitives * 45 / 100)).expect_err("control: three windows");
+    let Error::Limit { what, limit, .. } = &refused else { panic!("{refused}") };
+    assert_eq!((what.as_str(), *limit), ("primitives", "maxStorageBufferRange"), "{refused}");
+}
+
+/// Rays of a picture of the room that were given up with that loop budget.
+fn unfinished(budget: f64) -> u32 {
+    const RAYS: u32 = 512;
+    let gpu = gpu();
+    let scene = room(60);
+    let buffers = SceneBuffers::new(gpu, &scene, &Bvh::build(&scene), &Settings::default()).expect("the scene fits");
+    let kernel = Kernel::new(gpu, "trace_camera", &[("TRACE_BUDGET", budget)]);
+    let ray = |i: u32| {
+        let angle = i as f32 * 2.4;
+        let direction = vec3(angle.cos(), -0.5, angle.sin()).normalize().to_array();
+        Path { origin: [0.0, 1.0, 0.0], direction, ..Path::default() }
+    };
+    let count = u64::from(RAYS);
+    let paths = gpu.storage_with("paths", &(0..RAYS).map(ray).collect::<Vec<_>>()).expect("fits");
+    let queue = gpu.storage_with("queue", &(0..RAYS).collect::<Vec<_>>()).expect("fits");
+    let queue_out = gpu.storage::<u32>("queue out", count).expect("fits");
+    let counters = gpu.storage_with("counters", &[Counters { current: RAYS, ..Counters::default() }]).expect("fits");
+    let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
+    let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
+    let tile = gpu.uniform("tile", &CameraTile { samples: 1, ..CameraTile::default() });
+    let bindings = kernel.bind(
+        gpu,
+        &buffers.with(&[
+            ("tile", &tile),
+            ("paths", &paths),
+            ("queue_in", &queue),
+            ("queue_out", &queue_out),
+            ("counters", &counters),
+            ("points", &points),
+            ("first_hits", &first_hits),
+        ]),
+    );
+    let mut encoder = gpu.encoder();
+    kernel.dispatch(&mut encoder, &bindings, count);
+    gpu.submit(encoder);
+    gpu.read::<Counters>(&counters, 0, 1).expect("counters read back")[0].unfinished
+}
+
+#[test]
+fn a_ray_out_of_its_loop_budget_is_counted() {
+    assert!(unfinished(3.0) > 400, "rays that visit more than 3 nodes are not counted");
+    assert_eq!(unfinished(8000.0), 0, "control: the full budget is not enough");
+}
+
+#[test]
+fn memory_is_bounded_by_photons_alone() {
+    const MIB: u64 = 1 << 20;
+    let scene = room(8);
+    // A device of its own: the peak counts all that lives on it.
+    let gpu = Gpu::open(None).expect("tests need an adapter");
+    let peak = |photons: u32, size: u32, spp: u32| {
+        let settings = Settings {
+            max_paths: Some(1_000_000),
+            spp,
+            neighbors: 10,
+            ..settings(Mode::IndirectPhotons, photons, size)
+        };
+        render(&gpu, &scene, &settings, &Silent).expect("the scene renders").stats.peak_device_bytes
+    };
+    let (few, many) = (peak(1000, 16, 1), peak(500_000, 16, 1));
+    // Each of the two maps has its own capacity.
+    let bound = |photons: u64| 96 * 2 * photons + 32 * MIB;
+    assert!(few <= bound(1000), "{few} bytes for 1 k photons");
+    assert!(many <= bound(500_000), "{many} bytes for 500 k photons");
+    assert!(many > bound(500_000) / 10, "control: {many} bytes are too few to be true");
+    let full_tile = peak(1000, 200, 1);
+    let (large, deep) = (peak(1000, 300, 1), peak(1000, 64, 16));
+    assert_eq!((large, deep), (full_tile, full_tile), "device memory grows with --size or --spp");
+    assert!(full_tile <= bound(1000), "{full_tile} bytes for 1 k photons");
+}
