@@ -133,6 +133,6 @@ fn memory_is_bounded_by_photons_alone() {
     assert!(many > bound(500_000) / 10, "control: {many} bytes are too few to be true");
     let full_tile = peak(1000, 200, 1);
     let (large, deep) = (peak(1000, 300, 1), peak(1000, 64, 16));
-    assert_eq!((large, deep), (full_tile, full_tile), "device memory grows with --size or --spp");
+    assert!(large <= full_tile && deep <= full_tile, "device memory grows: {large} by --size, {deep} by --spp");
     assert!(full_tile <= bound(1000), "{full_tile} bytes for 1 k photons");
 }
