@@ -44,7 +44,7 @@ fn mirror_and_glass() -> Builder {
     let (mirror, glass) = (b.mirror("mirror"), b.glass("glass", 1.5));
     b.sphere("mirror ball", Vec3::new(-0.45, 0.4, -0.4), 0.4, mirror);
     b.sphere("glass ball", Vec3::new(0.45, 0.4, 0.35), 0.4, glass);
-    b.light("light", Vec3::new(0.0, 1.7, 0.0), 5.0);
+    b.light("light", Vec3::new(0.0, 1.7, 0.0), 1.5);
     b
 }
 
@@ -54,7 +54,7 @@ fn diffuse() -> Builder {
     let white = add_room(&mut b);
     add_block(&mut b, white);
     b.sphere("ball", Vec3::new(0.42, 0.35, 0.3), 0.35, white);
-    b.light("light", Vec3::new(0.0, 1.7, 0.0), 5.0);
+    b.light("light", Vec3::new(0.0, 1.7, 0.0), 1.5);
     b
 }
 
@@ -65,7 +65,7 @@ fn diffuse_in_glass() -> Builder {
     let (glass, blue) = (b.glass("glass", 1.5), b.diffuse("blue", [0.2, 0.35, 0.7]));
     b.sphere("glass ball", Vec3::new(0.0, 0.6, 0.0), 0.55, glass);
     b.sphere("inner ball", Vec3::new(0.0, 0.6, 0.0), 0.3, blue);
-    b.light("light", Vec3::new(-0.3, 1.75, 0.3), 5.0);
+    b.light("light", Vec3::new(-0.3, 1.75, 0.3), 1.5);
     b
 }
 
@@ -77,7 +77,7 @@ fn lit_room(lights: &[Vec3]) -> Builder {
     let glass = b.glass("glass", 1.5);
     b.sphere("glass ball", Vec3::new(0.42, 0.35, 0.3), 0.35, glass);
     for (i, light) in lights.iter().enumerate() {
-        b.light(&format!("light {}", i + 1), *light, 5.0);
+        b.light(&format!("light {}", i + 1), *light, 0.8);
     }
     b
 }

@@ -122,7 +122,7 @@ pub fn scene() -> Builder {
     b.node(json!({
         "name": "water, left", "mesh": mesh, "translation": [0.0, HEIGHT, 0.0], "rotation": [0.0, 1.0, 0.0, 0.0],
     }));
-    b.light("light", Vec3::new(0.25, 2.2, -0.2), 8.0);
+    b.light("light", Vec3::new(0.25, 2.2, -0.2), 2.0);
     b.camera(Vec3::new(0.0, 1.15, 4.8), -2.0, 33.0, 1.0);
     b
 }

@@ -1,0 +1,51 @@
+//! Seconds that the driver takes to compile each kernel, without its disk cache.
+//!
+//! `cargo bench --bench compile`. Each kernel runs one workgroup over zeroed buffers, twice; the first run compiles.
+
+use std::{process::Command, time::Instant};
+
+use caustica::gpu::{
+    Buffer, Gpu, Kernel,
+    shaders::{BindingKind, SHADERS},
+};
+
+/// Set in the process that measures: Mesa reads its environment when it is loaded.
+const MEASURING: (&str, &str) = ("MESA_SHADER_CACHE_DISABLE", "true");
+/// Bytes of each zeroed buffer.
+const BYTES: u64 = 1 << 16;
+
+fn main() {
+    if std::env::var(MEASURING.0).is_err() {
+        let program = std::env::current_exe().expect("a process has a program");
+        let status = Command::new(program).env(MEASURING.0, MEASURING.1).status().expect("the program starts");
+        std::process::exit(status.code().unwrap_or(1));
+    }
+    let gpu = Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("benches need an adapter");
+    println!("{} ({})", gpu.name, gpu.driver);
+    println!("{:>18} {:>10} {:>10}", "kernel", "first (s)", "second (s)");
+    for shader in SHADERS {
+        let buffers: Vec<(&str, Buffer)> = shader
+            .bindings
+            .iter()
+            .map(|b| match b.kind {
+                BindingKind::Uniform => (b.name, gpu.uniform("zeros", &[0_u32; 256])),
+                _ => (b.name, gpu.storage::<u8>("zeros", BYTES).expect("a small buffer fits")),
+            })
+            .collect();
+        let named: Vec<_> = buffers.iter().map(|(name, buffer)| (*name, buffer)).collect();
+        gpu.wait().expect("the device works");
+        let start = Instant::now();
+        let kernel = Kernel::new(&gpu, shader.stem, &[]);
+        let run = || {
+            let mut encoder = gpu.encoder();
+            kernel.dispatch(&mut encoder, &kernel.bind(&gpu, &named), 64);
+            gpu.submit(encoder);
+            gpu.wait().expect("the kernel runs");
+        };
+        run();
+        let first = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        run();
+        println!("{:>18} {first:>10.3} {:>10.4}", shader.stem, start.elapsed().as_secs_f64());
+    }
+}

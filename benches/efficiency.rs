@@ -1,0 +1,57 @@
+//! Efficiency of whole renders: 1 / (relMSE · seconds of the process), against the references at 256 x 256.
+//!
+//! `cargo bench --bench efficiency`. Runs the program as a user would, driver cache warm, five times a setting; the
+//! table gives the median time.
+
+use std::{path::Path, process::Command, time::Instant};
+
+use caustica::image::{read_exr, rel_mse};
+
+const RUNS: usize = 5;
+/// Photons per map, neighbours, samples per pixel.
+const SETTINGS: [(&str, &str, &str); 6] = [
+    ("200k", "100", "4"),
+    ("100k", "100", "4"),
+    ("200k", "100", "1"),
+    ("200k", "60", "2"),
+    ("100k", "50", "2"),
+    ("50k", "50", "2"),
+];
+
+fn main() {
+    println!("{:>5} {:>8} {:>5} {:>4} {:>10} {:>9} {:>11}", "scene", "photons", "k", "spp", "relMSE", "seconds", "efficiency");
+    for scene in ["S1", "S2"] {
+        for setting in SETTINGS {
+            measure(scene, setting);
+        }
+    }
+}
+
+fn measure(scene: &str, (photons, neighbors, spp): (&str, &str, &str)) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
+    let out = std::env::temp_dir().join(format!("caustica-efficiency-{}-{scene}.exr", std::process::id()));
+    let mut seconds: Vec<f64> = (0..=RUNS)
+        .map(|_| {
+            let start = Instant::now();
+            let status = Command::new(env!("CARGO_BIN_EXE_caustica"))
+                .args(["render", "-q", "--size", "256x256", "--photons", photons, "-k", neighbors, "--spp", spp, "-o"])
+                .args([&out, &folder.join(format!("{scene}.glb"))])
+                .status()
+                .expect("the program starts");
+            assert!(status.success(), "{scene} renders");
+            start.elapsed().as_secs_f64()
+        })
+        .collect();
+    // The first run warms the driver's cache.
+    seconds.remove(0);
+    seconds.sort_by(f64::total_cmp);
+    let median = seconds[RUNS / 2];
+    let picture = read_exr(&out).expect("the program wrote a picture");
+    let reference = read_exr(&folder.join(format!("{scene}.exr"))).expect("the reference reads");
+    let error = rel_mse(&picture.radiance, &reference.radiance, None);
+    let efficiency = 1.0 / (error * median);
+    println!("{scene:>5} {photons:>8} {neighbors:>5} {spp:>4} {error:>10.5} {median:>9.3} {efficiency:>11.1}");
+    if let Err(e) = std::fs::remove_file(&out) {
+        eprintln!("{}: {e}", out.display());
+    }
+}
