@@ -5,7 +5,7 @@
 
 use std::{path::Path, process::Command, time::Instant};
 
-use caustica::image::{read_exr, rel_mse};
+use caustica::image::{difference::rel_mse, read_exr};
 
 const RUNS: usize = 5;
 /// Photons per map, neighbours, samples per pixel.

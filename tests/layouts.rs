@@ -58,7 +58,7 @@ fn twins() -> Vec<Twin> {
         PhotonPlace { position, wi }
         PhotonFlux { flux, index }
         MapInfo { count, cells, split, pad }
-        GatherInfo { count, first, neighbors, cone_constant, max_radius_squared, per_path, pad0, pad1 }
+        GatherInfo { count, first, neighbors, cone_constant, max_radius_squared, per_path, stride, pad }
         Gathered { radius_squared, count }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }

@@ -119,8 +119,9 @@ fn fault(bvh: &Bvh) -> Option<String> {
                 if first as usize <= i {
                     return Some(format!("child {first} of node {i} comes before it"));
                 }
-                let [left, right] = children(&bvh.nodes[first as usize])
-                    .map(|(min, max, ..)| Bounds { min: min.into(), max: max.into() });
+                let [left, right] = bvh.nodes[first as usize]
+                    .children()
+                    .map(|child| Bounds { min: child.min.into(), max: child.max.into() });
                 left.union(right)
             } else {
                 let range = first as usize..(first + count) as usize;
