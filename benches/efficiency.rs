@@ -19,7 +19,10 @@ const SETTINGS: [(&str, &str, &str); 6] = [
 ];
 
 fn main() {
-    println!("{:>5} {:>8} {:>5} {:>4} {:>10} {:>9} {:>11}", "scene", "photons", "k", "spp", "relMSE", "seconds", "efficiency");
+    println!(
+        "{:>5} {:>8} {:>5} {:>4} {:>10} {:>9} {:>11}",
+        "scene", "photons", "k", "spp", "relMSE", "seconds", "efficiency"
+    );
     for scene in ["S1", "S2"] {
         for setting in SETTINGS {
             measure(scene, setting);

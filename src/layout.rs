@@ -14,53 +14,17 @@ pub const BVH_STACK: usize = 32;
 pub const MEDIA_DEPTH: usize = 4;
 
 /// One interior node of the binary BVH: both children's boxes and what they are, four words at a time as software
-/// Vulkan reads them fastest. See [`BvhNode::new`].
+/// Vulkan reads them fastest. Made by `BvhNode::new` in `src/bvh/node.rs`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct BvhNode {
-    /// Bits of the lower corner of the left child's box, metres; [`BvhChild::first`].
+    /// Bits of the lower corner of the left child's box, metres; then its node, or its first
+    /// primitive if it is a leaf.
     pub left_low: [u32; 4],
-    /// Bits of its upper corner; [`BvhChild::count`].
+    /// Bits of its upper corner; then the primitives of a leaf, 0 for an interior node.
     pub left_high: [u32; 4],
     pub right_low: [u32; 4],
     pub right_high: [u32; 4],
-}
-
-/// A child of a [`BvhNode`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BvhChild {
-    /// Corners of its box, metres.
-    pub min: [f32; 3],
-    pub max: [f32; 3],
-    /// Interior child: index of its node. Leaf: index of its first primitive.
-    pub first: u32,
-    /// Primitives of a leaf; 0 for an interior node.
-    pub count: u32,
-}
-
-impl BvhNode {
-    #[must_use]
-    pub fn new([left, right]: [BvhChild; 2]) -> Self {
-        let pack = |[x, y, z]: [f32; 3], w: u32| [x.to_bits(), y.to_bits(), z.to_bits(), w];
-        Self {
-            left_low: pack(left.min, left.first),
-            left_high: pack(left.max, left.count),
-            right_low: pack(right.min, right.first),
-            right_high: pack(right.max, right.count),
-        }
-    }
-
-    /// Left and right child.
-    #[must_use]
-    pub fn children(&self) -> [BvhChild; 2] {
-        let corner = |[x, y, z, _]: [u32; 4]| [x, y, z].map(f32::from_bits);
-        [(self.left_low, self.left_high), (self.right_low, self.right_high)].map(|(low, high)| BvhChild {
-            min: corner(low),
-            max: corner(high),
-            first: low[3],
-            count: high[3],
-        })
-    }
 }
 
 /// Set in [`Primitive::material`] when the primitive is a sphere; the other bits are the material's index.

@@ -2,8 +2,8 @@
 
 use obvhs::bvh2::Bvh2;
 
-use super::MAX_LEAF;
-use crate::layout::{BVH_STACK, BvhChild, BvhNode};
+use super::{BvhChild, MAX_LEAF};
+use crate::layout::{BVH_STACK, BvhNode};
 use crate::scene::Bounds;
 
 /// A child before it is written into its parent.

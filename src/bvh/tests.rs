@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::{Bvh, MAX_LEAF, bounds};
-use crate::layout::{BVH_STACK, BvhChild, BvhNode, Primitive, SPHERE_BIT};
+use super::{Bvh, BvhChild, MAX_LEAF, bounds};
+use crate::layout::{BVH_STACK, BvhNode, Primitive, SPHERE_BIT};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
 /// Random numbers in 0..1 (PCG hash, Jarzynski and Olano 2020).
