@@ -121,7 +121,7 @@ pub struct Photon {
     pub wi: u32,
     /// Flux in W, before the division by the number of emitted paths.
     pub flux: [f32; 3],
-    /// Before sorting: place in its path. After: Morton key of its cell.
+    /// Before sorting: place in its path. After: Hilbert key of its cell.
     pub key: u32,
 }
 
@@ -148,7 +148,7 @@ pub struct VisiblePoint {
 pub const CELL_PHOTONS: u32 = 32;
 pub const CELL_FAN: u32 = 8;
 
-/// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along the Morton curve, or
+/// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert curve, or
 /// [`CELL_FAN`] cells of the next finer level. Cells lie in depth-first order: the first finer cell follows its owner.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -16,7 +16,7 @@ const PACKET: u32 = 4;
 const PILOT_STRIDE: u32 = 8;
 /// Bytes of `SearchState` and `GatherState` in the shaders.
 const SEARCH_STATE: usize = 256;
-const GATHER_STATE: usize = 272;
+const GATHER_STATE: usize = 400;
 
 /// The radiance estimate that is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]

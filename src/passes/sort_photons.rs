@@ -1,4 +1,4 @@
-//! Orders photons along a Morton curve. Kernels: `bound_photons`, `merge_bounds`, `key_photons`, `sort_photons`.
+//! Orders photons along a Hilbert curve. Kernels: `bound_photons`, `merge_bounds`, `key_photons`, `sort_photons`.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -11,7 +11,7 @@ use crate::{
 
 /// Boxes per window of the first reduction; `BOUND_LANES` of the shaders.
 const BOUND_LANES: u32 = 1024;
-/// Bits of each half of a Morton key.
+/// Bits of each half of a Hilbert key.
 pub(super) const KEY_BITS: u32 = 30;
 
 /// The twin of `KeyStep` and `MoveStep` and, in its first two numbers, of `BoundStep`.
@@ -41,7 +41,7 @@ impl SortPhotons {
         }
     }
 
-    /// Pairs (key, index) of the first `count` photons in the order (Morton key, index).
+    /// Pairs (key, index) of the first `count` photons in the order (Hilbert key, index).
     pub(super) fn order(&self, gpu: &Gpu, radix: &RadixSort, photons: &PhotonStore, count: u32) -> Result<Buffer> {
         let bounds = self.bounds(gpu, photons, count)?;
         let mut entries = [
