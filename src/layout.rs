@@ -120,7 +120,7 @@ pub struct Photon {
     pub wi: u32,
     /// Flux in W, before the division by the number of emitted paths.
     pub flux: [f32; 3],
-    /// While staged: path and place in it, see `bounce_photons`. In a built map: Morton key of its cell.
+    /// While staged: path and place in it, see `bounce_photons`; of no use after that.
     pub key: u32,
 }
 
@@ -281,7 +281,7 @@ pub struct DirectLight {
 pub const CELL_PHOTONS: u32 = 32;
 pub const CELL_FAN: u32 = 8;
 
-/// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along the Morton curve, or
+/// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert curve, or
 /// [`CELL_FAN`] cells of the next finer level. Cells lie in depth-first order: the first finer cell follows its owner.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -436,7 +436,7 @@ pub struct GridStep {
 /// Bytes of `SearchState` in the shaders, in which a packet of queries waits for its next dispatch.
 pub const SEARCH_STATE_BYTES: usize = 256;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
-pub const GATHER_STATE_BYTES: usize = 272;
+pub const GATHER_STATE_BYTES: usize = 400;
 
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of
 /// Efficient Representations for Independent Unit Vectors"); x in the low half. Twin of `encode_octahedral` in

@@ -2,7 +2,7 @@
 //!
 //! Photons come unsorted in a [`PhotonStore`]: windows of `array<Photon>`, each within one binding (4,194,304 photons
 //! where a binding holds 128 MiB, so that up to that number there is one window). [`PhotonMap::build`] sorts them
-//! along a Morton curve of 20 bits per axis and splits them into what a search reads (`places`: position and
+//! along a Hilbert curve of 20 bits per axis and splits them into what a search reads (`places`: position and
 //! direction, 16 bytes) and what an estimate reads besides (`fluxes`, 16 bytes); where these exceed a binding, into two windows.
 //!
 //! Over the sorted photons lies the grid: a finest cell is 32 photons that follow each other on the curve, a coarser

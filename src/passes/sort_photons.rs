@@ -1,4 +1,4 @@
-//! Orders photons along a Morton curve. Kernels: `bound_photons`, `merge_bounds`, `key_photons`, `sort_photons`.
+//! Orders photons along a Hilbert curve. Kernels: `bound_photons`, `merge_bounds`, `key_photons`, `sort_photons`.
 
 use super::{photon_map::PhotonStore, radix_sort::RadixSort};
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
     layout::{BOUND_LANES, BoundStep, Cell, KeyStep, MoveStep},
 };
 
-/// Bits of each half of a Morton key.
+/// Bits of each half of a Hilbert key.
 pub(super) const KEY_BITS: u32 = 30;
 
 /// The compiled kernels.
@@ -32,7 +32,7 @@ impl SortPhotons {
         }
     }
 
-    /// Pairs (key, index) of the first `count` photons in the order (Morton key, index).
+    /// Pairs (key, index) of the first `count` photons in the order (Hilbert key, index).
     pub(super) fn order(&self, gpu: &Gpu, radix: &RadixSort, photons: &PhotonStore, count: u32) -> Result<Buffer> {
         let bounds = self.bounds(gpu, photons, count)?;
         let mut entries = [
