@@ -279,7 +279,7 @@ pub struct DirectLight {
 
 /// Photons of a finest cell of the photon grid; cells of a coarser one.
 pub const CELL_PHOTONS: u32 = 32;
-pub const CELL_FAN: u32 = 8;
+pub const CELL_FAN: u32 = 4;
 
 /// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert curve, or
 /// [`CELL_FAN`] cells of the next finer level. Cells lie in depth-first order: the first finer cell follows its owner.

@@ -59,7 +59,7 @@ mod tests {
     fn levels_end_in_one_cell() {
         assert!(level_sizes(0).is_empty());
         assert_eq!(level_sizes(1), [1]);
-        assert_eq!(level_sizes(8), [8, 1]);
-        assert_eq!(level_sizes(9), [9, 2, 1]);
+        assert_eq!(level_sizes(4), [4, 1]);
+        assert_eq!(level_sizes(5), [5, 2, 1]);
     }
 }

@@ -12,8 +12,8 @@ use crate::{
 const BATCH: u32 = 65_536;
 /// Queries of one invocation.
 const PACKET: u32 = 4;
-/// Of so many packets the first is searched before the others, which start from its radius.
-const PILOT_STRIDE: u32 = 8;
+/// Of how many packets one is searched in each dispatch of the search: pilots first, the others start from their radius.
+const STRIDES: [u32; 3] = [64, 8, 1];
 
 /// The radiance estimate that is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,11 +125,10 @@ impl Gather {
     ) -> Result<u32> {
         let scratch = self.scratch.as_ref().expect("run has made it");
         let (find, sum) = self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
-        let uniform = gpu.uniform("gather info", &GatherInfo { stride: 1, ..*info });
-        let pilots = gpu.uniform("gather info of pilots", &GatherInfo { stride: PILOT_STRIDE, ..*info });
+        let infos = STRIDES.map(|stride| gpu.uniform("gather info", &GatherInfo { stride, ..*info }));
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
-            ("gather_info", &uniform),
+            ("gather_info", &infos[0]),
             ("points", points),
             ("keyed", &scratch.entries[0]),
             ("states", &scratch.states),
@@ -145,18 +144,21 @@ impl Gather {
         gpu.submit(encoder);
         let sorted = self.radix.sort(gpu, [&scratch.entries[0], &scratch.entries[1]], info.count, KEY_BITS)?;
         buffers.push(("entries", &scratch.entries[sorted]));
-        let (find_bindings, sum_bindings) = (find.bind(gpu, &buffers), sum.bind(gpu, &buffers));
-        buffers.retain(|(name, _)| *name != "gather_info");
-        buffers.push(("gather_info", &pilots));
-        let pilot_bindings = find.bind(gpu, &buffers);
+        let sum_bindings = sum.bind(gpu, &buffers);
+        let find_bindings = infos.each_ref().map(|info| {
+            buffers.retain(|(name, _)| *name != "gather_info");
+            buffers.push(("gather_info", info));
+            find.bind(gpu, &buffers)
+        });
         let packets = u64::from(info.count.div_ceil(PACKET));
         let mut dispatches = 0;
         loop {
             progress.check()?;
             let mut encoder = gpu.encoder();
             encoder.clear_buffer(&scratch.open, 0, None);
-            find.dispatch(&mut encoder, &pilot_bindings, packets.div_ceil(PILOT_STRIDE.into()));
-            find.dispatch(&mut encoder, &find_bindings, packets);
+            for (bindings, stride) in find_bindings.iter().zip(STRIDES) {
+                find.dispatch(&mut encoder, bindings, packets.div_ceil(stride.into()));
+            }
             sum.dispatch(&mut encoder, &sum_bindings, packets);
             gpu.submit(encoder);
             dispatches += 1;
