@@ -58,8 +58,8 @@ fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[(Vec3, Vec3)]) -> f64 {
     let counters =
         gpu.storage_with("counters", &[Counters { current: RAYS as u32, ..Default::default() }]).expect("fits");
     let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
-    let first_hits = gpu.storage::<FirstHit>("first hits", count / 2).expect("fits");
-    let tile = gpu.uniform("tile", &CameraTile { samples: 1, ..Default::default() });
+    let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
+    let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..Default::default() });
     let bindings = kernel.bind(
         gpu,
         &buffers.with(&[

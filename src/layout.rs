@@ -237,9 +237,10 @@ pub struct CameraTile {
     pub first_sample: u32,
     pub samples: u32,
     pub max_bounces: u32,
+    /// Places for paths of a sample: both ways are followed at its first log2(branches) dielectric interfaces.
+    pub branches: u32,
     pub pad0: u32,
     pub pad1: u32,
-    pub pad2: u32,
 }
 
 /// What the first ray of a camera sample hit.

@@ -125,7 +125,7 @@ fn picture(
         }
         for map in maps {
             timed(&mut stats.seconds.gather, || {
-                let points = CameraTracer::point_count(tile);
+                let points = tracer.point_count(tile);
                 let results = (&tracer.radiance, &tracer.gathered);
                 gather.run(gpu, map, &tracer.points, points, &estimate, results, progress)
             })?;

@@ -50,7 +50,7 @@ fn twins() -> Vec<Twin> {
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
         PhotonBatch { seed, first_path, first_path_high, paths, light_count, first_light, max_bounces, rules, staging_capacity, lost_scale, pad0, pad1 }
         Store { staged, first_place, first_photon, photons, map_bit, pad0, pad1, pad2 }
-        CameraTile { position, seed, right, width, up, height, forward, spp, first_pixel, pixels, first_sample, samples, max_bounces, pad0, pad1, pad2 }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_pixel, pixels, first_sample, samples, max_bounces, branches, pad0, pad1 }
         FirstHit { normal, depth, albedo, alpha }
         TilePixel { radiance, alpha, normal, depth, albedo, pad }
         DirectLight { light, points, pad0, pad1 }

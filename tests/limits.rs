@@ -85,7 +85,7 @@ fn unfinished(budget: f64) -> u32 {
     let counters = gpu.storage_with("counters", &[Counters { current: RAYS, ..Counters::default() }]).expect("fits");
     let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
     let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
-    let tile = gpu.uniform("tile", &CameraTile { samples: 1, ..CameraTile::default() });
+    let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..CameraTile::default() });
     let bindings = kernel.bind(
         gpu,
         &buffers.with(&[

@@ -10,8 +10,10 @@ use crate::{
     settings::Settings,
 };
 
-/// Camera samples that a tile holds.
-const TILE_SAMPLES: u64 = 1 << 15;
+/// Visible points that a tile has room for.
+const TILE_POINTS: u64 = 1 << 16;
+/// Places for paths of a sample where the scene has dielectrics: both ways are followed at the first two interfaces.
+const BRANCHES: u32 = 4;
 /// Samples of one pixel that a tile holds at most.
 const PIXEL_SAMPLES: u32 = 256;
 /// Bounces handed to the device at once.
@@ -42,7 +44,7 @@ pub struct CameraTracer {
     queues: [Buffer; 2],
     counters: Buffer,
     dispatch_arguments: Buffer,
-    /// Two [`VisiblePoint`]s per sample, some of them not valid.
+    /// A [`VisiblePoint`] per place for a path, some of them not valid.
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
     pub radiance: Buffer,
@@ -72,23 +74,24 @@ impl CameraTracer {
         size: (u32, u32),
         settings: &Settings,
     ) -> Result<Self> {
-        let queue = || gpu.storage::<u32>("camera queue", 2 * TILE_SAMPLES);
+        let branches = if scene.has_dielectrics { BRANCHES } else { 1 };
+        let queue = || gpu.storage::<u32>("camera queue", TILE_POINTS);
         Ok(Self {
             start: Kernel::new(gpu, "start_camera", &[]),
             advance: Kernel::new(gpu, "advance_queue", &[]),
             trace: scene.kernel(gpu, "trace_camera"),
             direct: scene.kernel(gpu, "light_directly"),
             resolve: Kernel::new(gpu, "resolve", &[]),
-            paths: gpu.storage::<Path>("camera paths", 2 * TILE_SAMPLES)?,
+            paths: gpu.storage::<Path>("camera paths", TILE_POINTS)?,
             queues: [queue()?, queue()?],
             counters: gpu.storage::<Counters>("camera counters", 1)?,
             dispatch_arguments: gpu.storage::<[u32; 3]>("camera dispatch arguments", 1)?,
-            points: gpu.storage::<VisiblePoint>("visible points", 2 * TILE_SAMPLES)?,
-            radiance: gpu.storage::<[f32; 4]>("radiance", 2 * TILE_SAMPLES)?,
-            gathered: gpu.storage::<Gathered>("gathered", 2 * TILE_SAMPLES)?,
-            first_hits: gpu.storage::<FirstHit>("first hits", TILE_SAMPLES)?,
-            pixels: gpu.storage::<TilePixel>("tile pixels", TILE_SAMPLES)?,
-            view: view(camera, size, settings),
+            points: gpu.storage::<VisiblePoint>("visible points", TILE_POINTS)?,
+            radiance: gpu.storage::<[f32; 4]>("radiance", TILE_POINTS)?,
+            gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
+            first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
+            pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
+            view: CameraTile { branches, ..view(camera, size, settings) },
             lights: scene.light_table.len() as u32,
         })
     }
@@ -99,7 +102,8 @@ impl CameraTracer {
         let (width, height) = (self.view.width, self.view.height);
         let all_pixels = width.div_ceil(BLOCK) * height.div_ceil(BLOCK) * BLOCK * BLOCK;
         let samples = self.view.spp.min(PIXEL_SAMPLES);
-        let pixels = ((TILE_SAMPLES as u32 / samples) / (BLOCK * BLOCK)).max(1) * BLOCK * BLOCK;
+        let tile_samples = TILE_POINTS as u32 / self.view.branches;
+        let pixels = ((tile_samples / samples) / (BLOCK * BLOCK)).max(1) * BLOCK * BLOCK;
         let mut tiles = Vec::new();
         for first_pixel in (0..all_pixels).step_by(pixels as usize) {
             for first_sample in (0..self.view.spp).step_by(samples as usize) {
@@ -116,8 +120,8 @@ impl CameraTracer {
 
     /// Visible points of a tile, at most.
     #[must_use]
-    pub fn point_count(tile: &Tile) -> u32 {
-        2 * tile.pixels * tile.samples
+    pub fn point_count(&self, tile: &Tile) -> u32 {
+        self.view.branches * tile.pixels * tile.samples
     }
 
     /// Column and row of the `i`-th pixel of a tile; `None` outside the picture.
@@ -179,7 +183,7 @@ impl CameraTracer {
     /// # Errors
     /// Faults of the driver.
     pub fn light_directly(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
-        let points = Self::point_count(tile);
+        let points = self.point_count(tile);
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
         for light in 0..self.lights {

@@ -23,6 +23,8 @@ pub struct SceneBuffers {
     materials: Buffer,
     lights: Buffer,
     has_spheres: bool,
+    /// Some surface both reflects and transmits.
+    pub has_dielectrics: bool,
     /// The lights as uploaded.
     pub light_table: Vec<layout::Light>,
 }
@@ -50,6 +52,7 @@ impl SceneBuffers {
             normals: gpu.storage_with("normals", &bvh.normals)?,
             materials: gpu.storage_with("materials", &materials)?,
             lights: gpu.storage_with("lights", &light_table)?,
+            has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
             has_spheres: !scene.spheres.is_empty(),
             light_table,
         })
