@@ -22,7 +22,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use photons::{Random, caustic_box, in_caustic, on_walls};
 use rayon::prelude::*;
 
-const QUERIES: usize = 131_072;
+const QUERIES: usize = 262_144;
 /// Share of the photons in the caustic, and its width for a thousand times the density of the six walls.
 const SHARE: f32 = 0.3;
 const WIDTH: f32 = 0.0507;

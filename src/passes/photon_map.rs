@@ -29,7 +29,14 @@ impl PhotonStore {
     /// # Errors
     /// [`Error::Limit`] if the device refuses a window.
     pub fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
-        let window_photons = window_elements::<Photon>(gpu);
+        Self::windowed(gpu, capacity, window_elements::<Photon>(gpu))
+    }
+
+    /// As [`Self::new`], in windows of `window_photons`, a power of two ≥ 64.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn windowed(gpu: &Gpu, capacity: u32, window_photons: u32) -> Result<Self> {
         let windows = (0..capacity.div_ceil(window_photons).max(1))
             .map(|w| {
                 gpu.storage::<Photon>("unsorted photons", u64::from(window_photons.min(capacity - w * window_photons)))
@@ -45,12 +52,17 @@ impl PhotonStore {
     pub fn with(gpu: &Gpu, photons: &[Photon]) -> Result<Self> {
         let count = u32::try_from(photons.len()).map_err(|_| too_many(gpu, photons.len() as u64))?;
         let store = Self::new(gpu, count)?;
-        for (window, part) in store.windows.iter().zip(photons.chunks(store.window_photons as usize)) {
+        store.write(gpu, photons);
+        Ok(store)
+    }
+
+    /// Writes `photons` from the first place on.
+    pub fn write(&self, gpu: &Gpu, photons: &[Photon]) {
+        for (window, part) in self.windows.iter().zip(photons.chunks(self.window_photons as usize)) {
             gpu.write(window, 0, part);
             // Written in pieces: the staging memory of a write is given back with its submission.
             gpu.submit(gpu.encoder());
         }
-        Ok(store)
     }
 
     /// The buffers, `array<Photon>` each; photon `i` lies in window `i / window_photons`.
@@ -80,13 +92,21 @@ pub struct MapKernels {
     sort: SortPhotons,
     radix: RadixSort,
     grid: BuildGrid,
+    /// Photons per window of the sorted map.
+    window: u32,
 }
 
 impl MapKernels {
     /// Compiles them.
     #[must_use]
     pub fn new(gpu: &Gpu) -> Self {
-        Self { sort: SortPhotons::new(gpu), radix: RadixSort::new(gpu), grid: BuildGrid::new(gpu) }
+        Self::windowed(gpu, window_elements::<PhotonPlace>(gpu))
+    }
+
+    /// Compiles them for sorted maps in windows of `window` photons, a power of two ≥ 64.
+    #[must_use]
+    pub fn windowed(gpu: &Gpu, window: u32) -> Self {
+        Self { sort: SortPhotons::new(gpu), radix: RadixSort::new(gpu), grid: BuildGrid::new(gpu), window }
     }
 }
 
@@ -111,7 +131,7 @@ impl PhotonMap {
     /// # Errors
     /// [`Error::Limit`] if the map does not fit the device, [`Error::Gpu`] if the driver fails.
     pub fn build(gpu: &Gpu, kernels: &MapKernels, photons: PhotonStore, count: u32, emitted: u64) -> Result<Self> {
-        let window = window_elements::<PhotonPlace>(gpu);
+        let window = kernels.window;
         if count.div_ceil(window) as usize > MAX_WINDOWS {
             return Err(too_many(gpu, count.into()));
         }
