@@ -57,6 +57,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Prog
     let maps = photon_maps(gpu, scene, &buffers, settings, progress, &mut stats)?;
     let frame = picture(gpu, &buffers, &maps, camera, size, settings, progress, &mut stats)?;
 
+    warn_of_faults(&mut stats);
     stats.peak_device_bytes = gpu.memory.peak();
     stats.seconds.total = start.elapsed().as_secs_f64();
     Ok(Render { frame, stats })
@@ -205,4 +206,20 @@ fn add_step(stats: &mut Stats, count: StepCount) {
 fn count_faults(stats: &mut Stats, media_overflows: u64, unfinished: u64) {
     stats.media_overflows += media_overflows;
     stats.unfinished_rays += unfinished;
+}
+
+/// Says what was counted along the way and takes light from the picture.
+fn warn_of_faults(stats: &mut Stats) {
+    if stats.unfinished_rays > 0 {
+        stats
+            .warnings
+            .push(format!("{} rays were given up after their loop budget; their light is lost", stats.unfinished_rays));
+    }
+    if stats.media_overflows > 0 {
+        stats.warnings.push(format!(
+            "paths entered more than {} nested media {} times; the outer ones count there",
+            crate::layout::MEDIA_DEPTH,
+            stats.media_overflows
+        ));
+    }
 }

@@ -3,6 +3,7 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | S1, S2 | relMSE and mean of the picture | scaled by 1.05; the other scene's reference |
+//! | means | the mean over 4 seeds is within 0.5 % at k = 100 and k = 10 | scaled by 1.01 |
 
 mod common;
 
@@ -30,6 +31,25 @@ fn errors(name: &str, other: &str) {
     let ratio = sum(&picture) / sum(&reference(name));
     assert!((ratio - 1.0).abs() < 0.01, "{name}: mean {ratio} of the reference's");
     assert!((ratio * 1.05 - 1.0).abs() > 0.01, "control: a picture 5 % brighter passes");
+}
+
+#[test]
+fn means_over_four_seeds() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
+    let sum = |image: &[[f32; 3]]| image.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
+    for name in ["S1", "S2"] {
+        let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
+        let reference = read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance;
+        for neighbors in [100, 10] {
+            let one = |seed| {
+                let settings = Settings { seed, neighbors, ..settings(Mode::Hybrid, 200_000, 128) };
+                sum(&render_scene(&scene, &settings).frame.radiance)
+            };
+            let ratio = (0..4).map(one).sum::<f64>() / 4.0 / sum(&reference);
+            assert!((ratio - 1.0).abs() < 0.005, "{name}, k = {neighbors}: mean {ratio} of the reference's");
+            assert!((1.01 * ratio - 1.0).abs() > 0.005, "control: a picture 1 % brighter passes");
+        }
+    }
 }
 
 #[test]

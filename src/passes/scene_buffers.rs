@@ -8,11 +8,8 @@ use crate::{
     gpu::{Buffer, Gpu, Kernel},
     layout::{self, BvhNode, Primitive},
     scene::{Scene, Surface},
-    settings::{LightSampling, LightUnit, Settings},
+    settings::{LightSampling, Settings},
 };
-
-/// Lumens per watt, by which photometric intensities are divided.
-const LUMINOUS_EFFICACY: f32 = 683.0;
 
 /// The scene's buffers.
 #[derive(Debug)]
@@ -112,10 +109,6 @@ fn material(surface: &Surface) -> layout::Material {
 
 /// Lights in the renderer's unit, with the probability that a path starts at each.
 fn light_table(scene: &Scene, settings: &Settings) -> Vec<layout::Light> {
-    let scale = match settings.light_unit {
-        LightUnit::Radiometric => 1.0,
-        LightUnit::Photometric => 1.0 / LUMINOUS_EFFICACY,
-    };
     let power = |light: &crate::scene::Light| f64::from(light.intensity.element_sum());
     let total: f64 = scene.lights.iter().map(power).sum();
     let mut sum = 0.0;
@@ -130,7 +123,7 @@ fn light_table(scene: &Scene, settings: &Settings) -> Vec<layout::Light> {
             sum += probability;
             layout::Light {
                 position: light.position.to_array(),
-                intensity: (light.intensity * scale).to_array(),
+                intensity: light.intensity_in(settings.light_unit).to_array(),
                 cdf: sum as f32,
                 probability: probability as f32,
             }
