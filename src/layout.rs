@@ -402,7 +402,7 @@ pub struct KeyStep {
     /// Photons of the window that is bound: the first, and how many.
     pub window_first: u32,
     pub window_count: u32,
-    /// 1 for the fine half of the Morton key, 0 for the coarse one.
+    /// 1 for the fine half of the Hilbert key, 0 for the coarse one.
     pub fine: u32,
 }
 
