@@ -344,7 +344,7 @@ pub struct GatherInfo {
     pub max_radius_squared: f32,
     /// 1 / number of emitted paths.
     pub per_path: f32,
-    /// Of how many blocks of packets one is searched.
+    /// Of how many blocks of queries one is searched.
     pub stride: u32,
     pub pad: u32,
 }
@@ -438,8 +438,8 @@ pub struct GridStep {
     pub pad: u32,
 }
 
-/// Bytes of `SearchState` in the shaders, in which a packet of queries waits for its next dispatch.
-pub const SEARCH_STATE_BYTES: usize = 256;
+/// Bytes of `SearchState` in the shaders, in which a query waits for its next dispatch.
+pub const SEARCH_STATE_BYTES: usize = 112;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
 pub const GATHER_STATE_BYTES: usize = 416;
 

@@ -1,5 +1,5 @@
-//! Radiance from the k nearest photons. Kernels: `key_points`, `find_radius`, `gather`,
-//! `finish_gather`.
+//! Radiance from the k nearest photons. Kernels: `key_points`, `aim_search`,
+//! `count_photons`, `gather`, `finish_gather`.
 
 use super::{photon_map::PhotonMap, radix_sort::RadixSort, sort_photons::KEY_BITS};
 use crate::{
@@ -18,6 +18,8 @@ const BLOCK: u64 = 8;
 /// Of how many blocks of packets one is searched in each dispatch of the search: pilots first, the others start from
 /// their radius.
 const STRIDES: [u32; 3] = [64, 8, 1];
+/// Rounds of counting in one submission.
+const ROUNDS: u32 = 4;
 
 /// The radiance estimate that is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +69,8 @@ pub struct Gather {
 
 #[derive(Debug)]
 struct Search {
-    find: Kernel,
+    aim: Kernel,
+    count: Kernel,
     sum: Kernel,
     finish: Kernel,
 }
@@ -137,7 +140,7 @@ impl Gather {
         progress: &dyn Progress,
     ) -> Result<u32> {
         let scratch = self.scratch.as_ref().expect("run has made it");
-        let Search { find, sum, finish } = self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
+        let Search { aim, count, sum, finish } = self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
         let infos = STRIDES.map(|stride| gpu.uniform("gather info", &GatherInfo { stride, ..*info }));
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
@@ -158,10 +161,10 @@ impl Gather {
         let sorted = self.radix.sort(gpu, [&scratch.entries[0], &scratch.entries[1]], info.count, KEY_BITS)?;
         buffers.push(("entries", &scratch.entries[sorted]));
         let (sum_bindings, finish_bindings) = (sum.bind(gpu, &buffers), finish.bind(gpu, &buffers));
-        let find_bindings = infos.each_ref().map(|info| {
+        let search_bindings = infos.each_ref().map(|info| {
             buffers.retain(|(name, _)| *name != "gather_info");
             buffers.push(("gather_info", info));
-            find.bind(gpu, &buffers)
+            (aim.bind(gpu, &buffers), count.bind(gpu, &buffers))
         });
         let packets = u64::from(info.count.div_ceil(PACKET));
         let blocks = packets.div_ceil(BLOCK);
@@ -170,8 +173,13 @@ impl Gather {
             progress.check()?;
             let mut encoder = gpu.encoder();
             encoder.clear_buffer(&scratch.open, 0, None);
-            for (bindings, stride) in find_bindings.iter().zip(STRIDES) {
-                find.dispatch(&mut encoder, bindings, blocks.div_ceil(stride.into()) * BLOCK);
+            for ((aim_bindings, count_bindings), stride) in search_bindings.iter().zip(STRIDES) {
+                let packets = blocks.div_ceil(stride.into()) * BLOCK;
+                for _ in 0..ROUNDS {
+                    aim.dispatch(&mut encoder, aim_bindings, packets * u64::from(PACKET));
+                    count.dispatch(&mut encoder, count_bindings, packets);
+                }
+                aim.dispatch(&mut encoder, aim_bindings, packets * u64::from(PACKET));
             }
             sum.dispatch(&mut encoder, &sum_bindings, packets);
             finish.dispatch(&mut encoder, &finish_bindings, info.count.into());
@@ -194,7 +202,7 @@ impl Gather {
         self.search[windows as usize - 1]
             .get_or_insert_with(|| {
                 let kernel = |stem| Kernel::new(gpu, stem, &common);
-                Search { find: kernel("find_radius"), sum: kernel("gather"), finish: kernel("finish_gather") }
+                Search { aim: kernel("aim_search"), count: kernel("count_photons"), sum: kernel("gather"), finish: kernel("finish_gather") }
             });
     }
 }
@@ -208,7 +216,7 @@ impl Scratch {
                 gpu.storage::<[u32; 2]>("query order", capacity.into())?,
                 gpu.storage::<[u32; 2]>("query order", capacity.into())?,
             ],
-            states: gpu.storage::<[u8; SEARCH_STATE_BYTES]>("search states", packets)?,
+            states: gpu.storage::<[u8; SEARCH_STATE_BYTES]>("search states", packets * u64::from(PACKET))?,
             sums: gpu.storage::<[u8; GATHER_STATE_BYTES]>("unfinished sums", packets)?,
             open: gpu.storage::<u32>("open packets", 1)?,
         })
