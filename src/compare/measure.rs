@@ -107,18 +107,9 @@ pub(super) fn relative(a: f64, b: f64) -> f64 {
     }
 }
 
-/// Fingerprint of the photons that the grid summed, where it tells one.
-fn fingerprint(_: &Gathered) -> Option<u32> {
-    None
-}
-
-/// Whether both sides summed the same photons, as far as the grid tells.
+/// Whether both sides summed the same photons.
 fn sets_agree(grid: &Gathered, kdtree: &Estimate) -> bool {
-    let same = match fingerprint(grid) {
-        Some(fingerprint) => fingerprint == kdtree.fingerprint,
-        None => are_tied(grid.radius_squared, kdtree.radius_squared),
-    };
-    same && grid.count == kdtree.count
+    grid.fingerprint == kdtree.fingerprint && grid.count == kdtree.count
 }
 
 /// Whether the grid's photons can be had from those of the estimate by exchanging photons that are tied with its last.
@@ -129,7 +120,6 @@ pub(super) fn explained_by_ties(
     estimate: &Estimate,
     grid: &Gathered,
 ) -> bool {
-    let Some(wanted) = fingerprint(grid) else { return false };
     let edge = estimate.radius_squared;
     let near = map.search(point, settings.neighbors + MOST_TIED as u32, edge * (1.0 + 2.0 * TIE));
     let tied: Vec<u32> = near.iter().filter(|n| are_tied(n.0, edge)).map(|n| mix(n.1)).collect();
@@ -137,7 +127,7 @@ pub(super) fn explained_by_ties(
     let (base, certain) = nearer.fold((0_u32, 0), |(sum, n), photon| (sum.wrapping_add(mix(photon.1)), n + 1));
     tied.len() < MOST_TIED
         && (certain..=certain + tied.len() as u32).contains(&grid.count)
-        && some_add_up(&tied, grid.count - certain, wanted.wrapping_sub(base))
+        && some_add_up(&tied, grid.count - certain, grid.fingerprint.wrapping_sub(base))
 }
 
 /// Whether `count` of the numbers have that wrapping sum.

@@ -93,7 +93,7 @@ fn row(cells: &[&str]) -> String {
 
 /// Bars over half decades, as SVG.
 fn histogram(histogram: &Histogram, tolerance: f64) -> String {
-    const BAR: f64 = 34.0;
+    const BAR: f64 = 22.0;
     const LEFT: f64 = 20.0;
     const TOP: f64 = 26.0;
     const BOTTOM: f64 = 190.0;
@@ -108,8 +108,8 @@ fn histogram(histogram: &Histogram, tolerance: f64) -> String {
             svg,
             "<rect class=\"bar\" x=\"{:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{height:.1}\"><title>{}</title></rect>\
              <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" style=\"font-size:9px\">{}</text>",
-            x + 1.0,
-            BAR - 2.0,
+            x + 0.5,
+            BAR - 1.0,
             grouped(count),
             x + BAR / 2.0,
             y - 4.0,

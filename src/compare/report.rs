@@ -98,8 +98,9 @@ impl Report {
     /// What is said of both sides together: name and value.
     #[must_use]
     pub fn facts(&self) -> Vec<(&'static str, String)> {
-        let difference = |d: &RelativeDifference| {
-            format!("at most {:.2e}, mean {:.2e}", d.max_relative_difference, d.mean_relative_difference)
+        let difference = |d: &RelativeDifference| match d.max_relative_difference {
+            0.0 => "none".to_string(),
+            most => format!("at most {most:.2e}, mean {:.2e}", d.mean_relative_difference),
         };
         vec![
             ("queries", grouped(self.queries)),

@@ -34,7 +34,7 @@ pub(super) struct GridAnswer {
 
 impl<'a> GridGather<'a> {
     pub fn new(gpu: &Gpu, maps: &'a [PhotonMap]) -> Result<Self> {
-        let gather = Gather::new(gpu, GatherOptions::default());
+        let gather = Gather::new(gpu, GatherOptions { fingerprint: true, ..GatherOptions::default() });
         Ok(Self { maps, gather, radiance: None, warm: false, seconds: 0.0 })
     }
 

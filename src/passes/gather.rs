@@ -137,7 +137,8 @@ impl Gather {
         progress: &dyn Progress,
     ) -> Result<u32> {
         let scratch = self.scratch.as_ref().expect("run has made it");
-        let Search { find, sum, finish } = self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
+        let Search { find, sum, finish } =
+            self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
         let infos = STRIDES.map(|stride| gpu.uniform("gather info", &GatherInfo { stride, ..*info }));
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
@@ -191,11 +192,10 @@ impl Gather {
             ("STEP_BUDGET", f64::from(self.options.step_budget)),
             ("FINGERPRINT", f64::from(u8::from(self.options.fingerprint))),
         ];
-        self.search[windows as usize - 1]
-            .get_or_insert_with(|| {
-                let kernel = |stem| Kernel::new(gpu, stem, &common);
-                Search { find: kernel("find_radius"), sum: kernel("gather"), finish: kernel("finish_gather") }
-            });
+        self.search[windows as usize - 1].get_or_insert_with(|| {
+            let kernel = |stem| Kernel::new(gpu, stem, &common);
+            Search { find: kernel("find_radius"), sum: kernel("gather"), finish: kernel("finish_gather") }
+        });
     }
 }
 

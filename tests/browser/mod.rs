@@ -51,7 +51,9 @@ impl Browser {
             });
         let mut lines = BufReader::new(driver.stdout.take().expect("it is piped")).lines();
         let port = lines
-            .find_map(|line| line.ok()?.split("started successfully on port ").nth(1)?.trim_end_matches('.').parse().ok())
+            .find_map(|line| {
+                line.ok()?.split("started successfully on port ").nth(1)?.trim_end_matches('.').parse().ok()
+            })
             .expect("chromedriver tells its port");
         let profile = tempfile::tempdir().expect("a temporary folder");
         let mut browser = Self { driver, port, session: String::new(), _profile: profile };
