@@ -20,6 +20,8 @@ use crate::{
     error::{Error, Result},
     gpu::Gpu,
     image::{Frame, Origin, Tonemap, write_exr, write_file, write_png},
+    layout::VisiblePoint,
+    passes::Tile,
     progress::{Progress, Stage},
     renderer::{CameraPass, Session},
     scene::Scene,
@@ -90,10 +92,12 @@ pub fn compare(
     let maps = session.photon_maps(settings, progress)?;
     let mut stats = maps.stats().clone();
     let pass = CameraPass::new(&session, settings)?;
-    let mut grid = GridGather::new(gpu, maps.maps())?;
-    let mut kdtree = KdTreeGather::new(gpu, maps.maps(), settings)?;
-    let mut measure = Measure::default();
-    let (mut grid_film, mut kdtree_film) = (pass.film(), pass.film());
+    let mut sides = Sides {
+        grid: GridGather::new(gpu, maps.maps())?,
+        kdtree: KdTreeGather::new(gpu, maps.maps(), settings)?,
+        measure: Measure::default(),
+    };
+    let (mut grid, mut kdtree) = (pass.film(), pass.film());
     let mut sabotage = options.sabotage;
     let tiles = pass.tracer.tiles();
     for (done, tile) in tiles.iter().enumerate() {
@@ -101,37 +105,61 @@ pub fn compare(
         progress.report(Stage::Compare, done as u64, tiles.len() as u64);
         pass.trace(tile, &mut stats)?;
         let points = pass.points(tile)?;
-        sabotage -= kdtree.leave_out(sabotage, &points);
-        let mut grid_radiance = pass.radiance(tile)?;
-        let mut kdtree_radiance = grid_radiance.clone();
-        for map in 0..maps.maps().len() {
-            let ours = grid.gather(map, &pass, tile, progress)?;
-            let theirs = kdtree.gather(map, &points, progress)?;
-            measure.add(&points, &ours, &theirs, |i, gathered| kdtree.explains(map, &points[i], &theirs[i], gathered));
-            for i in 0..points.len() {
-                for c in 0..3 {
-                    grid_radiance[i][c] += ours.radiance[i][c];
-                    kdtree_radiance[i][c] += theirs[i].radiance[c] as f32;
-                }
-            }
-        }
+        sabotage -= sides.kdtree.leave_out(sabotage, &points);
+        let [grid_radiance, kdtree_radiance] = sides.gather(&pass, tile, &points, progress)?;
         pass.set_radiance(&grid_radiance);
-        pass.resolve(tile, &mut grid_film)?;
+        pass.resolve(tile, &mut grid)?;
         pass.set_radiance(&kdtree_radiance);
-        pass.resolve(tile, &mut kdtree_film)?;
+        pass.resolve(tile, &mut kdtree)?;
     }
     progress.report(Stage::Compare, tiles.len() as u64, tiles.len() as u64);
-    stats.seconds.gather = grid.seconds + kdtree.seconds;
+    let Sides { grid: grid_side, kdtree: kdtree_side, measure } = sides;
+    stats.seconds.gather = grid_side.seconds + kdtree_side.seconds;
     session.close(&mut stats);
     Ok(Comparison {
-        report: Report::new(&measure, &grid, &kdtree, &stats),
-        grid: grid_film.finish(settings.spp),
-        kdtree: kdtree_film.finish(settings.spp),
+        report: Report::new(&measure, &grid_side, &kdtree_side, &stats),
+        grid: grid.finish(settings.spp),
+        kdtree: kdtree.finish(settings.spp),
         stats,
         tolerance: options.tolerance,
         different: measure.different,
         histogram: measure.histogram,
     })
+}
+
+/// Both sides and what is counted of them.
+struct Sides<'a> {
+    grid: GridGather<'a>,
+    kdtree: KdTreeGather<'a>,
+    measure: Measure,
+}
+
+impl Sides<'_> {
+    /// Gathers the tile's points over all maps by both; the radiance of the points by the grid and by the kd-tree, on top of
+    /// what they have.
+    fn gather(
+        &mut self,
+        pass: &CameraPass,
+        tile: &Tile,
+        points: &[VisiblePoint],
+        progress: &dyn Progress,
+    ) -> Result<[Vec<[f32; 4]>; 2]> {
+        let mut by_grid = pass.radiance(tile)?;
+        let mut by_kdtree = by_grid.clone();
+        for map in 0..self.grid.maps.len() {
+            let ours = self.grid.gather(map, pass, tile, progress)?;
+            let theirs = self.kdtree.gather(map, points, progress)?;
+            self.measure
+                .add(points, &ours, &theirs, |i, gathered| self.kdtree.explains(map, &points[i], &theirs[i], gathered));
+            for i in 0..points.len() {
+                for c in 0..3 {
+                    by_grid[i][c] += ours.radiance[i][c];
+                    by_kdtree[i][c] += theirs[i].radiance[c] as f32;
+                }
+            }
+        }
+        Ok([by_grid, by_kdtree])
+    }
 }
 
 fn check(settings: &Settings, options: &Options) -> Result<()> {

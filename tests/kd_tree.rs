@@ -70,7 +70,8 @@ fn check(random: &mut Random, positions: &[Vec3]) {
 fn the_tree_equals_brute_force_at_awkward_sizes() {
     let mut random = Random(1);
     for size in [0, 1, 2, 3, 4, 7, 8, 9, 31, 32, 33, 63, 64, 65, 1000, 5000] {
-        check(&mut random, &positions(&uniform_box(&mut random, size)));
+        let photons = uniform_box(&mut random, size);
+        check(&mut random, &positions(&photons));
     }
 }
 
@@ -94,13 +95,14 @@ fn it_finds_the_distances_that_kiddo_finds() {
     let mut random = Random(3);
     let mut positions = positions(&caustic_box(&mut random, 20_000, 0.5, 1e-2));
     let points: Vec<[f32; 3]> = positions.iter().map(|p| p.to_array()).collect();
-    let theirs: ImmutableKdTree<f32, 3> = ImmutableKdTree::new_from_slice(&points);
+    let theirs: ImmutableKdTree<f32, 3> = ImmutableKdTree::new_from_slice(&points).unwrap();
     let queries = queries(&mut random, &positions);
     let differences = |positions: &[Vec3]| {
         let ours = KdTree::new(positions);
         let same = |query: &Vec3| {
             let found = ours.search(*query, 51, f32::INFINITY, |_| true);
-            let expected = theirs.nearest_n::<SquaredEuclidean>(&query.to_array(), NonZero::new(51).unwrap());
+            let expected =
+                theirs.query(&query.to_array()).nearest_n::<SquaredEuclidean<f32>>(NonZero::new(51).unwrap()).execute();
             let close = |(a, b): (&(f32, u32), f32)| (a.0 - b).abs() <= 1e-6 * a.0.max(b);
             found.iter().zip(expected.iter().map(|n| n.distance)).all(close) && found.len() == expected.len()
         };

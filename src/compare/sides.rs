@@ -17,7 +17,7 @@ const WARM_UP: u32 = 64;
 
 /// Gathers on the grid.
 pub(super) struct GridGather<'a> {
-    maps: &'a [PhotonMap],
+    pub maps: &'a [PhotonMap],
     gather: Gather,
     /// Radiance by one map alone.
     radiance: Option<Buffer>,
