@@ -41,7 +41,7 @@ fn command(line: &str) -> Command {
 
 /// A small comparison into the folder, with further words.
 fn compare_into(folder: &Path, words: &str) -> Output {
-    let line = format!("compare {SCENE} --size 32x24 --spp 2 --photons 3k -k 20 {words} -o");
+    let line = format!("compare {SCENE} --size 32x24 --spp 2 --photons 3k {words} -o");
     command(&line).arg(folder).output().expect("it starts")
 }
 
