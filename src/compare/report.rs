@@ -40,7 +40,7 @@ pub struct RelativeDifference {
 /// The grid on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GridSide {
-    /// Sorting the photons and building the grids, with compiling the kernels for that.
+    /// Sorting the photons and building the grids, once the kernels are compiled.
     pub build_seconds: f64,
     pub queries_per_second: f64,
     /// Photons and grids.
@@ -82,7 +82,7 @@ impl Report {
             radius: difference(&measure.radius),
             radiance: difference(&measure.radiance),
             grid: GridSide {
-                build_seconds: stats.seconds.grid,
+                build_seconds: grid.build_seconds,
                 queries_per_second: rate(grid.seconds),
                 bytes: grid.bytes(),
             },
