@@ -74,7 +74,16 @@ fn a_comparison_leaves_all_files_and_a_table() {
     let ended = compare_into(&new, "");
     let (out, said) = (text(&ended.stdout), text(&ended.stderr));
     assert_eq!(ended.status.code(), Some(0), "{said}");
-    for line in ["identical neighbours", "tied queries", "queries per second", "build", "memory", "CPU thread"] {
+    for line in [
+        "adapter",
+        "driver",
+        "identical neighbours",
+        "tied queries",
+        "queries per second",
+        "build",
+        "memory",
+        "CPU thread",
+    ] {
         assert!(out.contains(line), "{out}");
     }
     assert!(said.contains("compare: 100 %") && said.contains("device: "), "{said}");
