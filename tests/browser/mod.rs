@@ -5,7 +5,7 @@
 
 use std::{
     env,
-    io::{BufRead, BufReader, Read, Write},
+    io::{self, BufRead, BufReader, Read, Write},
     net::TcpStream,
     path::Path,
     process::{Child, Command, Stdio},
@@ -144,13 +144,7 @@ impl Browser {
 
     /// One request to chromedriver; the `value` of its answer.
     fn call(&self, method: &str, path: &str, body: &Value) -> Value {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("chromedriver listens");
-        stream.set_read_timeout(Some(Duration::from_secs(120))).expect("a timeout can be set");
-        let body = if body.is_null() { String::new() } else { body.to_string() };
-        let length = body.len();
-        write!(stream, "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {length}\r\n\r\n{body}")
-            .expect("chromedriver reads");
-        let mut reader = BufReader::new(stream);
+        let mut reader = BufReader::new(self.send(method, path, body).expect("chromedriver listens"));
         let mut length = 0;
         loop {
             let mut line = String::new();
@@ -169,12 +163,23 @@ impl Browser {
         assert!(value.get("error").is_none_or(Value::is_null), "{method} {path}: {}", value["message"]);
         value
     }
+
+    /// Sends a request; where its answer will come.
+    fn send(&self, method: &str, path: &str, body: &Value) -> io::Result<TcpStream> {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
+        stream.set_read_timeout(Some(Duration::from_secs(120)))?;
+        let body = if body.is_null() { String::new() } else { body.to_string() };
+        let length = body.len();
+        write!(stream, "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {length}\r\n\r\n{body}")?;
+        Ok(stream)
+    }
 }
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        if !self.session.is_empty() && !std::thread::panicking() {
-            self.command("DELETE", "", &Value::Null);
+        // Ends the browser too, also after a failed test.
+        if let Ok(mut answer) = self.send("DELETE", &format!("/session/{}", self.session), &Value::Null) {
+            let _ = answer.read(&mut [0; 1]);
         }
         let _ = self.driver.kill();
         let _ = self.driver.wait();
