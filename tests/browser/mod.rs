@@ -33,7 +33,9 @@ pub struct Browser {
     driver: Child,
     port: u16,
     session: String,
-    _profile: TempDir,
+    /// The browser's own process.
+    process: String,
+    profile: TempDir,
 }
 
 impl Browser {
@@ -57,14 +59,14 @@ impl Browser {
             })
             .expect("chromedriver tells its port");
         let profile = tempfile::tempdir().expect("a temporary folder");
-        let mut browser = Self { driver, port, session: String::new(), _profile: profile };
+        let mut browser = Self { driver, port, session: String::new(), process: String::new(), profile };
         browser.start(width, height);
         Some(browser)
     }
 
     fn start(&mut self, width: u32, height: u32) {
         let mut arguments: Vec<String> = ARGUMENTS.map(String::from).to_vec();
-        arguments.push(format!("--user-data-dir={}", self._profile.path().display()));
+        arguments.push(format!("--user-data-dir={}", self.profile.path().display()));
         arguments.push(format!("--window-size={width},{height}"));
         let capabilities = json!({"capabilities": {"alwaysMatch": {
             "browserName": "chrome",
@@ -73,6 +75,7 @@ impl Browser {
         }}});
         let session = self.call("POST", "/session", &capabilities);
         self.session = session["sessionId"].as_str().expect("a session has a name").to_string();
+        self.process = session["capabilities"]["goog:processID"].to_string();
     }
 
     /// Shows a file; what was logged before is forgotten.
@@ -177,9 +180,13 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // Ends the browser too, also after a failed test.
-        if let Ok(mut answer) = self.send("DELETE", &format!("/session/{}", self.session), &Value::Null) {
-            let _ = answer.read(&mut [0; 1]);
+        // Also after a failed test; a browser that does not end by itself is ended.
+        let ended = self.send("DELETE", &format!("/session/{}", self.session), &Value::Null).and_then(|mut answer| {
+            answer.set_read_timeout(Some(Duration::from_secs(10)))?;
+            answer.read(&mut [0; 1])
+        });
+        if ended.is_err() && !self.process.is_empty() {
+            let _ = Command::new("kill").args(["-KILL", &self.process]).status();
         }
         let _ = self.driver.kill();
         let _ = self.driver.wait();
