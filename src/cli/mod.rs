@@ -1,8 +1,10 @@
 //! The command line: arguments in, files and messages out. Uses the public library only.
 
 mod args;
+mod compare;
 mod devices;
 mod info;
+mod options;
 mod progress;
 mod render;
 mod say;
@@ -35,6 +37,7 @@ pub fn run() -> ExitCode {
 fn work(command: Command) -> Result<()> {
     match command {
         Command::Render(args) => render::render(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Devices => devices::devices(),
         Command::Info { scene } => info::info(&scene),
     }

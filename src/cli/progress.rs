@@ -107,6 +107,7 @@ fn name(stage: Stage) -> &'static str {
         Stage::Photons => "photons",
         Stage::Grid => "grid",
         Stage::Camera => "camera",
+        Stage::Compare => "compare",
     }
 }
 
@@ -114,7 +115,7 @@ fn name(stage: Stage) -> &'static str {
 fn unit(stage: Stage) -> Option<&'static str> {
     match stage {
         Stage::Photons => Some("photons"),
-        Stage::Camera => Some("tiles"),
+        Stage::Camera | Stage::Compare => Some("tiles"),
         Stage::Load | Stage::Bvh | Stage::Grid => None,
     }
 }

@@ -140,7 +140,8 @@ impl Gather {
         progress: &dyn Progress,
     ) -> Result<u32> {
         let scratch = self.scratch.as_ref().expect("run has made it");
-        let Search { aim, count, sum, finish } = self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
+        let Search { aim, count, sum, finish } =
+            self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
         let infos = STRIDES.map(|stride| gpu.uniform("gather info", &GatherInfo { stride, ..*info }));
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
@@ -199,11 +200,15 @@ impl Gather {
             ("STEP_BUDGET", f64::from(self.options.step_budget)),
             ("FINGERPRINT", f64::from(u8::from(self.options.fingerprint))),
         ];
-        self.search[windows as usize - 1]
-            .get_or_insert_with(|| {
-                let kernel = |stem| Kernel::new(gpu, stem, &common);
-                Search { aim: kernel("aim_search"), count: kernel("count_photons"), sum: kernel("gather"), finish: kernel("finish_gather") }
-            });
+        self.search[windows as usize - 1].get_or_insert_with(|| {
+            let kernel = |stem| Kernel::new(gpu, stem, &common);
+            Search {
+                aim: kernel("aim_search"),
+                count: kernel("count_photons"),
+                sum: kernel("gather"),
+                finish: kernel("finish_gather"),
+            }
+        });
     }
 }
 
