@@ -1,19 +1,19 @@
 //! Two-pass photon mapping (Jensen 1996, "Global Illumination Using Photon Maps"), in one screen: [`render`].
+//!
+//! [`Session`] holds its steps one by one, for those who make several pictures of the same photons.
+
+mod camera_pass;
 
 use std::time::Instant;
 
-use glam::Vec3;
+use camera_pass::CameraPass;
 
 use crate::{
     bvh::Bvh,
     error::{Error, Result},
     gpu::Gpu,
     image::Frame,
-    layout::TilePixel,
-    passes::{
-        CameraTracer, Gather, GatherOptions, GatherSettings, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers,
-        StepCount, Tile,
-    },
+    passes::{Gather, GatherOptions, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::Settings,
@@ -39,142 +39,129 @@ pub struct Render {
 /// the driver, or [`Error::Stopped`].
 pub fn render(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
     let start = Instant::now();
-    settings.check()?;
-    scene.check_renderable()?;
-    let camera = scene.camera(settings.camera.as_deref())?;
-    let size = picture_size(camera, settings)?;
-    let mut stats = Stats {
-        device: DeviceStats { name: gpu.name.clone(), driver: gpu.driver.clone() },
-        warnings: scene.warnings.clone(),
-        ..Stats::default()
-    };
-    gpu.memory.restart_peak();
-
-    progress.report(Stage::Bvh, 0, 1);
-    let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
-    let buffers = SceneBuffers::new(gpu, scene, &bvh, settings)?;
-    drop(bvh);
-    let maps = photon_maps(gpu, scene, &buffers, settings, progress, &mut stats)?;
-    let frame = picture(gpu, &buffers, &maps, camera, size, settings, progress, &mut stats)?;
-
-    warn_of_faults(&mut stats);
-    stats.peak_device_bytes = gpu.memory.peak();
-    stats.seconds.total = start.elapsed().as_secs_f64();
-    Ok(Render { frame, stats })
+    let session = Session::open(gpu, scene, settings, progress)?;
+    let maps = session.photon_maps(settings, progress)?;
+    let mut render = session.picture(&maps, settings, progress)?;
+    render.stats.seconds.total = start.elapsed().as_secs_f64();
+    Ok(render)
 }
 
-/// First pass: photons leave the lights and are stored in a global and a caustic map.
-fn photon_maps(
-    gpu: &Gpu,
-    scene: &Scene,
-    buffers: &SceneBuffers,
-    settings: &Settings,
-    progress: &dyn Progress,
-    stats: &mut Stats,
-) -> Result<Vec<PhotonMap>> {
-    if !settings.mode.traces_photons() {
-        return Ok(Vec::new());
-    }
-    let caustics = scene.has_delta();
-    let traced = timed(&mut stats.seconds.photons, || {
-        PhotonTracer::new(gpu, buffers).trace(gpu, buffers, settings, caustics, progress)
-    })?;
-    stats.rays += traced.rays;
-    stats.photons.global = map_stats(&traced.global);
-    stats.photons.caustic = map_stats(&traced.caustic);
-    stats.photons.lost_to_bounce_limit = traced.lost;
-    count_faults(stats, traced.media_overflows, traced.unfinished);
-    stats.warnings.extend(traced.warnings);
-    progress.report(Stage::Grid, 0, 1);
-    timed(&mut stats.seconds.grid, || {
-        let kernels = MapKernels::new(gpu);
-        let maps = [traced.global, traced.caustic].into_iter().filter(|map| map.stored > 0);
-        let build = |map: RawMap| PhotonMap::build(gpu, &kernels, map.photons, map.stored as u32, map.emitted);
-        maps.map(build).collect()
-    })
+/// A scene on the device. Photons are traced once for each call of [`Self::photon_maps`]; any number of pictures
+/// can be made of the same maps.
+#[derive(Debug)]
+pub struct Session<'a> {
+    gpu: &'a Gpu,
+    scene: &'a Scene,
+    buffers: SceneBuffers,
+    stats: Stats,
 }
 
-/// Second pass: camera rays, direct light and the radiance estimate, tile by tile.
-#[expect(clippy::too_many_arguments, reason = "all that the first pass and the caller know meets here")]
-fn picture(
-    gpu: &Gpu,
-    buffers: &SceneBuffers,
-    maps: &[PhotonMap],
-    camera: &Camera,
-    size: (u32, u32),
-    settings: &Settings,
-    progress: &dyn Progress,
-    stats: &mut Stats,
-) -> Result<Frame> {
-    let tracer = CameraTracer::new(gpu, buffers, camera, size, settings)?;
-    let mut gather = Gather::new(gpu, GatherOptions::default());
-    let estimate = GatherSettings {
-        neighbors: settings.neighbors,
-        cone_constant: settings.cone_constant,
-        max_radius: settings.max_radius,
-    };
-    let mut film = Film::new(size);
-    let tiles = tracer.tiles();
-    for (done, tile) in tiles.iter().enumerate() {
-        progress.check()?;
-        progress.report(Stage::Camera, done as u64, tiles.len() as u64);
-        let count = timed(&mut stats.seconds.camera, || tracer.trace(gpu, buffers, tile))?;
-        add_step(stats, count);
-        if settings.mode.direct_by_rays() {
-            let count = timed(&mut stats.seconds.direct, || tracer.light_directly(gpu, buffers, tile))?;
-            add_step(stats, count);
-        }
-        for map in maps {
-            timed(&mut stats.seconds.gather, || {
-                let points = tracer.point_count(tile);
-                let results = (&tracer.radiance, &tracer.gathered);
-                gather.run(gpu, map, &tracer.points, points, &estimate, results, progress)
-            })?;
-        }
-        film.add(&tracer, tile, &tracer.resolve(gpu, tile)?);
-    }
-    progress.report(Stage::Camera, tiles.len() as u64, tiles.len() as u64);
-    Ok(film.finish(settings.spp))
+/// The photons of a first pass on the device: the global and the caustic map, those of them that hold a photon.
+#[derive(Debug)]
+pub struct PhotonMaps {
+    maps: Vec<PhotonMap>,
+    stats: Stats,
 }
 
-/// Sums over samples, on the host: device memory does not grow with the picture.
-struct Film {
-    size: (u32, u32),
-    sums: Vec<TilePixel>,
+impl PhotonMaps {
+    /// The maps, the global one first; none if no photon was traced or stored.
+    #[must_use]
+    pub fn maps(&self) -> &[PhotonMap] {
+        &self.maps
+    }
+
+    /// What happened up to here: the session's stages and the first pass.
+    #[must_use]
+    pub fn stats(&self) -> &Stats {
+        &self.stats
+    }
 }
 
-impl Film {
-    fn new(size: (u32, u32)) -> Self {
-        Self { size, sums: vec![TilePixel::default(); size.0 as usize * size.1 as usize] }
+impl<'a> Session<'a> {
+    /// Puts the scene on the device. `light_sampling` and `light_unit` of the settings hold for the whole session; the
+    /// others are only checked, so that a wrong one fails before the work. The peak of device memory counts from here.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn open(gpu: &'a Gpu, scene: &'a Scene, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
+        settings.check()?;
+        scene.check_renderable()?;
+        picture_size(scene.camera(settings.camera.as_deref())?, settings)?;
+        let mut stats = Stats {
+            device: DeviceStats { name: gpu.name.clone(), driver: gpu.driver.clone() },
+            warnings: scene.warnings.clone(),
+            ..Stats::default()
+        };
+        gpu.memory.restart_peak();
+        progress.report(Stage::Bvh, 0, 1);
+        let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
+        let buffers = SceneBuffers::new(gpu, scene, &bvh, settings)?;
+        Ok(Self { gpu, scene, buffers, stats })
     }
 
-    fn add(&mut self, tracer: &CameraTracer, tile: &Tile, pixels: &[TilePixel]) {
-        for (i, pixel) in (0..).zip(pixels) {
-            let Some((x, y)) = tracer.pixel(tile, i) else { continue };
-            let sum = &mut self.sums[y as usize * self.size.0 as usize + x as usize];
-            let add = |a: &mut [f32; 3], b: [f32; 3]| *a = (Vec3::from(*a) + Vec3::from(b)).to_array();
-            add(&mut sum.radiance, pixel.radiance);
-            add(&mut sum.normal, pixel.normal);
-            add(&mut sum.albedo, pixel.albedo);
-            sum.alpha += pixel.alpha;
-            sum.depth += pixel.depth;
+    /// First pass: photons leave the lights and are stored in a global and a caustic map, as `mode`, the photon
+    /// counts, `max_bounces` and `seed` of the settings say.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn photon_maps(&self, settings: &Settings, progress: &dyn Progress) -> Result<PhotonMaps> {
+        settings.check()?;
+        let (gpu, mut stats) = (self.gpu, self.stats.clone());
+        if !settings.mode.traces_photons() {
+            return Ok(PhotonMaps { maps: Vec::new(), stats });
         }
+        let caustics = self.scene.has_delta();
+        let traced = timed(&mut stats.seconds.photons, || {
+            PhotonTracer::new(gpu, &self.buffers).trace(gpu, &self.buffers, settings, caustics, progress)
+        })?;
+        stats.rays += traced.rays;
+        stats.photons.global = map_stats(&traced.global);
+        stats.photons.caustic = map_stats(&traced.caustic);
+        stats.photons.lost_to_bounce_limit = traced.lost;
+        count_faults(&mut stats, traced.media_overflows, traced.unfinished);
+        stats.warnings.extend(traced.warnings);
+        progress.report(Stage::Grid, 0, 1);
+        let maps = timed(&mut stats.seconds.grid, || {
+            let kernels = MapKernels::new(gpu);
+            let maps = [traced.global, traced.caustic].into_iter().filter(|map| map.stored > 0);
+            let build = |map: RawMap| PhotonMap::build(gpu, &kernels, map.photons, map.stored as u32, map.emitted);
+            maps.map(build).collect::<Result<_>>()
+        })?;
+        Ok(PhotonMaps { maps, stats })
     }
 
-    /// Means: of radiance and coverage over all samples, of the rest over those that hit something.
-    fn finish(self, spp: u32) -> Frame {
-        let per_sample = 1.0 / spp as f32;
-        let per_hit = |p: &TilePixel| if p.alpha > 0.0 { 1.0 / p.alpha } else { 0.0 };
-        let scaled = |v: [f32; 3], s: f32| (Vec3::from(v) * s).to_array();
-        Frame {
-            width: self.size.0,
-            height: self.size.1,
-            radiance: self.sums.iter().map(|p| scaled(p.radiance, per_sample)).collect(),
-            alpha: self.sums.iter().map(|p| p.alpha * per_sample).collect(),
-            depth: self.sums.iter().map(|p| p.depth * per_hit(p)).collect(),
-            normal: self.sums.iter().map(|p| scaled(p.normal, per_hit(p))).collect(),
-            albedo: self.sums.iter().map(|p| scaled(p.albedo, per_hit(p))).collect(),
+    /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. `mode` is that of the maps; what
+    /// concerns the picture alone (`neighbors`, `cone_constant`, `max_radius`, `spp`, `size`, `camera`) is free. The
+    /// statistics are those of the maps and of this picture; `total` is their sum.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub fn picture(&self, maps: &PhotonMaps, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
+        let mut stats = maps.stats.clone();
+        let pass = CameraPass::new(self, settings)?;
+        let mut gather = Gather::new(self.gpu, GatherOptions::default());
+        let mut film = pass.film();
+        let tiles = pass.tracer.tiles();
+        for (done, tile) in tiles.iter().enumerate() {
+            progress.check()?;
+            progress.report(Stage::Camera, done as u64, tiles.len() as u64);
+            pass.trace(tile, &mut stats)?;
+            for map in &maps.maps {
+                timed(&mut stats.seconds.gather, || pass.gather(&mut gather, map, tile, progress))?;
+            }
+            pass.resolve(tile, &mut film)?;
         }
+        progress.report(Stage::Camera, tiles.len() as u64, tiles.len() as u64);
+        self.close(&mut stats);
+        Ok(Render { frame: film.finish(settings.spp), stats })
+    }
+
+    /// What can be said of a picture only when it is finished.
+    pub(crate) fn close(&self, stats: &mut Stats) {
+        warn_of_faults(stats);
+        stats.peak_device_bytes = self.gpu.memory.peak();
+        let s = &mut stats.seconds;
+        s.total = s.bvh + s.photons + s.grid + s.camera + s.direct + s.gather;
     }
 }
 
@@ -196,11 +183,6 @@ fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32, u32)> {
 
 fn map_stats(map: &RawMap) -> MapStats {
     MapStats { emitted: map.emitted, stored: map.stored }
-}
-
-fn add_step(stats: &mut Stats, count: StepCount) {
-    stats.rays += count.rays;
-    count_faults(stats, count.media_overflows, count.unfinished);
 }
 
 fn count_faults(stats: &mut Stats, media_overflows: u64, unfinished: u64) {

@@ -1,0 +1,122 @@
+//! The second pass step by step: tiles of camera samples, and the film that sums them.
+
+use glam::Vec3;
+
+use super::{Session, count_faults, picture_size};
+use crate::{
+    error::Result,
+    image::Frame,
+    layout::TilePixel,
+    passes::{CameraTracer, Gather, GatherSettings, PhotonMap, StepCount, Tile},
+    progress::Progress,
+    settings::Settings,
+    stats::{Stats, timed},
+};
+
+/// A picture under way. For each tile: [`Self::trace`], then light is added to the radiance of its visible points,
+/// then [`Self::resolve`].
+pub(crate) struct CameraPass<'a> {
+    session: &'a Session<'a>,
+    /// Holds the visible points and the radiance of the tile that was traced last.
+    pub tracer: CameraTracer,
+    /// The radiance estimate that the settings ask for.
+    pub estimate: GatherSettings,
+    size: (u32, u32),
+    direct: bool,
+}
+
+impl<'a> CameraPass<'a> {
+    pub fn new(session: &'a Session<'a>, settings: &Settings) -> Result<Self> {
+        settings.check()?;
+        let camera = session.scene.camera(settings.camera.as_deref())?;
+        let size = picture_size(camera, settings)?;
+        Ok(Self {
+            session,
+            tracer: CameraTracer::new(session.gpu, &session.buffers, camera, size, settings)?,
+            estimate: GatherSettings {
+                neighbors: settings.neighbors,
+                cone_constant: settings.cone_constant,
+                max_radius: settings.max_radius,
+            },
+            size,
+            direct: settings.mode.direct_by_rays(),
+        })
+    }
+
+    /// An empty film of the picture's size.
+    pub fn film(&self) -> Film {
+        Film::new(self.size)
+    }
+
+    /// Camera rays to the tile's visible points, and direct light there if the mode takes it from shadow rays.
+    pub fn trace(&self, tile: &Tile, stats: &mut Stats) -> Result<()> {
+        let (gpu, buffers) = (self.session.gpu, &self.session.buffers);
+        let count = timed(&mut stats.seconds.camera, || self.tracer.trace(gpu, buffers, tile))?;
+        add_step(stats, count);
+        if self.direct {
+            let count = timed(&mut stats.seconds.direct, || self.tracer.light_directly(gpu, buffers, tile))?;
+            add_step(stats, count);
+        }
+        Ok(())
+    }
+
+    /// Adds the light of a map's photons on the device.
+    pub fn gather(&self, gather: &mut Gather, map: &PhotonMap, tile: &Tile, progress: &dyn Progress) -> Result<()> {
+        let points = self.tracer.point_count(tile);
+        let results = (&self.tracer.radiance, &self.tracer.gathered);
+        gather.run(self.session.gpu, map, &self.tracer.points, points, &self.estimate, results, progress)?;
+        Ok(())
+    }
+
+    /// Sums the tile's radiance into the film.
+    pub fn resolve(&self, tile: &Tile, film: &mut Film) -> Result<()> {
+        film.add(&self.tracer, tile, &self.tracer.resolve(self.session.gpu, tile)?);
+        Ok(())
+    }
+}
+
+/// Sums over samples, on the host: device memory does not grow with the picture.
+pub(crate) struct Film {
+    size: (u32, u32),
+    sums: Vec<TilePixel>,
+}
+
+impl Film {
+    fn new(size: (u32, u32)) -> Self {
+        Self { size, sums: vec![TilePixel::default(); size.0 as usize * size.1 as usize] }
+    }
+
+    fn add(&mut self, tracer: &CameraTracer, tile: &Tile, pixels: &[TilePixel]) {
+        for (i, pixel) in (0..).zip(pixels) {
+            let Some((x, y)) = tracer.pixel(tile, i) else { continue };
+            let sum = &mut self.sums[y as usize * self.size.0 as usize + x as usize];
+            let add = |a: &mut [f32; 3], b: [f32; 3]| *a = (Vec3::from(*a) + Vec3::from(b)).to_array();
+            add(&mut sum.radiance, pixel.radiance);
+            add(&mut sum.normal, pixel.normal);
+            add(&mut sum.albedo, pixel.albedo);
+            sum.alpha += pixel.alpha;
+            sum.depth += pixel.depth;
+        }
+    }
+
+    /// Means: of radiance and coverage over all samples, of the rest over those that hit something.
+    pub fn finish(self, spp: u32) -> Frame {
+        let per_sample = 1.0 / spp as f32;
+        let per_hit = |p: &TilePixel| if p.alpha > 0.0 { 1.0 / p.alpha } else { 0.0 };
+        let scaled = |v: [f32; 3], s: f32| (Vec3::from(v) * s).to_array();
+        Frame {
+            width: self.size.0,
+            height: self.size.1,
+            radiance: self.sums.iter().map(|p| scaled(p.radiance, per_sample)).collect(),
+            alpha: self.sums.iter().map(|p| p.alpha * per_sample).collect(),
+            depth: self.sums.iter().map(|p| p.depth * per_hit(p)).collect(),
+            normal: self.sums.iter().map(|p| scaled(p.normal, per_hit(p))).collect(),
+            albedo: self.sums.iter().map(|p| scaled(p.albedo, per_hit(p))).collect(),
+        }
+    }
+}
+
+fn add_step(stats: &mut Stats, count: StepCount) {
+    stats.rays += count.rays;
+    count_faults(stats, count.media_overflows, count.unfinished);
+}
