@@ -51,5 +51,6 @@ pub mod renderer;
 pub mod scene;
 pub mod settings;
 pub mod stats;
+pub mod study;
 
 pub use error::{Error, Result};

@@ -1,14 +1,17 @@
 //! Pictures: the film's frame, EXR and PNG files, tone mapping, difference measures.
 
+mod canvas;
 pub mod difference;
 mod exr;
 mod file;
+pub mod flip;
 mod png;
 mod tonemap;
 
+pub use canvas::{Canvas, Rgb8};
 pub use exr::{Origin, read_exr, read_exr_attributes, write_exr};
 pub use file::{check_output, close_files, write_file};
-pub use png::write_png;
+pub use png::{encode_png, write_png};
 pub use tonemap::{Tonemap, srgb_encode};
 
 /// A finished frame, scene-linear, row 0 at the top. All vectors have `width * height` elements.

@@ -1,6 +1,6 @@
 //! 8-bit preview: exposure, tone curve, sRGB.
 
-use std::path::Path;
+use std::{io, path::Path};
 
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
@@ -13,12 +13,25 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::Io`] if the file cannot be written; an older file is kept then.
 pub fn write_png(path: &Path, frame: &Frame, exposure: f32, curve: Tonemap) -> Result<()> {
-    let pixels = to_srgb8(frame, exposure, curve);
+    let bytes = encode_png(frame, exposure, curve).map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
+    write_file(path, &bytes)
+}
+
+/// The bytes that [`write_png`] writes.
+///
+/// # Errors
+/// If the frame has no pixel.
+pub fn encode_png(frame: &Frame, exposure: f32, curve: Tonemap) -> io::Result<Vec<u8>> {
+    encode_rgb8(&to_srgb8(frame, exposure, curve), frame.width, frame.height)
+}
+
+/// A PNG file of three bytes a pixel, rows from the top.
+pub(super) fn encode_rgb8(pixels: &[u8], width: u32, height: u32) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)
-        .write_image(&pixels, frame.width, frame.height, ExtendedColorType::Rgb8)
-        .map_err(|e| Error::Io { path: path.to_path_buf(), source: std::io::Error::other(e) })?;
-    write_file(path, &bytes)
+        .write_image(pixels, width, height, ExtendedColorType::Rgb8)
+        .map_err(io::Error::other)?;
+    Ok(bytes)
 }
 
 /// Three bytes a pixel, rows from the top.
