@@ -27,7 +27,10 @@ impl Key {
     pub fn new(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Self {
         let settings = serde_json::to_string(settings).expect("settings hold nothing that JSON cannot");
         let (version, hash) = (env!("CARGO_PKG_VERSION"), &scene.hash);
-        Self(format!("caustica {version}\nscene {hash}\nsettings {settings}\nadapter {}\ndriver {}", gpu.name, gpu.driver))
+        Self(format!(
+            "caustica {version}\nscene {hash}\nsettings {settings}\nadapter {}\ndriver {}",
+            gpu.name, gpu.driver
+        ))
     }
 
     fn file_name(&self) -> String {
@@ -86,8 +89,7 @@ impl Cells {
 
     /// The record is written last: it says that the picture is there.
     pub fn keep(&self, key: &Key, scene: &Scene, settings: &Settings, frame: &Frame, measured: Measured) -> Result<()> {
-        let origin =
-            Origin { scene: &scene.file_name, scene_hash: &scene.hash, settings, stats: &measured.stats };
+        let origin = Origin { scene: &scene.file_name, scene_hash: &scene.hash, settings, stats: &measured.stats };
         write_exr(&self.picture_path(key), frame, &origin)?;
         let path = self.record_path(key);
         let text = serde_json::to_vec_pretty(&Record { key: key.0.clone(), measured })

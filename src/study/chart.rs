@@ -173,7 +173,10 @@ mod tests {
     fn charts_hold_their_names_and_survive_odd_data() {
         let line = |points: &[(f64, f64)]| Series { name: "n = 10k".to_string(), points: points.to_vec() };
         let chart = line_chart("error", "seconds", "relMSE", &[line(&[(1.0, 0.5), (10.0, 0.05)])]);
-        assert!(["<svg", "error", "seconds", "relMSE", "n = 10k", "</svg>"].iter().all(|s| chart.contains(s)), "{chart}");
+        assert!(
+            ["<svg", "error", "seconds", "relMSE", "n = 10k", "</svg>"].iter().all(|s| chart.contains(s)),
+            "{chart}"
+        );
         for points in [&[][..], &[(1.0, 1.0)], &[(0.0, 1.0), (1.0, f64::NAN), (-1.0, 2.0)]] {
             assert!(line_chart("t", "x", "y", &[line(points)]).contains("</svg>"));
         }

@@ -61,9 +61,10 @@ impl Question {
     /// The claim, and the rule by which it is judged.
     fn texts(self) -> (&'static str, &'static str) {
         match self {
-            Self::Energy => {
-                ("The total energy is constant over n and k.", "the mean radiance varies by at most 5 % over the figure")
-            }
+            Self::Energy => (
+                "The total energy is constant over n and k.",
+                "the mean radiance varies by at most 5 % over the figure",
+            ),
             Self::GatherDominates => (
                 "The gather takes the most of the time.",
                 "the gather takes more than half of the total time in every picture of the figure",

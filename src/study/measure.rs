@@ -2,13 +2,7 @@
 
 use serde::Serialize;
 
-use super::{
-    Combination, Plan, Radii,
-    cells::Measured,
-    corners::corner_region,
-    grid::short,
-    plan::Look,
-};
+use super::{Combination, Plan, Radii, cells::Measured, corners::corner_region, grid::short, plan::Look};
 use crate::{
     image::{
         Frame, Rgb8,
@@ -156,8 +150,7 @@ fn compare(row: &mut Row, renders: &[(Frame, Measured)], reference: &Frame, look
     row.rel_mse = Some(average(renders, |frame| rel_mse(&frame.radiance, right, None)));
     let square = average(renders, |frame| rmse(&frame.radiance, right, None).powi(2));
     row.rmse = Some(square.sqrt());
-    row.flip =
-        Some(average(renders, |frame| flip(&frame.radiance, right, frame.width, look.exposure, look.tonemap)));
+    row.flip = Some(average(renders, |frame| flip(&frame.radiance, right, frame.width, look.exposure, look.tonemap)));
     // The square error of an estimate is the sum of its variance and of its squared bias.
     row.bias = row.noise.map(|noise| (square - noise * noise).max(0.0).sqrt());
 }

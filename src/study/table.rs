@@ -70,7 +70,11 @@ pub(super) fn csv(rows: &[Row]) -> String {
 }
 
 fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\r', '\n']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.to_string() }
+    if field.contains([',', '"', '\r', '\n']) {
+        format!("\"{}\"", field.replace('"', "\"\""))
+    } else {
+        field.to_string()
+    }
 }
 
 /// What `study.json` holds.
@@ -121,9 +125,14 @@ mod tests {
 
     #[test]
     fn numbers_keep_their_digits_and_have_no_exponent() {
-        for (x, text) in
-            [(0.0, "0"), (1.0, "1"), (-0.0, "0"), (0.1234567891, "0.1234568"), (1.5e-7, "0.00000015"), (1234.5, "1234.5")]
-        {
+        for (x, text) in [
+            (0.0, "0"),
+            (1.0, "1"),
+            (-0.0, "0"),
+            (0.1234567891, "0.1234568"),
+            (1.5e-7, "0.00000015"),
+            (1234.5, "1234.5"),
+        ] {
             assert_eq!(number(x), text, "{x}");
         }
     }
