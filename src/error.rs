@@ -32,6 +32,12 @@ pub enum Error {
     /// A setting outside its range.
     #[error("{name} {value}: {problem}")]
     Setting { name: &'static str, value: String, problem: String },
+    /// What should be equal is not.
+    #[error("{0}")]
+    Differs(String),
+    /// Part of the work failed; the rest was done.
+    #[error("{0}")]
+    Incomplete(String),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,

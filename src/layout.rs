@@ -280,20 +280,19 @@ pub struct DirectLight {
 
 /// Photons of a finest cell of the photon grid; cells of a coarser one.
 pub const CELL_PHOTONS: u32 = 32;
-pub const CELL_FAN: u32 = 4;
+pub const CELL_FAN: u32 = 8;
 
 /// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert curve, or
-/// [`CELL_FAN`] cells of the next finer level. Cells lie in depth-first order: the first finer cell follows its owner.
+/// [`CELL_FAN`] cells of the next finer level. Cells lie level by level, the coarsest, which is one cell, first.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Cell {
     /// Smallest box around the photons, metres.
     pub lo: [f32; 3],
-    /// Index of the next cell that is not part of this one.
-    pub skip: u32,
+    /// Box around the directions to where the photons came from: x, y, z in 8 bits each, signed normalised.
+    pub wi_lo: u32,
     pub hi: [f32; 3],
-    /// Finest cell: index of its first photon, with the highest bit set. Else: number of its photons.
-    pub content: u32,
+    pub wi_hi: u32,
 }
 
 /// Position of a sorted photon and where it came from: all that a search needs.
@@ -322,8 +321,8 @@ pub struct PhotonFlux {
 pub struct MapInfo {
     /// Photons.
     pub count: u32,
-    /// Cells of all levels.
-    pub cells: u32,
+    /// Levels of cells.
+    pub levels: u32,
     /// Index of the first photon of the second window.
     pub split: u32,
     pub pad: u32,
@@ -345,7 +344,7 @@ pub struct GatherInfo {
     pub max_radius_squared: f32,
     /// 1 / number of emitted paths.
     pub per_path: f32,
-    /// Of how many packets of queries one is searched.
+    /// Of how many blocks of packets one is searched.
     pub stride: u32,
     pub pad: u32,
 }
@@ -358,6 +357,8 @@ pub struct Gathered {
     pub radius_squared: f32,
     /// Photons summed.
     pub count: u32,
+    /// Tells the set of photons from others, see `GatherOptions::fingerprint`.
+    pub fingerprint: u32,
 }
 
 /// Consecutive entries that one invocation of the radix sort walks.
@@ -424,20 +425,23 @@ pub struct MoveStep {
 pub struct GridStep {
     /// Photons of the map.
     pub photons: u32,
-    /// Number of finest cells.
-    pub finest: u32,
-    /// Level of the cells, 0 for the finest, and number of levels.
+    /// Level of the cells, 0 for the finest.
     pub level: u32,
-    pub levels: u32,
+    /// Places of the first cell of the level and of the next finer one.
+    pub base: u32,
+    pub finer_base: u32,
+    /// Cells of the next finer level.
+    pub finer_count: u32,
     /// The cells of this dispatch: the first in its level, and how many.
     pub first_cell: u32,
     pub cell_count: u32,
+    pub pad: u32,
 }
 
 /// Bytes of `SearchState` in the shaders, in which a packet of queries waits for its next dispatch.
 pub const SEARCH_STATE_BYTES: usize = 256;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
-pub const GATHER_STATE_BYTES: usize = 400;
+pub const GATHER_STATE_BYTES: usize = 416;
 
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of
 /// Efficient Representations for Independent Unit Vectors"); x in the low half. Twin of `encode_octahedral` in

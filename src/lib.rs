@@ -40,6 +40,7 @@
 #![warn(missing_debug_implementations)]
 
 pub mod bvh;
+pub mod compare;
 pub mod error;
 pub mod gpu;
 pub mod image;

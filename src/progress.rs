@@ -12,6 +12,8 @@ pub enum Stage {
     Grid,
     /// Counted in tiles of camera samples: camera rays, direct light and gather.
     Camera,
+    /// Counted in tiles, as [`Stage::Camera`], each gathered twice.
+    Compare,
 }
 
 /// Listener of a render. Its methods are called often and must return at once.

@@ -3,17 +3,19 @@
 //! [`Session`] holds its steps one by one, for those who make several pictures of the same photons.
 
 mod camera_pass;
+mod searcher;
 
 use std::time::Instant;
 
 pub(crate) use camera_pass::CameraPass;
+use searcher::Searcher;
 
 use crate::{
     bvh::Bvh,
     error::{Error, Result},
     gpu::Gpu,
     image::Frame,
-    passes::{Gather, GatherOptions, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
+    passes::{MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::Settings,
@@ -131,7 +133,7 @@ impl<'a> Session<'a> {
     }
 
     /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. `mode` is that of the maps; what
-    /// concerns the picture alone (`neighbors`, `cone_constant`, `max_radius`, `spp`, `size`, `camera`) is free. The
+    /// concerns the picture alone (`neighbors`, `cone_constant`, `max_radius`, `search`, `spp`, `size`, `camera`) is free. The
     /// statistics are those of the maps and of this picture; `total` is their sum.
     ///
     /// # Errors
@@ -139,16 +141,14 @@ impl<'a> Session<'a> {
     pub fn picture(&self, maps: &PhotonMaps, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
         let mut stats = maps.stats.clone();
         let pass = CameraPass::new(self, settings)?;
-        let mut gather = Gather::new(self.gpu, GatherOptions::default());
+        let mut searcher = timed(&mut stats.seconds.grid, || Searcher::new(self.gpu, maps, settings))?;
         let mut film = pass.film();
         let tiles = pass.tracer.tiles();
         for (done, tile) in tiles.iter().enumerate() {
             progress.check()?;
             progress.report(Stage::Camera, done as u64, tiles.len() as u64);
             pass.trace(tile, &mut stats)?;
-            for map in &maps.maps {
-                timed(&mut stats.seconds.gather, || pass.gather(&mut gather, map, tile, progress))?;
-            }
+            timed(&mut stats.seconds.gather, || searcher.gather(&pass, maps, tile, progress))?;
             pass.resolve(tile, &mut film)?;
         }
         progress.report(Stage::Camera, tiles.len() as u64, tiles.len() as u64);

@@ -79,6 +79,17 @@ pub enum LightUnit {
     Photometric,
 }
 
+/// How the photons nearest to a point are found. Both ways give the same picture but for rounding.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Search {
+    /// The grid, on the device.
+    #[default]
+    Grid,
+    /// The kd-tree of [`crate::reference`], on the CPU.
+    KdTree,
+}
+
 /// Settings of one render.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -106,6 +117,8 @@ pub struct Settings {
     pub seed: u32,
     pub light_sampling: LightSampling,
     pub light_unit: LightUnit,
+    #[serde(default)]
+    pub search: Search,
 }
 
 impl Default for Settings {
@@ -125,6 +138,7 @@ impl Default for Settings {
             seed: 0,
             light_sampling: LightSampling::Power,
             light_unit: LightUnit::Radiometric,
+            search: Search::Grid,
         }
     }
 }

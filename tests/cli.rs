@@ -162,7 +162,10 @@ fn help_and_version_go_to_stdout() {
     };
     assert_eq!(help("--version"), format!("caustica {}\n", env!("CARGO_PKG_VERSION")));
     let general = help("--help");
-    assert!(["render", "devices", "info", "Exit codes"].iter().all(|said| general.contains(said)), "{general}");
+    assert!(
+        ["render", "compare", "devices", "info", "Exit codes"].iter().all(|said| general.contains(said)),
+        "{general}"
+    );
     let of_render = help("render --help");
     for option in [
         "--mode",
@@ -184,6 +187,7 @@ fn help_and_version_go_to_stdout() {
         "--light-unit",
         "--exposure",
         "--tonemap",
+        "--search",
         "--stats",
         "-q, --quiet",
         "-v, --verbose",

@@ -54,17 +54,17 @@ fn twins() -> Vec<Twin> {
         FirstHit { normal, depth, albedo, alpha }
         TilePixel { radiance, alpha, normal, depth, albedo, pad }
         DirectLight { light, points, pad0, pad1 }
-        Cell { lo, skip, hi, content }
+        Cell { lo, wi_lo, hi, wi_hi }
         PhotonPlace { position, wi }
         PhotonFlux { flux, index }
-        MapInfo { count, cells, split, pad }
+        MapInfo { count, levels, split, pad }
         GatherInfo { count, first, neighbors, cone_constant, max_radius_squared, per_path, stride, pad }
-        Gathered { radius_squared, count }
+        Gathered { radius_squared, count, fingerprint }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
         KeyStep { count, window_first, window_count, fine }
         MoveStep { sorted_first, sorted_count, window_first, window_count }
-        GridStep { photons, finest, level, levels, first_cell, cell_count }
+        GridStep { photons, level, base, finer_base, finer_count, first_cell, cell_count, pad }
     }
 }
 

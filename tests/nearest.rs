@@ -228,7 +228,7 @@ fn a_tiny_budget_goes_on_in_further_dispatches_with_the_same_bits() {
     let points: Vec<_> = (0..200).map(|_| point(&mut random, false)).collect();
     let map = bench.map(&photons);
     let whole = bench.ask(true, &map, &points, &settings(200));
-    let mut tiny = Gather::new(&bench.gpu, GatherOptions { side_test: true, round_budget: 3 });
+    let mut tiny = Gather::new(&bench.gpu, GatherOptions { step_budget: 3, ..GatherOptions::default() });
     let pieces = run(&bench.gpu, &mut tiny, &map, &points, &settings(200));
     assert!(pieces.stats.dispatches > 2 * whole.stats.dispatches, "{:?} {:?}", pieces.stats, whole.stats);
     assert_eq!(pieces.gathered, whole.gathered);

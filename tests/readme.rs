@@ -3,7 +3,7 @@
 const README: &str = include_str!("../README.md");
 const CI: &str = include_str!("../.ci/run");
 
-const TEST_COMMAND: &str = "scripts/install-vulkan && cargo test --release --locked";
+const TEST_COMMAND: &str = "scripts/install-vulkan && scripts/install-chromium && cargo test --release --locked";
 
 /// Lines of the n-th fenced block.
 fn block(text: &str, n: usize) -> Vec<&str> {

@@ -1,12 +1,17 @@
 //! The command line: arguments in, files and messages out. Uses the public library only.
 
 mod args;
+mod compare;
 mod devices;
 mod info;
+mod options;
 mod progress;
 mod render;
 mod say;
 mod signals;
+mod study;
+mod study_args;
+mod study_progress;
 mod values;
 
 use std::process::ExitCode;
@@ -35,6 +40,8 @@ pub fn run() -> ExitCode {
 fn work(command: Command) -> Result<()> {
     match command {
         Command::Render(args) => render::render(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Study(args) => study::run(&args),
         Command::Devices => devices::devices(),
         Command::Info { scene } => info::info(&scene),
     }

@@ -22,10 +22,11 @@ use super::{args::RenderArgs, progress::Display, values::extension};
 /// Loads, renders and writes.
 pub fn render(args: &RenderArgs) -> Result<()> {
     let started = Instant::now();
-    if args.verbose {
+    let options = &args.options;
+    if options.shared.verbose {
         log_library();
     }
-    let display = Display::new(args.quiet, args.verbose);
+    let display = Display::new(options.shared.quiet, options.shared.verbose);
     check_files(args)?;
     let settings = args.settings();
 
@@ -38,7 +39,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
         display.note(&format!("warning: {warning}"));
     }
 
-    let gpu = Gpu::open(args.device.as_deref())?;
+    let gpu = Gpu::open(options.shared.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
     let result = renderer::render(&gpu, &scene, &settings, &display);
     display.finish();
@@ -58,7 +59,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     }
     stats.seconds.load = load_seconds;
     stats.seconds.total = started.elapsed().as_secs_f64();
-    if args.verbose {
+    if options.shared.verbose {
         display.note(&summary(&stats));
     }
     args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats))
@@ -90,7 +91,7 @@ fn identity(path: &Path) -> PathBuf {
 
 fn write_picture(path: &Path, frame: &Frame, origin: &Origin, args: &RenderArgs) -> Result<()> {
     match extension(path).as_str() {
-        "png" => write_png(path, frame, args.exposure, args.tonemap.into()),
+        "png" => write_png(path, frame, args.options.shared.exposure, args.options.shared.tonemap.into()),
         _ => write_exr(path, frame, origin),
     }
 }
@@ -133,7 +134,7 @@ fn summary(stats: &Stats) -> String {
 }
 
 /// Sends what the library logs to stderr.
-fn log_library() {
+pub(super) fn log_library() {
     let _ = tracing_subscriber::fmt()
         .with_writer(io::stderr)
         .with_max_level(tracing_subscriber::filter::LevelFilter::DEBUG)

@@ -48,6 +48,17 @@ pub fn radius(text: &str) -> Result<f32, String> {
     number(text).filter(|r| *r > 0.0).ok_or_else(|| "a length in metres, more than 0".to_string())
 }
 
+/// A relative difference.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|t| *t >= 0.0 && t.is_finite());
+    number.ok_or_else(|| "a relative difference of at least 0, as 1e-4".to_string())
+}
+
+/// A factor above 0.
+pub fn scale(text: &str) -> Result<f64, String> {
+    number(text).filter(|s| *s > 0.0).map(f64::from).ok_or_else(|| "a number above 0".to_string())
+}
+
 /// Stops of exposure.
 pub fn exposure(text: &str) -> Result<f32, String> {
     number(text).filter(|e| e.abs() <= 100.0).ok_or_else(|| "a number of stops, -100 to 100".to_string())
@@ -107,6 +118,12 @@ mod tests {
         }
         assert!(cone_constant("0.99").is_err() && cone_constant("1").is_ok() && cone_constant("inf").is_err());
         assert!(radius("0").is_err() && radius("NaN").is_err() && radius("1e-3").is_ok());
+        assert!(
+            tolerance("0").is_ok()
+                && tolerance("1e-4").is_ok()
+                && tolerance("-1").is_err()
+                && tolerance("inf").is_err()
+        );
         assert!(exposure("-2.5").is_ok() && exposure("101").is_err());
         assert!(output("a.EXR".into()).is_ok() && output("a.jpg".into()).is_err() && output("exr".into()).is_err());
     }

@@ -92,7 +92,19 @@ fn report(adapter: wgpu::Adapter) -> AdapterReport {
         .iter()
         .find(|(_, has, needed)| has < needed)
         .map(|(what, has, needed)| format!("it has {has} {what}, {needed} are needed"));
+    let unusable = unusable.or_else(|| no_subgroups(&adapter, info.subgroup_min_size));
     let driver = format!("{} {}", info.driver, info.driver_info).trim().to_string();
     let backend = format!("{:?}", info.backend);
     AdapterReport { name: info.name, driver, backend, kind, limits, unusable, adapter }
+}
+
+/// Invocations that share what they load; the smallest subgroup that the kernels work with.
+const NEEDED_SUBGROUP: u32 = 8;
+
+/// Why the adapter's subgroups do not do, if so.
+fn no_subgroups(adapter: &wgpu::Adapter, size: u32) -> Option<String> {
+    if !adapter.features().contains(wgpu::Features::SUBGROUP) {
+        return Some("its driver lacks subgroup operations in compute shaders".to_string());
+    }
+    (size < NEEDED_SUBGROUP).then(|| format!("its subgroups may have {size} invocations, {NEEDED_SUBGROUP} are needed"))
 }

@@ -37,6 +37,7 @@ impl Gpu {
         let chosen = adapter::choose(wanted)?;
         let (device, queue) = pollster::block_on(chosen.adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("caustica"),
+            required_features: wgpu::Features::SUBGROUP,
             required_limits: chosen.limits.clone(),
             ..Default::default()
         }))

@@ -1,4 +1,5 @@
-//! Radiance from the k nearest photons. Kernels: `key_points`, `find_radius`, `gather`.
+//! Radiance from the k nearest photons. Kernels: `key_points`, `find_radius`, `gather`,
+//! `finish_gather`.
 
 use super::{photon_map::PhotonMap, radix_sort::RadixSort, sort_photons::KEY_BITS};
 use crate::{
@@ -12,7 +13,10 @@ use crate::{
 const BATCH: u32 = 65_536;
 /// Queries of one invocation.
 const PACKET: u32 = 4;
-/// Of how many packets one is searched in each dispatch of the search: pilots first, the others start from their radius.
+/// Packets that are searched or wait together.
+const BLOCK: u64 = 8;
+/// Of how many blocks of packets one is searched in each dispatch of the search: pilots first, the others start from
+/// their radius.
 const STRIDES: [u32; 3] = [64, 8, 1];
 
 /// The radiance estimate that is asked for.
@@ -31,13 +35,15 @@ pub struct GatherSettings {
 pub struct GatherOptions {
     /// Only photons that come from the viewer's side of the surface count. Without it the interpolated normal has no say either.
     pub side_test: bool,
-    /// Cells that a query may visit in one round of a dispatch; what is left goes on in the next dispatch.
-    pub round_budget: u32,
+    /// Loop iterations after which a query goes on in the next dispatch.
+    pub step_budget: u32,
+    /// Makes [`Gathered::fingerprint`]: the wrapping sum of a hash of the places in the sorted map of the photons summed.
+    pub fingerprint: bool,
 }
 
 impl Default for GatherOptions {
     fn default() -> Self {
-        Self { side_test: true, round_budget: 150 }
+        Self { side_test: true, step_budget: 25_000, fingerprint: false }
     }
 }
 
@@ -55,8 +61,15 @@ pub struct Gather {
     key: Kernel,
     radix: RadixSort,
     /// Search and sum for maps of one window and of two, compiled when first needed.
-    search: [Option<(Kernel, Kernel)>; 2],
+    search: [Option<Search>; 2],
     scratch: Option<Scratch>,
+}
+
+#[derive(Debug)]
+struct Search {
+    find: Kernel,
+    sum: Kernel,
+    finish: Kernel,
 }
 
 #[derive(Debug)]
@@ -124,7 +137,8 @@ impl Gather {
         progress: &dyn Progress,
     ) -> Result<u32> {
         let scratch = self.scratch.as_ref().expect("run has made it");
-        let (find, sum) = self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
+        let Search { find, sum, finish } =
+            self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
         let infos = STRIDES.map(|stride| gpu.uniform("gather info", &GatherInfo { stride, ..*info }));
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
@@ -144,22 +158,24 @@ impl Gather {
         gpu.submit(encoder);
         let sorted = self.radix.sort(gpu, [&scratch.entries[0], &scratch.entries[1]], info.count, KEY_BITS)?;
         buffers.push(("entries", &scratch.entries[sorted]));
-        let sum_bindings = sum.bind(gpu, &buffers);
+        let (sum_bindings, finish_bindings) = (sum.bind(gpu, &buffers), finish.bind(gpu, &buffers));
         let find_bindings = infos.each_ref().map(|info| {
             buffers.retain(|(name, _)| *name != "gather_info");
             buffers.push(("gather_info", info));
             find.bind(gpu, &buffers)
         });
         let packets = u64::from(info.count.div_ceil(PACKET));
+        let blocks = packets.div_ceil(BLOCK);
         let mut dispatches = 0;
         loop {
             progress.check()?;
             let mut encoder = gpu.encoder();
             encoder.clear_buffer(&scratch.open, 0, None);
             for (bindings, stride) in find_bindings.iter().zip(STRIDES) {
-                find.dispatch(&mut encoder, bindings, packets.div_ceil(stride.into()));
+                find.dispatch(&mut encoder, bindings, blocks.div_ceil(stride.into()) * BLOCK);
             }
             sum.dispatch(&mut encoder, &sum_bindings, packets);
+            finish.dispatch(&mut encoder, &finish_bindings, info.count.into());
             gpu.submit(encoder);
             dispatches += 1;
             if gpu.read::<u32>(&scratch.open, 0, 1)?[0] == 0 {
@@ -173,10 +189,13 @@ impl Gather {
         let common = [
             ("WINDOWS", f64::from(windows)),
             ("SIDE_TEST", f64::from(u8::from(self.options.side_test))),
-            ("ROUND_BUDGET", f64::from(self.options.round_budget)),
+            ("STEP_BUDGET", f64::from(self.options.step_budget)),
+            ("FINGERPRINT", f64::from(u8::from(self.options.fingerprint))),
         ];
-        self.search[windows as usize - 1]
-            .get_or_insert_with(|| (Kernel::new(gpu, "find_radius", &common), Kernel::new(gpu, "gather", &common)));
+        self.search[windows as usize - 1].get_or_insert_with(|| {
+            let kernel = |stem| Kernel::new(gpu, stem, &common);
+            Search { find: kernel("find_radius"), sum: kernel("gather"), finish: kernel("finish_gather") }
+        });
     }
 }
 

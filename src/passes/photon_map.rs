@@ -6,7 +6,7 @@
 //! direction, 16 bytes) and what an estimate reads besides (`fluxes`, 16 bytes); where these exceed a binding, into two windows.
 //!
 //! Over the sorted photons lies the grid: a finest cell is 32 photons that follow each other on the curve, a coarser
-//! one four finer cells, each with its exact bounds. Cells thus follow the density of the photons at every scale: a
+//! one eight finer cells, each with its exact bounds. Cells thus follow the density of the photons at every scale: a
 //! caustic has small cells, an empty region none, and photons on one spot have cells of size zero.
 
 use super::{build_grid::BuildGrid, radix_sort::RadixSort, sort_photons::SortPhotons};
@@ -145,8 +145,8 @@ impl PhotonMap {
         kernels.sort.fetch(gpu, &entries, &photons, count, (&places, &fluxes, window));
         drop(entries);
         drop(photons);
-        let (cells, cell_count) = kernels.grid.build(gpu, &places, window, count)?;
-        let info = gpu.uniform("map info", &MapInfo { count, cells: cell_count, split: window, pad: 0 });
+        let (cells, levels) = kernels.grid.build(gpu, &places, window, count)?;
+        let info = gpu.uniform("map info", &MapInfo { count, levels, split: window, pad: 0 });
         gpu.wait()?;
         Ok(Self { count, emitted, info, cells, places, fluxes })
     }

@@ -5,10 +5,10 @@ use glam::Vec3;
 use super::{Session, count_faults, picture_size};
 use crate::{
     error::Result,
+    gpu::Gpu,
     image::Frame,
-    layout::TilePixel,
-    passes::{CameraTracer, Gather, GatherSettings, PhotonMap, StepCount, Tile},
-    progress::Progress,
+    layout::{TilePixel, VisiblePoint},
+    passes::{CameraTracer, GatherSettings, SceneBuffers, StepCount, Tile},
     settings::Settings,
     stats::{Stats, timed},
 };
@@ -16,7 +16,8 @@ use crate::{
 /// A picture under way. For each tile: [`Self::trace`], then light is added to the radiance of its visible points,
 /// then [`Self::resolve`].
 pub(crate) struct CameraPass<'a> {
-    session: &'a Session<'a>,
+    pub gpu: &'a Gpu,
+    buffers: &'a SceneBuffers,
     /// Holds the visible points and the radiance of the tile that was traced last.
     pub tracer: CameraTracer,
     /// The radiance estimate that the settings ask for.
@@ -31,7 +32,8 @@ impl<'a> CameraPass<'a> {
         let camera = session.scene.camera(settings.camera.as_deref())?;
         let size = picture_size(camera, settings)?;
         Ok(Self {
-            session,
+            gpu: session.gpu,
+            buffers: &session.buffers,
             tracer: CameraTracer::new(session.gpu, &session.buffers, camera, size, settings)?,
             estimate: GatherSettings {
                 neighbors: settings.neighbors,
@@ -50,7 +52,7 @@ impl<'a> CameraPass<'a> {
 
     /// Camera rays to the tile's visible points, and direct light there if the mode takes it from shadow rays.
     pub fn trace(&self, tile: &Tile, stats: &mut Stats) -> Result<()> {
-        let (gpu, buffers) = (self.session.gpu, &self.session.buffers);
+        let (gpu, buffers) = (self.gpu, self.buffers);
         let count = timed(&mut stats.seconds.camera, || self.tracer.trace(gpu, buffers, tile))?;
         add_step(stats, count);
         if self.direct {
@@ -60,17 +62,24 @@ impl<'a> CameraPass<'a> {
         Ok(())
     }
 
-    /// Adds the light of a map's photons on the device.
-    pub fn gather(&self, gather: &mut Gather, map: &PhotonMap, tile: &Tile, progress: &dyn Progress) -> Result<()> {
-        let points = self.tracer.point_count(tile);
-        let results = (&self.tracer.radiance, &self.tracer.gathered);
-        gather.run(self.session.gpu, map, &self.tracer.points, points, &self.estimate, results, progress)?;
-        Ok(())
+    /// The tile's visible points, some of them not valid.
+    pub fn points(&self, tile: &Tile) -> Result<Vec<VisiblePoint>> {
+        self.gpu.read(&self.tracer.points, 0, self.tracer.point_count(tile).into())
+    }
+
+    /// Radiance from each of them so far.
+    pub fn radiance(&self, tile: &Tile) -> Result<Vec<[f32; 4]>> {
+        self.gpu.read(&self.tracer.radiance, 0, self.tracer.point_count(tile).into())
+    }
+
+    /// Replaces it.
+    pub fn set_radiance(&self, radiance: &[[f32; 4]]) {
+        self.gpu.write(&self.tracer.radiance, 0, radiance);
     }
 
     /// Sums the tile's radiance into the film.
     pub fn resolve(&self, tile: &Tile, film: &mut Film) -> Result<()> {
-        film.add(&self.tracer, tile, &self.tracer.resolve(self.session.gpu, tile)?);
+        film.add(&self.tracer, tile, &self.tracer.resolve(self.gpu, tile)?);
         Ok(())
     }
 }

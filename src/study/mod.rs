@@ -20,6 +20,7 @@ mod preset;
 mod radii;
 mod run;
 mod sheet;
+mod summary;
 mod table;
 mod write;
 
@@ -31,4 +32,5 @@ pub use plan::{Combination, Figure, Finer, Look, Plan, Reference, Subject};
 pub use preset::report;
 pub use radii::Radii;
 pub use run::{Results, run};
+pub use summary::summary;
 pub use write::write;

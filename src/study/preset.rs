@@ -96,24 +96,26 @@ impl Figures<'_> {
 
     /// The whole plane, and the report's two lines in it.
     fn plane(&mut self) {
-        let base = Settings { mode: Mode::Hybrid, ..self.settings.clone() };
         let photons = PHOTONS.map(self.scaled);
-        let mut figure = |photons: &[u32], neighbors: &[u32], title: String| {
-            add_plane(&mut self.plan, MIRROR_AND_GLASS, &base, photons, neighbors, self.repeats, title);
-            self.plan.figures.last_mut().expect("it was added")
-        };
-        let along_n = figure(&photons, &[10], "More photons at k = 10 (scene 1)".to_string());
+        let along_n = self.add_plane(&photons, &[10], "More photons at k = 10 (scene 1)".to_string());
         (along_n.plane, along_n.questions) =
             (false, vec![Question::Energy, Question::GatherDominates, Question::TimeWithPhotons]);
         transpose(along_n);
         let title = format!("More neighbours at n = {} (scene 1)", short(photons[3]));
-        let along_k = figure(&photons[3..], &NEIGHBORS, title);
+        let along_k = self.add_plane(&photons[3..], &NEIGHBORS, title);
         (along_k.plane, along_k.questions) = (
             false,
             vec![Question::Energy, Question::GatherDominates, Question::TimeWithNeighbors, Question::NoiseForBias],
         );
-        let whole = figure(&photons, &NEIGHBORS, "All n and k (scene 1)".to_string());
+        let whole = self.add_plane(&photons, &NEIGHBORS, "All n and k (scene 1)".to_string());
         whole.questions = vec![Question::Proportion];
+    }
+
+    /// Of scene 1.
+    fn add_plane(&mut self, photons: &[u32], neighbors: &[u32], title: String) -> &mut Figure {
+        let base = Settings { mode: Mode::Hybrid, ..self.settings.clone() };
+        add_plane(&mut self.plan, MIRROR_AND_GLASS, &base, photons, neighbors, self.repeats, title);
+        self.plan.figures.last_mut().expect("it was added")
     }
 
     fn corners(&mut self) {

@@ -271,6 +271,7 @@ fn photon_part(settings: &Settings) -> Settings {
         neighbors: free.neighbors,
         cone_constant: free.cone_constant,
         max_radius: free.max_radius,
+        search: free.search,
         spp: free.spp,
         size: free.size,
         camera: free.camera,

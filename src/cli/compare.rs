@@ -1,0 +1,54 @@
+//! `caustica compare`.
+
+use std::{fs, time::Instant};
+
+use caustica::{
+    Error, Result,
+    compare::{FILES, Options, compare},
+    gpu::Gpu,
+    image::{Origin, check_output},
+    progress::{Progress, Stage},
+    scene::Scene,
+};
+
+use super::{args::CompareArgs, progress::Display, render::log_library, say::print};
+
+/// Compares, writes the files and says whether both sides agree.
+pub fn run(args: &CompareArgs) -> Result<()> {
+    let started = Instant::now();
+    let options = &args.options;
+    if options.shared.verbose {
+        log_library();
+    }
+    let display = Display::new(options.shared.quiet, options.shared.verbose);
+    display.report(Stage::Load, 0, 0);
+    let scene = Scene::load(&args.scene)?;
+    display.check()?;
+    prepare(args)?;
+    let settings = options.settings();
+    let gpu = Gpu::open(options.shared.device.as_deref())?;
+    display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
+    let asked = Options { tolerance: args.tolerance, sabotage: args.sabotage };
+    let result = compare(&gpu, &scene, &settings, &asked, &display);
+    display.finish();
+    let comparison = result?;
+    for warning in &comparison.stats.warnings {
+        display.note(&format!("warning: {warning}"));
+    }
+    let stats = &comparison.stats;
+    let origin = Origin { scene: &scene.file_name, scene_hash: &scene.hash, settings: &settings, stats };
+    display.check()?;
+    comparison.write(&args.output, &origin, options.shared.exposure, options.shared.tonemap.into())?;
+    display.note(&format!("wrote {} in {:.1} s", args.output.display(), started.elapsed().as_secs_f64()));
+    if !options.shared.quiet {
+        print(&comparison.report.table());
+    }
+    comparison.verdict()
+}
+
+/// Makes the folder and finds out before the work that every file can be written there.
+fn prepare(args: &CompareArgs) -> Result<()> {
+    let folder = &args.output;
+    fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
+    FILES.iter().try_for_each(|name| check_output(&folder.join(name)))
+}

@@ -1,0 +1,205 @@
+//! Options that all commands have that render.
+
+use caustica::{
+    image::Tonemap,
+    settings::{LightSampling, LightUnit, Mode, Search, Settings},
+};
+use clap::ValueEnum;
+
+use super::values::{cone_constant, count, exposure, photons, radius, size};
+
+/// Options of commands that make one picture.
+#[derive(Debug, clap::Args)]
+pub struct RenderOptions {
+    /// Which light reaches the picture and how, by name or number
+    #[arg(long, value_enum, default_value = "hybrid", help_heading = "Light")]
+    pub mode: ModeArg,
+
+    /// Photons that each map can hold, as 100000, 200k or 1.5M [default: 100k]
+    #[arg(long, value_name = "N", value_parser = photons, help_heading = "Photons")]
+    pub photons: Option<u32>,
+
+    /// Photons that the global map can hold [default: --photons]
+    #[arg(long, value_name = "N", value_parser = photons, help_heading = "Photons")]
+    pub global_photons: Option<u32>,
+
+    /// Photons that the caustic map can hold [default: --photons]
+    #[arg(long, value_name = "N", value_parser = photons, help_heading = "Photons")]
+    pub caustic_photons: Option<u32>,
+
+    /// Neighbours in the radiance estimate, 1 to 1000
+    #[arg(short = 'k', long, value_name = "K", default_value_t = 100, help_heading = "Estimate")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub neighbors: u32,
+
+    #[command(flatten)]
+    pub shared: SharedOptions,
+}
+
+/// Options of all work on a scene that makes pictures: what is rendered, how, and what is said of it meanwhile.
+#[derive(Debug, clap::Args)]
+pub struct SharedOptions {
+    /// How photon paths are dealt to lights
+    #[arg(long, value_name = "HOW", value_enum, default_value = "power", help_heading = "Light")]
+    pub light_sampling: LightSamplingArg,
+
+    /// How the file's light intensities are read
+    #[arg(long, value_name = "UNIT", value_enum, default_value = "radiometric", help_heading = "Light")]
+    pub light_unit: LightUnitArg,
+
+    /// Photon paths emitted at most [default: 100 times the capacity]
+    #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
+    pub max_paths: Option<u64>,
+
+    /// Longest photon path, and longest chain of mirrors and glass on a camera path, in surfaces; 0 leaves the end
+    /// of paths to Russian roulette
+    #[arg(long, value_name = "B", default_value_t = 20, help_heading = "Photons")]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=65535))]
+    pub max_bounces: u32,
+
+    /// Constant of the cone filter, at least 1
+    #[arg(long, value_name = "C", default_value_t = 2.0, value_parser = cone_constant, help_heading = "Estimate")]
+    pub cone_constant: f32,
+
+    /// Bound of the search radius in metres [default: none]
+    #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
+    pub max_radius: Option<f32>,
+
+    /// Jittered camera samples per pixel, averaged over the pixel's square; 1 is the pixel's centre
+    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Picture")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: u32,
+
+    /// Size in pixels; the vertical angle of view stays [default: 512 high, as wide as the camera says or square]
+    #[arg(long, value_name = "WxH", value_parser = size, help_heading = "Picture")]
+    pub size: Option<(u32, u32)>,
+
+    /// Camera of the file, by name or by index from 0 [default: the first]
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "Picture")]
+    pub camera: Option<String>,
+
+    /// Brightens the PNG by this many stops
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, help_heading = "Picture")]
+    #[arg(allow_negative_numbers = true)]
+    pub exposure: f32,
+
+    /// Tone curve of the PNG
+    #[arg(long, value_name = "CURVE", value_enum, default_value = "neutral", help_heading = "Picture")]
+    pub tonemap: TonemapArg,
+
+    /// One number that decides all randomness
+    #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Run")]
+    pub seed: u32,
+
+    /// Adapter, by a part of its name or by the index that `caustica devices` shows [default: the best real GPU,
+    /// else software]
+    #[arg(long, value_name = "NAME|INDEX", env = "CAUSTICA_DEVICE", hide_env_values = true, help_heading = "Run")]
+    pub device: Option<String>,
+
+    /// Print errors only
+    #[arg(short, long, help_heading = "Run", conflicts_with = "verbose")]
+    pub quiet: bool,
+
+    /// Print more: seconds by stage, photons and memory, and what the library logs
+    #[arg(short, long, help_heading = "Run")]
+    pub verbose: bool,
+}
+
+impl RenderOptions {
+    /// The library's settings that these arguments ask for.
+    pub fn settings(&self) -> Settings {
+        let settings = self.shared.settings();
+        let capacity = |specific: Option<u32>, default| specific.or(self.photons).unwrap_or(default);
+        Settings {
+            mode: self.mode.into(),
+            global_photons: capacity(self.global_photons, settings.global_photons),
+            caustic_photons: capacity(self.caustic_photons, settings.caustic_photons),
+            neighbors: self.neighbors,
+            ..settings
+        }
+    }
+}
+
+impl SharedOptions {
+    /// The library's settings that these arguments ask for; mode, photons and neighbours are the defaults.
+    pub fn settings(&self) -> Settings {
+        Settings {
+            max_paths: self.max_paths,
+            cone_constant: self.cone_constant,
+            max_radius: self.max_radius,
+            max_bounces: self.max_bounces,
+            spp: self.spp,
+            size: self.size,
+            camera: self.camera.clone(),
+            seed: self.seed,
+            light_sampling: self.light_sampling.into(),
+            light_unit: self.light_unit.into(),
+            ..Settings::default()
+        }
+    }
+}
+
+/// An enumeration of the command line, value for value one of the library.
+macro_rules! value_enum {
+    ($name:ident => $library:ident { $($(#[$meta:meta])* $value:ident),+ $(,)? }) => {
+        #[derive(Clone, Copy, Debug, ValueEnum)]
+        pub enum $name { $($(#[$meta])* $value),+ }
+
+        impl From<$name> for $library {
+            fn from(value: $name) -> Self {
+                match value { $($name::$value => $library::$value),+ }
+            }
+        }
+    };
+}
+
+value_enum!(ModeArg => Mode {
+    /// 0: direct light by shadow rays, all else by photons
+    #[value(alias = "0")]
+    Hybrid,
+    /// 1: all light by photons
+    #[value(alias = "1")]
+    Photons,
+    /// 2: direct light by shadow rays only
+    #[value(alias = "2")]
+    DirectRays,
+    /// 3: light straight from the lights or through mirrors and glass only, by photons
+    #[value(alias = "3")]
+    DirectPhotons,
+    /// 4: what `hybrid` takes from photons
+    #[value(alias = "4")]
+    IndirectPhotons,
+});
+
+value_enum!(LightSamplingArg => LightSampling {
+    /// In proportion to power
+    Power,
+    /// In turn, whatever the power
+    Uniform,
+});
+
+value_enum!(LightUnitArg => LightUnit {
+    /// Candela read as W/sr in each channel
+    Radiometric,
+    /// Candela divided by 683 lm/W
+    Photometric,
+});
+
+value_enum!(SearchArg => Search {
+    /// In the grid on the device
+    Grid,
+    /// In a kd-tree on the CPU: the same picture but for rounding
+    #[value(name = "kdtree")]
+    KdTree,
+});
+
+value_enum!(TonemapArg => Tonemap {
+    /// Khronos PBR Neutral: keeps base colours, rolls off highlights
+    Neutral,
+    /// ACES, as fitted by Stephen Hill
+    Aces,
+    /// Reinhard's curve on luminance
+    Reinhard,
+    /// Clips at 1
+    None,
+});

@@ -1,0 +1,172 @@
+//! What is counted over the queries of a comparison.
+
+use super::sides::GridAnswer;
+use crate::{
+    layout::{Gathered, VisiblePoint},
+    reference::{Estimate, KdMap, TIE, are_tied, mix},
+    settings::Settings,
+};
+
+/// Photons of one tie that are looked into at most.
+const MOST_TIED: usize = 16;
+
+/// Counts and differences over all queries so far. A query is one visible point and one map.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Measure {
+    pub queries: u64,
+    /// Queries in which both sides summed the same photons.
+    pub identical: u64,
+    /// Queries whose last photon and the next one are tied.
+    pub tied: u64,
+    /// Queries that differ in more than tied photons.
+    pub different: u64,
+    pub radiance: Differences,
+    pub radius: Differences,
+    pub histogram: Histogram,
+}
+
+/// Relative differences.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Differences {
+    pub max: f64,
+    sum: f64,
+    count: u64,
+}
+
+/// Queries by the relative difference of their radiance.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Histogram {
+    /// Without any difference.
+    pub none: u64,
+    /// Bin `i` ends at 10^([`Self::FIRST`] + (i + 1) / 2); the first takes what is smaller, the last what is larger.
+    pub bins: [u64; 18],
+}
+
+impl Measure {
+    /// Counts the valid points of a tile. `explains` says whether the photons of a point differ in tied ones only.
+    pub fn add(
+        &mut self,
+        points: &[VisiblePoint],
+        grid: &GridAnswer,
+        kdtree: &[Estimate],
+        explains: impl Fn(usize, &Gathered) -> bool,
+    ) {
+        for i in (0..points.len()).filter(|&i| points[i].valid != 0) {
+            let (gathered, estimate) = (&grid.gathered[i], &kdtree[i]);
+            let same = sets_agree(gathered, estimate);
+            self.queries += 1;
+            self.identical += u64::from(same);
+            if estimate.tied {
+                self.tied += 1;
+                self.different += u64::from(!same && !explains(i, gathered));
+                continue;
+            }
+            self.different += u64::from(!same);
+            let channel = |c: usize| relative(grid.radiance[i][c].into(), estimate.radiance[c]);
+            let radiance = channel(0).max(channel(1)).max(channel(2));
+            self.radiance.add(radiance);
+            self.histogram.add(radiance);
+            let radius = |squared: f32| f64::from(squared).sqrt();
+            self.radius.add(relative(radius(gathered.radius_squared), radius(estimate.radius_squared)));
+        }
+    }
+}
+
+impl Differences {
+    fn add(&mut self, difference: f64) {
+        self.max = self.max.max(difference);
+        self.sum += difference;
+        self.count += 1;
+    }
+
+    pub fn mean(&self) -> f64 {
+        self.sum / self.count.max(1) as f64
+    }
+}
+
+impl Histogram {
+    /// Exponent of ten at which the first bin begins.
+    pub const FIRST: i32 = -9;
+
+    fn add(&mut self, difference: f64) {
+        if difference == 0.0 {
+            self.none += 1;
+        } else {
+            let bin = ((difference.log10() - f64::from(Self::FIRST)) * 2.0).clamp(0.0, 17.0);
+            self.bins[bin as usize] += 1;
+        }
+    }
+}
+
+/// |a - b| as a fraction of the larger; infinite if one of them is no number.
+pub(super) fn relative(a: f64, b: f64) -> f64 {
+    match (a - b).abs() {
+        0.0 => 0.0,
+        difference if difference.is_finite() => difference / a.abs().max(b.abs()),
+        _ => f64::INFINITY,
+    }
+}
+
+/// Whether both sides summed the same photons.
+fn sets_agree(grid: &Gathered, kdtree: &Estimate) -> bool {
+    grid.fingerprint == kdtree.fingerprint && grid.count == kdtree.count
+}
+
+/// Whether the grid's photons can be had from those of the estimate by exchanging photons that are tied with its last.
+pub(super) fn explained_by_ties(
+    map: &KdMap,
+    point: &VisiblePoint,
+    settings: &Settings,
+    estimate: &Estimate,
+    grid: &Gathered,
+) -> bool {
+    let edge = estimate.radius_squared;
+    let near = map.search(point, settings.neighbors + MOST_TIED as u32, edge * (1.0 + 2.0 * TIE));
+    let tied: Vec<u32> = near.iter().filter(|n| are_tied(n.0, edge)).map(|n| mix(n.1)).collect();
+    let nearer = near.iter().take_while(|n| !are_tied(n.0, edge));
+    let (base, certain) = nearer.fold((0_u32, 0), |(sum, n), photon| (sum.wrapping_add(mix(photon.1)), n + 1));
+    tied.len() < MOST_TIED
+        && (certain..=certain + tied.len() as u32).contains(&grid.count)
+        && some_add_up(&tied, grid.count - certain, grid.fingerprint.wrapping_sub(base))
+}
+
+/// Whether `count` of the numbers have that wrapping sum.
+fn some_add_up(numbers: &[u32], count: u32, sum: u32) -> bool {
+    match numbers {
+        _ if count == 0 => sum == 0,
+        [] => false,
+        [first, rest @ ..] => some_add_up(rest, count - 1, sum.wrapping_sub(*first)) || some_add_up(rest, count, sum),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_relative_to_the_larger() {
+        assert_eq!(relative(0.0, 0.0), 0.0);
+        assert_eq!(relative(1.0, 0.0), 1.0);
+        assert_eq!(relative(3.0, 4.0), 0.25);
+        assert_eq!(relative(f64::NAN, 4.0), f64::INFINITY);
+    }
+
+    #[test]
+    fn bins_are_half_decades() {
+        let mut histogram = Histogram::default();
+        for difference in [0.0, 1e-12, 2e-9, 2e-7, 5e-7, 0.5, 1.0, f64::INFINITY] {
+            histogram.add(difference);
+        }
+        assert_eq!(histogram.none, 1);
+        let expected = [(0, 2), (4, 1), (5, 1), (17, 3)];
+        assert!(expected.iter().all(|&(bin, count)| histogram.bins[bin] == count), "{histogram:?}");
+        assert_eq!(histogram.bins.iter().sum::<u64>(), 7);
+    }
+
+    #[test]
+    fn sums_are_found_only_of_as_many() {
+        let numbers = [5, 7, u32::MAX, 11];
+        assert!(some_add_up(&numbers, 2, 12) && some_add_up(&numbers, 2, 4) && some_add_up(&numbers, 0, 0));
+        assert!(!some_add_up(&numbers, 1, 12) && !some_add_up(&numbers, 3, 12) && !some_add_up(&numbers, 5, 22));
+    }
+}

@@ -1,0 +1,144 @@
+//! The two sides of a comparison, each with its clock.
+
+use crate::{
+    error::Result,
+    gpu::{Buffer, Gpu},
+    layout::{Gathered, VisiblePoint},
+    passes::{Gather, GatherOptions, PhotonMap, Tile},
+    progress::Progress,
+    reference::{Estimate, KdMap},
+    renderer::CameraPass,
+    settings::Settings,
+    stats::timed,
+};
+
+/// Points that a warm-up gathers.
+const WARM_UP: u32 = 64;
+
+/// Gathers on the grid.
+pub(super) struct GridGather<'a> {
+    pub maps: &'a [PhotonMap],
+    gather: Gather,
+    /// Radiance by one map alone.
+    radiance: Option<Buffer>,
+    warm: bool,
+    /// Seconds of all gathers, without reading back.
+    pub seconds: f64,
+}
+
+/// What the grid found at each point of a tile.
+pub(super) struct GridAnswer {
+    pub gathered: Vec<Gathered>,
+    pub radiance: Vec<[f32; 4]>,
+}
+
+impl<'a> GridGather<'a> {
+    pub fn new(gpu: &Gpu, maps: &'a [PhotonMap]) -> Result<Self> {
+        let gather = Gather::new(gpu, GatherOptions { fingerprint: true, ..GatherOptions::default() });
+        Ok(Self { maps, gather, radiance: None, warm: false, seconds: 0.0 })
+    }
+
+    /// Gathers the tile that `pass` has traced.
+    pub fn gather(
+        &mut self,
+        map: usize,
+        pass: &CameraPass,
+        tile: &Tile,
+        progress: &dyn Progress,
+    ) -> Result<GridAnswer> {
+        let (gpu, points, gathered) = (pass.gpu, &pass.tracer.points, &pass.tracer.gathered);
+        let count = pass.tracer.point_count(tile);
+        let radiance = match self.radiance.take() {
+            Some(buffer) => buffer,
+            None => gpu.storage::<[u8; 1]>("radiance of one map", pass.tracer.radiance.size())?,
+        };
+        let results = (&radiance, gathered);
+        if !self.warm {
+            // Drivers compile a kernel when it first runs; that is no part of a query.
+            for map in self.maps {
+                self.gather.run(gpu, map, points, count.min(WARM_UP), &pass.estimate, results, progress)?;
+            }
+            self.warm = true;
+        }
+        let mut encoder = gpu.encoder();
+        encoder.clear_buffer(&radiance, 0, None);
+        gpu.submit(encoder);
+        gpu.wait()?;
+        timed(&mut self.seconds, || {
+            self.gather.run(gpu, &self.maps[map], points, count, &pass.estimate, results, progress)
+        })?;
+        let answer = GridAnswer {
+            gathered: gpu.read(gathered, 0, count.into())?,
+            radiance: gpu.read(&radiance, 0, count.into())?,
+        };
+        self.radiance = Some(radiance);
+        Ok(answer)
+    }
+
+    /// Memory of the photons and the grids over them, bytes.
+    pub fn bytes(&self) -> u64 {
+        let of_map = |map: &PhotonMap| {
+            let mut buffers = map.bindings().map(|(_, buffer)| buffer).to_vec();
+            // A map of one window shows it under two names.
+            buffers.dedup_by(|a, b| std::ptr::eq(*a, *b));
+            buffers.iter().map(|buffer| buffer.size()).sum::<u64>()
+        };
+        self.maps.iter().map(of_map).sum()
+    }
+}
+
+/// Gathers on the kd-tree.
+pub(super) struct KdTreeGather<'a> {
+    maps: Vec<KdMap>,
+    settings: &'a Settings,
+    pub build_seconds: f64,
+    /// Seconds of all gathers.
+    pub seconds: f64,
+}
+
+impl<'a> KdTreeGather<'a> {
+    /// Reads the maps' photons back and balances them.
+    pub fn new(gpu: &Gpu, maps: &[PhotonMap], settings: &'a Settings) -> Result<Self> {
+        let mut build_seconds = 0.0;
+        let mut build = |map: &PhotonMap| {
+            let (places, fluxes) = map.read(gpu)?;
+            Ok(timed(&mut build_seconds, || KdMap::new(places, fluxes, map.emitted())))
+        };
+        let maps = maps.iter().map(&mut build).collect::<Result<_>>()?;
+        Ok(Self { maps, settings, build_seconds, seconds: 0.0 })
+    }
+
+    /// Lets the first map lose up to `count` photons, each the nearest to one of the points; returns how many.
+    pub fn leave_out(&mut self, count: u32, points: &[VisiblePoint]) -> u32 {
+        let Some(map) = self.maps.first_mut() else { return 0 };
+        let limit = self.settings.max_radius.map_or(f32::INFINITY, |r| r * r);
+        let valid: Vec<&VisiblePoint> = points.iter().filter(|p| p.valid != 0).collect();
+        let places = (count as usize).min(valid.len());
+        let mut lost = 0;
+        for point in (0..places).map(|i| valid[i * valid.len() / places]) {
+            // Without a bound a photon alone is never summed: it would only give the radius.
+            if let [(_, nearest), rest @ ..] = &map.search(point, 2, limit)[..]
+                && (!rest.is_empty() || limit.is_finite())
+            {
+                map.leave_out(*nearest);
+                lost += 1;
+            }
+        }
+        lost
+    }
+
+    /// Gathers the points.
+    pub fn gather(&mut self, map: usize, points: &[VisiblePoint], progress: &dyn Progress) -> Result<Vec<Estimate>> {
+        timed(&mut self.seconds, || self.maps[map].gather(points, self.settings, progress))
+    }
+
+    /// Whether the photons that the grid summed differ from those of the estimate in tied ones only.
+    pub fn explains(&self, map: usize, point: &VisiblePoint, estimate: &Estimate, gathered: &Gathered) -> bool {
+        super::measure::explained_by_ties(&self.maps[map], point, self.settings, estimate, gathered)
+    }
+
+    /// Memory of the photons and the trees, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.maps.iter().map(KdMap::bytes).sum()
+    }
+}

@@ -1,0 +1,171 @@
+//! Headless Chromium for tests of pages, driven through chromedriver (W3C WebDriver over HTTP).
+//!
+//! A missing browser fails the test, unless the environment variable `CAUSTICA_NO_BROWSER` is 1.
+#![allow(dead_code, reason = "every test file uses a part of this one")]
+
+use std::{
+    env,
+    io::{BufRead, BufReader, Read, Write},
+    net::TcpStream,
+    path::Path,
+    process::{Child, Command, Stdio},
+    time::Duration,
+};
+
+use base64::{Engine, prelude::BASE64_STANDARD};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+const ARGUMENTS: [&str; 8] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+];
+
+/// One browser with one page.
+pub struct Browser {
+    driver: Child,
+    port: u16,
+    session: String,
+    _profile: TempDir,
+}
+
+impl Browser {
+    /// Starts it with a window of that many pixels. `None`: `CAUSTICA_NO_BROWSER=1` says to do without.
+    pub fn open(width: u32, height: u32) -> Option<Self> {
+        if env::var("CAUSTICA_NO_BROWSER").is_ok_and(|v| v == "1") {
+            return None;
+        }
+        let mut driver = Command::new("chromedriver")
+            .arg("--port=0")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap_or_else(|e| {
+                panic!("chromedriver: {e}; run scripts/install-chromium, or set CAUSTICA_NO_BROWSER=1 to do without")
+            });
+        let mut lines = BufReader::new(driver.stdout.take().expect("it is piped")).lines();
+        let port = lines
+            .find_map(|line| {
+                line.ok()?.split("started successfully on port ").nth(1)?.trim_end_matches('.').parse().ok()
+            })
+            .expect("chromedriver tells its port");
+        let profile = tempfile::tempdir().expect("a temporary folder");
+        let mut browser = Self { driver, port, session: String::new(), _profile: profile };
+        browser.start(width, height);
+        Some(browser)
+    }
+
+    fn start(&mut self, width: u32, height: u32) {
+        let mut arguments: Vec<String> = ARGUMENTS.map(String::from).to_vec();
+        arguments.push(format!("--user-data-dir={}", self._profile.path().display()));
+        arguments.push(format!("--window-size={width},{height}"));
+        let capabilities = json!({"capabilities": {"alwaysMatch": {
+            "browserName": "chrome",
+            "goog:chromeOptions": {"args": arguments},
+            "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"},
+        }}});
+        let session = self.call("POST", "/session", &capabilities);
+        self.session = session["sessionId"].as_str().expect("a session has a name").to_string();
+    }
+
+    /// Shows a file.
+    pub fn show(&self, file: &Path) {
+        let path = file.canonicalize().expect("the page is there");
+        self.command("POST", "/url", &json!({"url": format!("file://{}", path.display())}));
+    }
+
+    /// Runs JavaScript; what it returns.
+    pub fn run(&self, script: &str) -> Value {
+        self.command("POST", "/execute/sync", &json!({"script": script, "args": []}))
+    }
+
+    /// Presses keys in the element that the CSS selector names; arrow keys are U+E012 (left) to U+E015 (down).
+    pub fn press(&self, selector: &str, keys: &str) {
+        let found = self.command("POST", "/element", &json!({"using": "css selector", "value": selector}));
+        let element = found.as_object().and_then(|o| o.values().next()).and_then(Value::as_str);
+        let element = element.unwrap_or_else(|| panic!("no {selector}: {found}"));
+        self.command("POST", &format!("/element/{element}/value"), &json!({"text": keys}));
+    }
+
+    /// Clicks the element that the CSS selector names.
+    pub fn click(&self, selector: &str) {
+        let found = self.command("POST", "/element", &json!({"using": "css selector", "value": selector}));
+        let element = found.as_object().and_then(|o| o.values().next()).and_then(Value::as_str);
+        let element = element.unwrap_or_else(|| panic!("no {selector}: {found}"));
+        self.command("POST", &format!("/element/{element}/click"), &json!({}));
+    }
+
+    /// The window as a PNG file.
+    pub fn screenshot(&self) -> Vec<u8> {
+        let text = self.command("GET", "/screenshot", &Value::Null);
+        BASE64_STANDARD.decode(text.as_str().expect("a picture")).expect("base64")
+    }
+
+    /// Warnings and errors of the console since the last call.
+    pub fn complaints(&self) -> Vec<String> {
+        let entries = self.command("POST", "/se/log", &json!({"type": "browser"}));
+        let entries = entries.as_array().expect("a log is a list");
+        let serious = entries.iter().filter(|e| e["level"] == "SEVERE" || e["level"] == "WARNING");
+        serious.map(|e| e["message"].to_string()).collect()
+    }
+
+    /// Addresses asked for since the last call that are neither files nor in the page itself.
+    pub fn outside_requests(&self) -> Vec<String> {
+        let entries = self.command("POST", "/se/log", &json!({"type": "performance"}));
+        let address = |entry: &Value| {
+            let event: Value = serde_json::from_str(entry["message"].as_str()?).ok()?;
+            let sent = event["message"]["method"] == "Network.requestWillBeSent";
+            sent.then(|| event["message"]["params"]["request"]["url"].as_str().map(String::from))?
+        };
+        let addresses = entries.as_array().expect("a log is a list").iter().filter_map(address);
+        addresses.filter(|a| !["file:", "data:", "blob:"].iter().any(|inside| a.starts_with(inside))).collect()
+    }
+
+    fn command(&self, method: &str, path: &str, body: &Value) -> Value {
+        self.call(method, &format!("/session/{}{path}", self.session), body)
+    }
+
+    /// One request to chromedriver; the `value` of its answer.
+    fn call(&self, method: &str, path: &str, body: &Value) -> Value {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("chromedriver listens");
+        stream.set_read_timeout(Some(Duration::from_secs(120))).expect("a timeout can be set");
+        let body = if body.is_null() { String::new() } else { body.to_string() };
+        let length = body.len();
+        write!(stream, "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {length}\r\n\r\n{body}")
+            .expect("chromedriver reads");
+        let mut reader = BufReader::new(stream);
+        let mut length = 0;
+        loop {
+            let mut line = String::new();
+            reader.read_line(&mut line).expect("chromedriver answers");
+            if let Some(value) = line.to_lowercase().strip_prefix("content-length:") {
+                length = value.trim().parse().expect("a length");
+            }
+            if line.trim().is_empty() {
+                break;
+            }
+        }
+        let mut answer = vec![0; length];
+        reader.read_exact(&mut answer).expect("chromedriver answers in full");
+        let answer: Value = serde_json::from_slice(&answer).expect("JSON");
+        let value = answer["value"].clone();
+        assert!(value.get("error").is_none_or(Value::is_null), "{method} {path}: {}", value["message"]);
+        value
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        if !self.session.is_empty() && !std::thread::panicking() {
+            self.command("DELETE", "", &Value::Null);
+        }
+        let _ = self.driver.kill();
+        let _ = self.driver.wait();
+    }
+}
