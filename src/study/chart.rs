@@ -57,8 +57,8 @@ fn draw_lines(area: &Area, title: &str, x_name: &str, y_name: &str, series: &[Se
     let mut chart = ChartBuilder::on(&left)
         .x_label_area_size(46)
         .y_label_area_size(70)
-        .build_cartesian_2d(x.log_scale(), y.log_scale())?;
-    let label = |value: &f64| brief(*value);
+        .build_cartesian_2d(x.clone().log_scale().base(base(&x)), y.clone().log_scale().base(base(&y)))?;
+    let label = |value: &f64| tick(*value);
     chart
         .configure_mesh()
         .x_desc(x_name)
@@ -161,8 +161,24 @@ fn text(size: i32) -> TextStyle<'static> {
 /// A range that holds all values with room at both ends; `None` without a value.
 fn decades(values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
     let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
-    let room = (high / low).powf(0.06).max(1.15);
+    // Wide enough that two powers of two lie in it.
+    let room = (high / low).powf(0.06).max(if high < 2.0 * low { 2.0 } else { 1.15 });
     (low <= high).then(|| low / room..high * room)
+}
+
+/// Marks stand at powers of ten, or of two on a short axis.
+fn base(range: &Range<f64>) -> f64 {
+    if range.end / range.start > 50.0 { 10.0 } else { 2.0 }
+}
+
+/// A number at an axis.
+fn tick(x: f64) -> String {
+    let text = brief(x);
+    if text.contains('.') && !text.contains('e') {
+        text.trim_end_matches('0').trim_end_matches('.').to_string()
+    } else {
+        text
+    }
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ fn row(photons: u32, neighbors: u32) -> Row {
         rmse: Some(0.1),
         flip: Some(0.1),
         bias: Some(0.1),
+        bias_limit: Some(0.01),
         corner_ratio: Some(1.1),
         error: None,
         thumbnail: Thumbnail::default(),
@@ -70,6 +71,13 @@ fn every_claim_of_a_plane_can_hold_and_can_fail() {
         assert_eq!(verdict(question, &rows), Verdict::DoesNotHold, "{question:?}");
         assert_eq!(verdict(question, &[]), Verdict::Unknown, "{question:?}");
     }
+}
+
+#[test]
+fn a_bias_that_noise_hides_is_not_compared() {
+    let mut rows = plane();
+    rows.iter_mut().for_each(|row| row.bias_limit = Some(1.0));
+    assert_eq!(verdict(Question::NoiseForBias, &rows), Verdict::Unknown);
 }
 
 #[test]

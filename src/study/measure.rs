@@ -2,7 +2,14 @@
 
 use serde::Serialize;
 
-use super::{Combination, Plan, Radii, cells::Measured, corners::corner_region, grid::short, plan::Look};
+use super::{
+    Combination, Plan, Radii,
+    cells::Measured,
+    corners::corner_region,
+    grid::short,
+    plan::Look,
+    spread::{bias, noise},
+};
 use crate::{
     image::{
         Frame, Rgb8,
@@ -45,9 +52,10 @@ pub struct Row {
     pub rmse: Option<f64>,
     /// Mean FLIP error of the tone-mapped pictures, 0 to 1.
     pub flip: Option<f64>,
-    /// What of the error is no noise: the root of the mean square of the mean picture's difference from the reference, less
-    /// the part that noise has in it, W/(m² sr); from two repeats.
+    /// What all repeats share of the error, root of the mean square over pixels and channels, W/(m² sr); from two repeats.
     pub bias: Option<f64>,
+    /// A smaller bias cannot be told from noise, W/(m² sr).
+    pub bias_limit: Option<f64>,
     /// Mean radiance near open corners over the reference's there, 1 is right.
     pub corner_ratio: Option<f64>,
     /// Why it failed.
@@ -121,6 +129,7 @@ pub(super) fn measure(
         rmse: None,
         flip: None,
         bias: None,
+        bias_limit: None,
         corner_ratio: None,
         error,
         thumbnail: Thumbnail::default(),
@@ -131,7 +140,7 @@ pub(super) fn measure(
     row.global = map_row(measured.stats.photons.global, measured.radii[0]);
     row.caustic = map_row(measured.stats.photons.caustic, measured.radii[1]);
     row.mean_radiance = std::array::from_fn(|c| average(renders, |frame| mean(&frame.radiance)[c]));
-    row.noise = noise(renders);
+    row.noise = noise(&frames(renders));
     row.thumbnail = Thumbnail::new(first, plan.look);
     if let Some(reference) = reference.filter(|r| (r.width, r.height) == (first.width, first.height)) {
         compare(&mut row, renders, reference, plan.look);
@@ -148,30 +157,18 @@ pub(super) fn measure(
 fn compare(row: &mut Row, renders: &[(Frame, Measured)], reference: &Frame, look: Look) {
     let right = &reference.radiance;
     row.rel_mse = Some(average(renders, |frame| rel_mse(&frame.radiance, right, None)));
-    let square = average(renders, |frame| rmse(&frame.radiance, right, None).powi(2));
-    row.rmse = Some(square.sqrt());
+    row.rmse = Some(average(renders, |frame| rmse(&frame.radiance, right, None).powi(2)).sqrt());
     row.flip = Some(average(renders, |frame| flip(&frame.radiance, right, frame.width, look.exposure, look.tonemap)));
-    // The square error of an estimate is the sum of its variance and of its squared bias.
-    row.bias = row.noise.map(|noise| (square - noise * noise).max(0.0).sqrt());
+    let bias = bias(&frames(renders), reference);
+    (row.bias, row.bias_limit) = (bias.map(|b| b.value), bias.map(|b| b.limit));
+}
+
+fn frames(renders: &[(Frame, Measured)]) -> Vec<&Frame> {
+    renders.iter().map(|(frame, _)| frame).collect()
 }
 
 fn average(renders: &[(Frame, Measured)], value: impl Fn(&Frame) -> f64) -> f64 {
     renders.iter().map(|(frame, _)| value(frame)).sum::<f64>() / renders.len() as f64
-}
-
-/// Root of the mean over pixels and channels of the unbiased variance between renders.
-fn noise(renders: &[(Frame, Measured)]) -> Option<f64> {
-    let count = renders.len() as f64;
-    let values = renders.first()?.0.radiance.len() * 3;
-    if renders.len() < 2 || values == 0 {
-        return None;
-    }
-    let variance = |i: usize| {
-        let of = |(frame, _): &(Frame, Measured)| f64::from(frame.radiance[i / 3][i % 3]);
-        let mean = renders.iter().map(of).sum::<f64>() / count;
-        renders.iter().map(|r| (of(r) - mean).powi(2)).sum::<f64>() / (count - 1.0)
-    };
-    Some(((0..values).map(variance).sum::<f64>() / values as f64).sqrt())
 }
 
 fn mean_seconds(renders: &[(Frame, Measured)]) -> Seconds {
@@ -244,15 +241,6 @@ mod tests {
         let radiance = values.iter().map(|&v| [v; 3]).collect();
         let frame = Frame { width: values.len() as u32, height: 1, radiance, ..Frame::default() };
         (frame, Measured { stats: Stats::default(), radii: [None; 2] })
-    }
-
-    #[test]
-    fn noise_is_the_deviation_between_renders() {
-        // Variances 2 and 0 (of two values, n - 1).
-        let renders = [render(&[1.0, 5.0]), render(&[3.0, 5.0])];
-        assert!((noise(&renders).unwrap() - 1.0).abs() < 1e-12);
-        assert_eq!(noise(&renders[..1]), None);
-        assert_eq!(noise(&[render(&[1.0]), render(&[1.0])]), Some(0.0));
     }
 
     #[test]

@@ -100,8 +100,8 @@ fn show_figure(figure: &Figure, results: &Results) -> io::Result<String> {
     let title = escape(&figure.title);
     let claims: String = answers(figure, &results.rows).iter().map(show_claim).collect();
     Ok(format!(
-        "<h2>{title}</h2>\n<div class=\"scroll\"><img class=\"sheet\" alt=\"Contact sheet: {title}\" \
-         src=\"data:image/png;base64,{picture}\"></div>\n{claims}"
+        "<h2>{title}</h2>\n<figure><img class=\"sheet\" alt=\"Contact sheet: {title}\" \
+         src=\"data:image/png;base64,{picture}\"></figure>\n{claims}"
     ))
 }
 

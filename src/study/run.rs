@@ -3,22 +3,21 @@
 use std::{collections::BTreeMap, path::Path};
 
 use super::{
-    cells::{Cells, Key, Measured},
+    cells::{Cells, Key},
     cost::{Meter, Watch, work},
+    job::{Job, finer_settings, photon_part, repeats},
     measure::{Row, measure},
-    plan::{Combination, Finer, Plan, Reference, reference_mode},
-    radii::Counts,
+    picture::{mean_frame, picture},
+    plan::{Combination, Plan, Reference, reference_mode},
 };
 use crate::{
     error::{Error, Result},
     gpu::Gpu,
     image::Frame,
-    layout::Gathered,
-    passes::{Gather, GatherOptions},
     progress::{Progress, Silent},
-    renderer::{CameraPass, PhotonMaps, Session},
-    settings::{Mode, Settings},
-    stats::{DeviceStats, timed},
+    renderer::{PhotonMaps, Session},
+    settings::Settings,
+    stats::DeviceStats,
 };
 
 /// What a study found.
@@ -35,13 +34,6 @@ pub struct Results {
     pub kept: usize,
     /// What failed and why, one line each.
     pub failures: Vec<String>,
-}
-
-/// One render to make.
-struct Job {
-    subject: usize,
-    settings: Settings,
-    key: Key,
 }
 
 /// Runs the study in the folder, which is made where there is none.
@@ -256,94 +248,6 @@ impl Study<'_> {
         };
         self.plan.subjects.iter().filter_map(describe).collect()
     }
-}
-
-/// Settings of a combination's renders.
-fn repeats(combination: &Combination) -> impl Iterator<Item = Settings> + '_ {
-    let settings = &combination.settings;
-    (0..combination.repeats).map(|r| Settings { seed: settings.seed.wrapping_add(r), ..settings.clone() })
-}
-
-/// What decides the photon maps: all cells with the same share them.
-fn photon_part(settings: &Settings) -> Settings {
-    let free = Settings::default();
-    Settings {
-        neighbors: free.neighbors,
-        cone_constant: free.cone_constant,
-        max_radius: free.max_radius,
-        search: free.search,
-        spp: free.spp,
-        size: free.size,
-        camera: free.camera,
-        ..settings.clone()
-    }
-}
-
-/// Settings of the passes of a reference.
-fn finer_settings(settings: &Settings, finer: Finer, mode: Mode) -> Vec<Settings> {
-    // Far from the seeds that a study counts up from its own.
-    const APART: u32 = 0x8000_0000;
-    let seed = |pass: u32| settings.seed.wrapping_add(APART).wrapping_add(pass);
-    let pass = |pass: u32| Settings {
-        mode,
-        global_photons: finer.photons,
-        caustic_photons: finer.photons,
-        neighbors: finer.neighbors,
-        spp: finer.spp,
-        seed: seed(pass),
-        ..settings.clone()
-    };
-    (0..finer.passes).map(pass).collect()
-}
-
-/// One picture of the maps, as [`Session::picture`] makes it, and the radii of its estimates.
-fn picture(
-    gpu: &Gpu,
-    session: &Session,
-    maps: &PhotonMaps,
-    settings: &Settings,
-    progress: &dyn Progress,
-) -> Result<(Frame, Measured)> {
-    let mut stats = maps.stats().clone();
-    let pass = CameraPass::new(session, settings)?;
-    let mut gather = Gather::new(gpu, GatherOptions::default());
-    let mut film = pass.film();
-    let tiles = pass.tracer.tiles();
-    // Maps without a photon are not there; the global one comes first.
-    let first = usize::from(stats.photons.global.stored == 0);
-    let mut radii = [Counts::default(), Counts::default()];
-    for (done, tile) in tiles.iter().enumerate() {
-        progress.check()?;
-        progress.report(crate::progress::Stage::Camera, done as u64, tiles.len() as u64);
-        pass.trace(tile, &mut stats)?;
-        let (tracer, points) = (&pass.tracer, pass.tracer.point_count(tile));
-        for (map, counts) in maps.maps().iter().zip(&mut radii[first..]) {
-            // Places without a valid point would keep what an older tile left there.
-            let mut encoder = gpu.encoder();
-            encoder.clear_buffer(&tracer.gathered, 0, None);
-            gpu.submit(encoder);
-            timed(&mut stats.seconds.gather, || {
-                let results = (&tracer.radiance, &tracer.gathered);
-                gather.run(gpu, map, &tracer.points, points, &pass.estimate, results, progress)
-            })?;
-            counts.add(&gpu.read::<Gathered>(&tracer.gathered, 0, points.into())?);
-        }
-        pass.resolve(tile, &mut film)?;
-    }
-    session.close(&mut stats);
-    Ok((film.finish(settings.spp), Measured { stats, radii: radii.map(|counts| counts.finish()) }))
-}
-
-/// Mean of pictures of one size; the other layers are the first one's.
-fn mean_frame(frames: Vec<Frame>) -> Frame {
-    let scale = 1.0 / frames.len().max(1) as f32;
-    let mut frames = frames.into_iter();
-    let mut mean = frames.next().unwrap_or_default();
-    for frame in frames {
-        mean.radiance.iter_mut().zip(&frame.radiance).for_each(|(a, b)| (0..3).for_each(|c| a[c] += b[c]));
-    }
-    mean.radiance.iter_mut().flatten().for_each(|x| *x *= scale);
-    mean
 }
 
 /// The error as one line; what ends the whole study is an error here too.

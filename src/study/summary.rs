@@ -21,7 +21,8 @@ pub fn summary(plan: &Plan, results: &Results) -> String {
                 Verdict::DoesNotHold => "does not hold",
                 Verdict::Unknown => "cannot be told",
             };
-            let _ = write!(text, "{}: {}\n  {verdict}: {}\n", figure.title, claim.claim, claim.measured);
+            let line = format!("{}: {}\n  {verdict}: {}\n", figure.title, claim.claim, claim.measured);
+            text.push_str(&line);
         }
     }
     text

@@ -9,7 +9,7 @@ use crate::stats::DeviceStats;
 type Column = (&'static str, fn(&Row) -> String);
 
 /// The columns of the CSV file, in order. Seconds, metres and W/(m² sr).
-pub(super) const COLUMNS: [Column; 37] = [
+pub(super) const COLUMNS: [Column; 38] = [
     ("scene", |r| r.scene.clone()),
     ("mode", |r| r.mode.name().to_string()),
     ("photons", |r| r.photons.to_string()),
@@ -41,6 +41,7 @@ pub(super) const COLUMNS: [Column; 37] = [
     ("mean_b", |r| number(r.mean_radiance[2])),
     ("noise", |r| r.noise.map(number).unwrap_or_default()),
     ("bias", |r| r.bias.map(number).unwrap_or_default()),
+    ("bias_limit", |r| r.bias_limit.map(number).unwrap_or_default()),
     ("rel_mse", |r| r.rel_mse.map(number).unwrap_or_default()),
     ("rmse", |r| r.rmse.map(number).unwrap_or_default()),
     ("flip", |r| r.flip.map(number).unwrap_or_default()),
