@@ -155,15 +155,13 @@ impl Study<'_> {
             if i > 0 {
                 self.begin(job, meter)?;
             }
-            match picture(self.gpu, session, maps, &job.settings, meter) {
-                Ok((frame, measured)) => {
-                    let scene = &self.plan.subjects[job.subject].scene;
-                    self.cells.keep(&job.key, scene, &job.settings, &frame, measured)?;
-                }
-                Err(error) => {
-                    let text = one_line(error)?;
-                    failed.insert(job.key.clone(), format!("{}: {text}", self.name(job)));
-                }
+            let scene = &self.plan.subjects[job.subject].scene;
+            let made = picture(self.gpu, session, maps, &job.settings, meter);
+            let kept =
+                made.and_then(|(frame, measured)| self.cells.keep(&job.key, scene, &job.settings, &frame, measured));
+            if let Err(error) = kept {
+                let text = one_line(error)?;
+                failed.insert(job.key.clone(), format!("{}: {text}", self.name(job)));
             }
             meter.end();
         }
@@ -250,10 +248,10 @@ impl Study<'_> {
     }
 }
 
-/// The error as one line; what ends the whole study is an error here too.
+/// Why a cell failed, as one line; a study that is to stop stops here.
 fn one_line(error: Error) -> Result<String> {
     match error {
-        Error::Stopped | Error::Io { .. } => Err(error),
+        Error::Stopped => Err(error),
         other => Ok(other.to_string().lines().collect::<Vec<_>>().join(" ")),
     }
 }
