@@ -65,10 +65,9 @@ pub struct SharedOptions {
     #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
     pub max_radius: Option<f32>,
 
-    /// Jittered camera samples per pixel, averaged over the pixel's square; 1 is the pixel's centre
-    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Picture")]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
-    pub spp: u32,
+    /// Jittered camera samples per pixel, averaged over the pixel's square; 1 is the pixel's centre [default: 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
+    pub spp: Option<u32>,
 
     /// Size in pixels; the vertical angle of view stays [default: 512 high, as wide as the camera says or square]
     #[arg(long, value_name = "WxH", value_parser = size, help_heading = "Picture")]
@@ -123,18 +122,19 @@ impl RenderOptions {
 impl SharedOptions {
     /// The library's settings that these arguments ask for; mode, photons and neighbours are the defaults.
     pub fn settings(&self) -> Settings {
+        let defaults = Settings::default();
         Settings {
             max_paths: self.max_paths,
             cone_constant: self.cone_constant,
             max_radius: self.max_radius,
             max_bounces: self.max_bounces,
-            spp: self.spp,
+            spp: self.spp.unwrap_or(defaults.spp),
             size: self.size,
             camera: self.camera.clone(),
             seed: self.seed,
             light_sampling: self.light_sampling.into(),
             light_unit: self.light_unit.into(),
-            ..Settings::default()
+            ..defaults
         }
     }
 }

@@ -28,6 +28,7 @@ use super::{
 const SCENES: &str = "scenes";
 /// Pictures of the preset, unless asked for otherwise: all of it should take minutes on software Vulkan.
 const PRESET_SIZE: (u32, u32) = (256, 256);
+const PRESET_SPP: u32 = 1;
 /// Renders per combination of the preset's plane: noise needs two.
 const PRESET_REPEATS: u32 = 2;
 
@@ -90,7 +91,8 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
     let settings = options.settings();
     if args.preset == Some(PresetArg::Report) {
         let folder = args.scene.clone().unwrap_or_else(|| PathBuf::from(SCENES));
-        let settings = Settings { size: Some(options.size.unwrap_or(PRESET_SIZE)), ..settings };
+        let size = Some(options.size.unwrap_or(PRESET_SIZE));
+        let settings = Settings { size, spp: options.spp.unwrap_or(PRESET_SPP), ..settings };
         return study::report(&folder, &settings, args.repeat.unwrap_or(PRESET_REPEATS), args.preset_scale, look);
     }
     // clap has seen to it that all three are there.
@@ -99,7 +101,7 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
     let most = args.photons.iter().copied().max().unwrap_or(1);
     let (reference, size) = match &args.reference {
         None => (Reference::None, options.size),
-        Some(ReferenceArg::Auto) => (Reference::Finer(Finer::than(most, options.spp)), options.size),
+        Some(ReferenceArg::Auto) => (Reference::Finer(Finer::than(most, settings.spp)), options.size),
         Some(ReferenceArg::File(path)) => {
             let frame = read_exr(path)?;
             let size = options.size.unwrap_or((frame.width, frame.height));

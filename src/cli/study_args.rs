@@ -70,7 +70,8 @@ pub struct StudyArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum PresetArg {
-    /// The figures of a university report on photon mapping, and its claims put to the test; 256x256 unless --size
+    /// The figures of a university report on photon mapping, and its claims put to the test; 256x256 with one sample
+    /// a pixel unless --size and --spp say otherwise
     Report,
 }
 

@@ -57,11 +57,11 @@ pub struct Finer {
 const MOST_PHOTONS: u32 = 1_000_000;
 
 impl Finer {
-    /// Ten times the photons of the study's finest map within reason, and many more samples.
+    /// Ten times the photons of the study's finest map within reason, in several passes of so many samples a pixel.
     #[must_use]
     pub fn than(most_photons: u32, spp: u32) -> Self {
         let photons = most_photons.saturating_mul(10).min(MOST_PHOTONS.max(most_photons));
-        Self { photons, neighbors: 50, spp: spp.saturating_mul(2), passes: 4 }
+        Self { photons, neighbors: 50, spp, passes: 4 }
     }
 }
 

@@ -1,6 +1,9 @@
 //! Renders what is not there yet and measures all.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use super::{
     cells::{Cells, Key},
@@ -104,6 +107,7 @@ impl Study<'_> {
     }
 
     fn render_all(&self, jobs: &[Job], meter: &Meter, failed: &mut Failed) -> Result<()> {
+        let mut warm = BTreeSet::new();
         for of_subject in jobs.chunk_by(|a, b| a.subject == b.subject) {
             let scene = &self.plan.subjects[of_subject[0].subject].scene;
             for sharing in of_subject.chunk_by(|a, b| photon_part(&a.settings) == photon_part(&b.settings)) {
@@ -112,7 +116,9 @@ impl Study<'_> {
                 let opened = Session::open(self.gpu, scene, settings, meter);
                 let traced = opened.and_then(|session| {
                     begun?;
-                    self.warm_up(&session, settings)?;
+                    if warm.insert((sharing[0].subject, settings.mode as u32)) {
+                        self.warm_up(&session, settings)?;
+                    }
                     let maps = session.photon_maps(settings, meter)?;
                     Ok((session, maps))
                 });
