@@ -41,7 +41,7 @@ fn command(line: &str) -> Command {
 
 /// A small comparison into the folder, with further words.
 fn compare_into(folder: &Path, words: &str) -> Output {
-    let line = format!("compare {SCENE} --size 32x24 --spp 2 --photons 3k -k 20 {words} -o");
+    let line = format!("compare {SCENE} --size 32x24 --spp 2 --photons 3k {words} -o");
     command(&line).arg(folder).output().expect("it starts")
 }
 
@@ -74,7 +74,16 @@ fn a_comparison_leaves_all_files_and_a_table() {
     let ended = compare_into(&new, "");
     let (out, said) = (text(&ended.stdout), text(&ended.stderr));
     assert_eq!(ended.status.code(), Some(0), "{said}");
-    for line in ["identical neighbours", "tied queries", "queries per second", "build", "memory", "CPU thread"] {
+    for line in [
+        "adapter",
+        "driver",
+        "identical neighbours",
+        "tied queries",
+        "queries per second",
+        "build",
+        "memory",
+        "CPU thread",
+    ] {
         assert!(out.contains(line), "{out}");
     }
     assert!(said.contains("compare: 100 %") && said.contains("device: "), "{said}");

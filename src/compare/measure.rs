@@ -121,6 +121,11 @@ pub(super) fn explained_by_ties(
     grid: &Gathered,
 ) -> bool {
     let edge = estimate.radius_squared;
+    // Their number is k or all but one, unless the bound of the radius cuts through the tie.
+    let cut = settings.max_radius.is_some_and(|r| are_tied(edge, r * r));
+    if !cut && grid.count != estimate.count {
+        return false;
+    }
     let near = map.search(point, settings.neighbors + MOST_TIED as u32, edge * (1.0 + 2.0 * TIE));
     let tied: Vec<u32> = near.iter().filter(|n| are_tied(n.0, edge)).map(|n| mix(n.1)).collect();
     let nearer = near.iter().take_while(|n| !are_tied(n.0, edge));
@@ -142,6 +147,67 @@ fn some_add_up(numbers: &[u32], count: u32, sum: u32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        layout::{PhotonFlux, PhotonPlace, octahedral},
+        reference::fingerprint,
+    };
+
+    const SETTINGS: fn() -> Settings = || Settings { neighbors: 2, ..Settings::default() };
+
+    /// Photons at these distances along x, all of them from above, and the origin to see them from.
+    fn line(distances: &[f32]) -> (KdMap, VisiblePoint) {
+        let place = |&x: &f32| PhotonPlace { position: [x, 0.0, 0.0], wi: octahedral(glam::Vec3::Y) };
+        let flux = PhotonFlux { flux: [1.0; 3], index: 0 };
+        let up = [0.0, 1.0, 0.0];
+        let point = VisiblePoint { valid: 1, ng: up, ns: up, weight: [1.0; 3], ..VisiblePoint::default() };
+        (KdMap::new(distances.iter().map(place).collect(), vec![flux; distances.len()], 1), point)
+    }
+
+    /// What is counted when the grid has summed these photons of a line, with the estimate's radiance times `factor`.
+    fn counted(distances: &[f32], summed: &[u32], factor: f32) -> Measure {
+        let (map, point) = line(distances);
+        let estimate = map.estimate(&point, &SETTINGS());
+        let gathered = Gathered {
+            radius_squared: estimate.radius_squared,
+            count: summed.len() as u32,
+            fingerprint: fingerprint(summed),
+        };
+        let [r, g, b] = estimate.radiance.map(|x| x as f32);
+        let answer = GridAnswer { gathered: vec![gathered], radiance: vec![[r, g * factor, b, 0.0]] };
+        let mut measure = Measure::default();
+        let explains = |_, gathered: &Gathered| explained_by_ties(&map, &point, &SETTINGS(), &estimate, gathered);
+        measure.add(&[point, VisiblePoint::default()], &answer, &[estimate, estimate], explains);
+        measure
+    }
+
+    /// 2 m, and so little more that their squares are tied.
+    const TIED: [f32; 3] = [2.0, 2.000_000_5, 2.000_000_2];
+
+    #[test]
+    fn ties_may_be_exchanged_and_nothing_else() {
+        let photons = [1.0, TIED[0], 3.0, TIED[1]];
+        for (summed, identical, different) in
+            [(&[0, 1][..], 1, 0), (&[0, 3], 0, 0), (&[1, 3], 0, 1), (&[0, 2], 0, 1), (&[0], 0, 1), (&[0, 1, 3], 0, 1)]
+        {
+            let m = counted(&photons, summed, 2.0);
+            assert_eq!((m.queries, m.tied, m.identical, m.different), (1, 1, identical, different), "{summed:?}");
+            assert_eq!(m.radiance.max, 0.0, "ties are left out of the differences");
+        }
+        // Several of one tie, of which the estimate takes two.
+        let m = counted(&[TIED[0], TIED[1], TIED[2]], &[1, 2], 1.0);
+        assert_eq!((m.tied, m.identical, m.different), (1, 0, 0));
+    }
+
+    #[test]
+    fn without_a_tie_the_sets_are_equal_and_differences_count() {
+        let photons = [1.0, 2.0, 3.0, 4.0];
+        let m = counted(&photons, &[0, 1], 1.0);
+        assert_eq!((m.queries, m.tied, m.identical, m.different), (1, 0, 1, 0));
+        assert!(m.radiance.max < 1e-7 && m.radius.max == 0.0);
+        let m = counted(&photons, &[0, 2], 1.01);
+        assert_eq!((m.identical, m.different), (0, 1));
+        assert!((m.radiance.max - 0.01 / 1.01).abs() < 1e-6 && (m.radiance.mean() - m.radiance.max).abs() < 1e-12);
+    }
 
     #[test]
     fn differences_are_relative_to_the_larger() {

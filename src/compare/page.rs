@@ -68,9 +68,9 @@ fn fill(values: &[(&str, &str)]) -> String {
 }
 
 fn subtitle(comparison: &Comparison, origin: &Origin) -> String {
-    let (settings, photons, device) = (origin.settings, &comparison.stats.photons, &comparison.report.device);
+    let (settings, photons) = (origin.settings, &comparison.stats.photons);
     format!(
-        "{}, {} mode, k = {}, {} + {} photons, {} x {} pixels, {} spp; {} ({}); Caustica {}",
+        "{}, {} mode, k = {}, {} + {} photons, {} x {} pixels, {} spp; Caustica {}",
         origin.scene,
         settings.mode.name(),
         settings.neighbors,
@@ -79,8 +79,6 @@ fn subtitle(comparison: &Comparison, origin: &Origin) -> String {
         comparison.grid.width,
         comparison.grid.height,
         settings.spp,
-        device.name,
-        device.driver,
         env!("CARGO_PKG_VERSION"),
     )
 }

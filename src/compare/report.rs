@@ -40,7 +40,7 @@ pub struct RelativeDifference {
 /// The grid on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GridSide {
-    /// Sorting the photons and building the grids, with compiling the kernels for that.
+    /// Sorting the photons and building the grids, once the kernels are compiled.
     pub build_seconds: f64,
     pub queries_per_second: f64,
     /// Photons and grids.
@@ -82,7 +82,7 @@ impl Report {
             radius: difference(&measure.radius),
             radiance: difference(&measure.radiance),
             grid: GridSide {
-                build_seconds: stats.seconds.grid,
+                build_seconds: grid.build_seconds,
                 queries_per_second: rate(grid.seconds),
                 bytes: grid.bytes(),
             },
@@ -103,6 +103,8 @@ impl Report {
             most => format!("at most {most:.2e}, mean {:.2e}", d.mean_relative_difference),
         };
         vec![
+            ("adapter", self.device.name.clone()),
+            ("driver", self.device.driver.clone()),
             ("queries", grouped(self.queries)),
             ("identical neighbours", format!("{} %", percent(self.neighbors.identical_fraction))),
             ("tied queries", grouped(self.neighbors.tied)),
@@ -119,7 +121,7 @@ impl Report {
         let mebibytes = |bytes: u64| format!("{:.2} MiB", bytes as f64 / f64::from(1 << 20));
         let threads = if t.threads == 1 { "1 CPU thread".to_string() } else { format!("{} CPU threads", t.threads) };
         vec![
-            row("runs on", self.device.name.clone(), threads),
+            row("runs on", "the adapter".to_string(), threads),
             row("build", format!("{:.3} s", g.build_seconds), format!("{:.3} s", t.build_seconds)),
             row("queries per second", rounded(g.queries_per_second), rounded(t.queries_per_second)),
             row("memory", mebibytes(g.bytes), mebibytes(t.bytes)),

@@ -3,8 +3,8 @@
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu},
-    layout::{Gathered, VisiblePoint},
-    passes::{Gather, GatherOptions, PhotonMap, Tile},
+    layout::{Gathered, Photon, VisiblePoint},
+    passes::{Gather, GatherOptions, MapKernels, PhotonMap, PhotonStore, Tile},
     progress::Progress,
     reference::{Estimate, KdMap},
     renderer::CameraPass,
@@ -22,6 +22,8 @@ pub(super) struct GridGather<'a> {
     /// Radiance by one map alone.
     radiance: Option<Buffer>,
     warm: bool,
+    /// Seconds that sorting the photons and building the grids take once the kernels are compiled.
+    pub build_seconds: f64,
     /// Seconds of all gathers, without reading back.
     pub seconds: f64,
 }
@@ -35,7 +37,7 @@ pub(super) struct GridAnswer {
 impl<'a> GridGather<'a> {
     pub fn new(gpu: &Gpu, maps: &'a [PhotonMap]) -> Result<Self> {
         let gather = Gather::new(gpu, GatherOptions { fingerprint: true, ..GatherOptions::default() });
-        Ok(Self { maps, gather, radiance: None, warm: false, seconds: 0.0 })
+        Ok(Self { maps, gather, radiance: None, warm: false, build_seconds: build_seconds(gpu, maps)?, seconds: 0.0 })
     }
 
     /// Gathers the tile that `pass` has traced.
@@ -85,6 +87,27 @@ impl<'a> GridGather<'a> {
         };
         self.maps.iter().map(of_map).sum()
     }
+}
+
+/// Builds the maps once more, of photons as they come from the tracer: drivers compile a kernel when it first runs, so the
+/// first time says little.
+fn build_seconds(gpu: &Gpu, maps: &[PhotonMap]) -> Result<f64> {
+    let kernels = MapKernels::new(gpu);
+    let mut seconds = 0.0;
+    for map in maps {
+        let (places, fluxes) = map.read(gpu)?;
+        let mut photons = vec![Photon::default(); places.len()];
+        for (place, flux) in places.iter().zip(&fluxes) {
+            let photon = Photon { position: place.position, wi: place.wi, flux: flux.flux, key: 0 };
+            photons[flux.index as usize] = photon;
+        }
+        let few = &photons[..photons.len().min(WARM_UP as usize)];
+        PhotonMap::build(gpu, &kernels, PhotonStore::with(gpu, few)?, few.len() as u32, map.emitted())?;
+        let store = PhotonStore::with(gpu, &photons)?;
+        gpu.wait()?;
+        timed(&mut seconds, || PhotonMap::build(gpu, &kernels, store, map.count(), map.emitted()))?;
+    }
+    Ok(seconds)
 }
 
 /// Gathers on the kd-tree.

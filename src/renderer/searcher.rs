@@ -12,14 +12,14 @@ use crate::{
 
 /// A search over the maps, ready to gather.
 pub(super) enum Searcher<'a> {
-    Grid(Gather),
+    Grid(Box<Gather>),
     KdTree(Vec<KdMap>, &'a Settings),
 }
 
 impl<'a> Searcher<'a> {
     pub fn new(gpu: &Gpu, maps: &PhotonMaps, settings: &'a Settings) -> Result<Self> {
         Ok(match settings.search {
-            Search::Grid => Self::Grid(Gather::new(gpu, GatherOptions::default())),
+            Search::Grid => Self::Grid(Box::new(Gather::new(gpu, GatherOptions::default()))),
             Search::KdTree => {
                 let trees = maps.maps.iter().map(|map| kd_map(gpu, map)).collect::<Result<_>>()?;
                 Self::KdTree(trees, settings)

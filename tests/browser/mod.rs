@@ -16,10 +16,11 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-const ARGUMENTS: [&str; 8] = [
+const ARGUMENTS: [&str; 9] = [
     "--headless",
     "--no-sandbox",
     "--disable-gpu",
+    "--disable-dev-shm-usage",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",
@@ -74,9 +75,12 @@ impl Browser {
         self.session = session["sessionId"].as_str().expect("a session has a name").to_string();
     }
 
-    /// Shows a file.
+    /// Shows a file; what was logged before is forgotten.
     pub fn show(&self, file: &Path) {
         let path = file.canonicalize().expect("the page is there");
+        self.command("POST", "/url", &json!({"url": "about:blank"}));
+        self.complaints();
+        self.outside_requests();
         self.command("POST", "/url", &json!({"url": format!("file://{}", path.display())}));
     }
 
@@ -115,16 +119,23 @@ impl Browser {
         serious.map(|e| e["message"].to_string()).collect()
     }
 
-    /// Addresses asked for since the last call that are neither files nor in the page itself.
+    /// Addresses asked for since the last call that are neither files nor in the page or the browser itself.
     pub fn outside_requests(&self) -> Vec<String> {
         let entries = self.command("POST", "/se/log", &json!({"type": "performance"}));
         let address = |entry: &Value| {
             let event: Value = serde_json::from_str(entry["message"].as_str()?).ok()?;
-            let sent = event["message"]["method"] == "Network.requestWillBeSent";
-            sent.then(|| event["message"]["params"]["request"]["url"].as_str().map(String::from))?
+            let (method, params) = (&event["message"]["method"], &event["message"]["params"]);
+            let address = match method.as_str()? {
+                "Network.requestWillBeSent" => &params["request"]["url"],
+                "Network.webSocketCreated" => &params["url"],
+                _ => return None,
+            };
+            address.as_str().map(String::from)
         };
         let addresses = entries.as_array().expect("a log is a list").iter().filter_map(address);
-        addresses.filter(|a| !["file:", "data:", "blob:"].iter().any(|inside| a.starts_with(inside))).collect()
+        addresses
+            .filter(|a| !["file:", "data:", "blob:", "about:", "chrome:"].iter().any(|inside| a.starts_with(inside)))
+            .collect()
     }
 
     fn command(&self, method: &str, path: &str, body: &Value) -> Value {
