@@ -32,9 +32,14 @@ pub fn write(plan: &Plan, results: &Results, folder: &Path) -> Result<Vec<PathBu
     put("contact-sheet.png", &sheet)?;
     let plots = plots(&plan.figures, &results.rows);
     for plot in &plots {
-        put(&format!("{}.svg", plot.stem), plot.svg.as_bytes())?;
+        put(&format!("{}.svg", plot.stem), on_paper(&plot.svg).as_bytes())?;
     }
     let page = page(plan, results, &plots).map_err(|e| other("report.html", e))?;
     put("report.html", page.as_bytes())?;
     Ok(written)
+}
+
+/// A plot that stands alone, on white: its ink is black wherever it is shown.
+fn on_paper(svg: &str) -> String {
+    svg.replacen('>', "><rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>", 1)
 }
