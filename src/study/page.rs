@@ -15,8 +15,11 @@ use super::{
 
 const TEMPLATE: &str = include_str!("page.html");
 
-/// Columns of the page's table: heading, and value in a row, as shown and as sorted.
-const COLUMNS: [(&str, fn(&Row) -> Value); 14] = [
+/// A column of the page's table: heading, and value in a row.
+type Column = (&'static str, fn(&Row) -> Value);
+
+/// The columns, in order.
+const COLUMNS: [Column; 14] = [
     ("scene", |r| Value::text(&r.scene)),
     ("mode", |r| Value::text(r.mode.name())),
     ("n", |r| Value { shown: short(r.photons), sorted: r.photons.to_string() }),
@@ -33,6 +36,7 @@ const COLUMNS: [(&str, fn(&Row) -> Value); 14] = [
     ("corners", |r| Value::number(r.corner_ratio)),
 ];
 
+/// A value as it is shown, and as it is sorted by.
 struct Value {
     shown: String,
     sorted: String,

@@ -62,7 +62,8 @@ mod tests {
 
     fn of(radii: &[f32], count: u32) -> Option<Radii> {
         let mut counts = Counts::default();
-        let points: Vec<_> = radii.iter().map(|r| Gathered { radius_squared: r * r, count }).collect();
+        let points: Vec<_> =
+            radii.iter().map(|r| Gathered { radius_squared: r * r, count, ..Gathered::default() }).collect();
         points.chunks(3).for_each(|part| counts.add(part));
         counts.finish()
     }

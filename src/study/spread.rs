@@ -41,8 +41,8 @@ pub(super) fn bias(frames: &[&Frame], reference: &Frame) -> Option<Bias> {
     let mut blocks = vec![(0.0, 0.0); columns * height.div_ceil(BLOCK)];
     for (i, right) in reference.radiance.iter().enumerate() {
         let block = &mut blocks[i / width / BLOCK * columns + i % width / BLOCK];
-        for c in 0..3 {
-            let difference = |frame: &&Frame| f64::from(frame.radiance[i][c]) - f64::from(right[c]);
+        for (c, right) in right.iter().enumerate() {
+            let difference = |frame: &&Frame| f64::from(frame.radiance[i][c]) - f64::from(*right);
             let sum: f64 = frames.iter().map(difference).sum();
             let squares: f64 = frames.iter().map(|frame| difference(frame).powi(2)).sum();
             // The mean of the products over all pairs.
