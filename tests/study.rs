@@ -206,4 +206,6 @@ fn combinations_are_planned_once() {
     assert_eq!((at, plan.combinations.len(), plan.combinations[0].repeats), (0, 4, 3));
     let at = plan.add(Combination { settings: Settings { seed: 9, ..known.settings.clone() }, ..known });
     assert_eq!((at, plan.combinations.len()), (4, 5));
+    // Without photons n and k make no difference.
+    assert_eq!(self::plan(Reference::None, &[Mode::DirectRays], 1).combinations.len(), 1);
 }

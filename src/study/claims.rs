@@ -82,7 +82,7 @@ impl Question {
             ),
             Self::CornersBright => (
                 "Corners come out too bright.",
-                "the pixels near open corners are brighter than the reference's on average, by more than 2 % at most",
+                "with the largest k of each n and mode the pixels near open corners are brighter than the reference's, somewhere by more than 1 %",
             ),
             Self::DirectAgrees => (
                 "Photons give the same direct light as shadow rays.",
@@ -94,7 +94,7 @@ impl Question {
             ),
             Self::ThreeLights => (
                 "Three lights give three times the light at the same cost.",
-                "three times the mean radiance within 5 %, in at most 1.25 times the total time",
+                "three times the mean radiance within a quarter (the picture sees light by where it hangs), in at most 1.25 times the total time",
             ),
         }
     }

@@ -5,6 +5,8 @@ use crate::settings::Mode;
 
 /// Part by which means may differ and still count as the same.
 const SAME_LIGHT: f64 = 0.05;
+/// The same for scenes whose lights hang in different places, of which the picture sees more or less.
+const ABOUT_THE_SAME_LIGHT: f64 = 0.25;
 /// Factor by which times may differ and still count as the same.
 const SAME_TIME: f64 = 1.25;
 
@@ -67,16 +69,21 @@ fn growth(groups: &[Vec<&Row>]) -> Option<(f64, f64)> {
     range(groups.iter().map(of)).filter(|(low, high)| low.is_finite() && high.is_finite())
 }
 
+/// One factor, or the smallest and the largest.
+fn factors((low, high): (f64, f64)) -> String {
+    let (low, high) = (brief(low), brief(high));
+    if low == high { low } else { format!("{low} to {high}") }
+}
+
 pub(super) fn time_with_neighbors(rows: &[&Row]) -> Finding {
     let groups = over_k(rows);
     let (low, high) = growth(&groups)?;
     let (first, last) = ends(&groups[0]);
     let text = format!(
-        "from k = {} to k = {} the gather's time grows by a factor of {} to {}",
+        "from k = {} to k = {} the gather's time grows by a factor of {}",
         first.neighbors,
         last.neighbors,
-        brief(low),
-        brief(high)
+        factors((low, high))
     );
     Some((text, low > 1.0))
 }
@@ -88,11 +95,10 @@ pub(super) fn time_with_photons(rows: &[&Row]) -> Finding {
     let logarithm = |row: &Row| f64::from(row.photons).ln().max(1.0);
     let allowed = logarithm(last) / logarithm(first);
     let text = format!(
-        "from n = {} to n = {} the gather's time grows by a factor of {} to {}; the logarithm by {}, n itself by {}",
+        "from n = {} to n = {} the gather's time grows by a factor of {}; the logarithm by {}, n itself by {}",
         short(first.photons),
         short(last.photons),
-        brief(low),
-        brief(high),
+        factors((low, high)),
         brief(allowed),
         brief(f64::from(last.photons) / f64::from(first.photons))
     );
@@ -140,19 +146,18 @@ pub(super) fn noise_for_bias(rows: &[&Row]) -> Finding {
 }
 
 pub(super) fn corners_bright(rows: &[&Row]) -> Finding {
-    let known: Vec<(&Row, f64)> = rows.iter().filter_map(|row| Some((*row, row.corner_ratio?))).collect();
-    let (worst, high) = known.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let (low, _) = range(known.iter().map(|(_, ratio)| *ratio))?;
-    let mean = known.iter().map(|(_, ratio)| ratio).sum::<f64>() / known.len() as f64;
+    let (low, high) = range(rows.iter().filter_map(|row| row.corner_ratio))?;
     let percent = |ratio: f64| format!("{:+.1} %", 100.0 * (ratio - 1.0));
-    let text = format!(
-        "{} to {} against the reference, {} on average; most at {}",
-        percent(low),
-        percent(high),
-        percent(mean),
-        worst.name()
-    );
-    Some((text, mean > 1.0 && high > 1.02))
+    // The largest k of each n has the least noise.
+    let smooth: Vec<(&Row, f64)> =
+        over_k(rows).iter().filter_map(|group| Some((ends(group).1, ends(group).1.corner_ratio?))).collect();
+    let most = smooth.iter().map(|(_, ratio)| *ratio).fold(0.0, f64::max);
+    let line = |(row, ratio): &(&Row, f64)| {
+        format!("{} with {}, n = {}, k = {}", percent(*ratio), row.mode.name(), short(row.photons), row.neighbors)
+    };
+    let list = smooth.iter().map(line).collect::<Vec<_>>().join(", ");
+    let text = format!("{list}; over all pictures {} to {}", percent(low), percent(high));
+    (!smooth.is_empty()).then(|| (text, most > 1.01 && smooth.iter().all(|(_, ratio)| *ratio > 1.0)))
 }
 
 /// Direct light by photons over that by rays, for each scene; `true` where there are caustics as well.
@@ -187,6 +192,6 @@ pub(super) fn three_lights(rows: &[&Row]) -> Finding {
     let (one, three) = ends(if rows.len() > 1 { rows } else { return None });
     let (light, time) = (three.mean() / one.mean(), three.seconds.total / one.seconds.total);
     let text = format!("{} times the light in {} times the time", brief(light), brief(time));
-    let holds = (light / 3.0 - 1.0).abs() <= SAME_LIGHT && time <= SAME_TIME;
+    let holds = (light / 3.0 - 1.0).abs() <= ABOUT_THE_SAME_LIGHT && time <= SAME_TIME;
     (light.is_finite() && time.is_finite()).then_some((text, holds))
 }

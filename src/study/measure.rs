@@ -28,7 +28,7 @@ pub struct Row {
     /// File name.
     pub scene: String,
     pub mode: Mode,
-    /// Photons that each map can hold.
+    /// Photons that each map can hold; means nothing, as `neighbors`, where the mode traces none.
     pub photons: u32,
     pub neighbors: u32,
     /// Seed of the first repeat.

@@ -22,8 +22,8 @@ type Column = (&'static str, fn(&Row) -> Value);
 const COLUMNS: [Column; 14] = [
     ("scene", |r| Value::text(&r.scene)),
     ("mode", |r| Value::text(r.mode.name())),
-    ("n", |r| Value { shown: short(r.photons), sorted: r.photons.to_string() }),
-    ("k", |r| Value::text(&r.neighbors.to_string())),
+    ("n", |r| Value::of_photons(r, short(r.photons), r.photons)),
+    ("k", |r| Value::of_photons(r, r.neighbors.to_string(), r.neighbors)),
     ("gather", |r| Value::number(Some(r.seconds.gather).filter(|_| r.error.is_none()))),
     ("total", |r| Value::number(Some(r.seconds.total).filter(|_| r.error.is_none()))),
     ("stored", |r| Value::text(&r.global.stored.to_string())),
@@ -45,6 +45,11 @@ struct Value {
 impl Value {
     fn text(text: &str) -> Self {
         Self { shown: text.to_string(), sorted: text.to_string() }
+    }
+
+    /// Empty where no photons are traced.
+    fn of_photons(row: &Row, shown: String, sorted: u32) -> Self {
+        if row.mode.traces_photons() { Self { shown, sorted: sorted.to_string() } } else { Self::text("") }
     }
 
     fn number(x: Option<f64>) -> Self {

@@ -106,8 +106,13 @@ pub struct Look {
 }
 
 impl Plan {
-    /// Adds a combination, or finds it; the larger number of repeats stays.
-    pub fn add(&mut self, new: Combination) -> usize {
+    /// Adds a combination, or finds it; the larger number of repeats stays. Where no photons are traced, n and k make no
+    /// difference and are the defaults.
+    pub fn add(&mut self, mut new: Combination) -> usize {
+        if !new.settings.mode.traces_photons() {
+            let Settings { global_photons, caustic_photons, neighbors, .. } = Settings::default();
+            new.settings = Settings { global_photons, caustic_photons, neighbors, ..new.settings };
+        }
         let same = |old: &Combination| old.subject == new.subject && old.settings == new.settings;
         if let Some(at) = self.combinations.iter().position(same) {
             let old = &mut self.combinations[at];

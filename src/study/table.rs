@@ -12,8 +12,8 @@ type Column = (&'static str, fn(&Row) -> String);
 pub(super) const COLUMNS: [Column; 38] = [
     ("scene", |r| r.scene.clone()),
     ("mode", |r| r.mode.name().to_string()),
-    ("photons", |r| r.photons.to_string()),
-    ("neighbors", |r| r.neighbors.to_string()),
+    ("photons", |r| of_photons(r, r.photons)),
+    ("neighbors", |r| of_photons(r, r.neighbors)),
     ("seed", |r| r.seed.to_string()),
     ("repeats", |r| r.repeats.to_string()),
     ("width", |r| r.width.to_string()),
@@ -49,6 +49,11 @@ pub(super) const COLUMNS: [Column; 38] = [
     ("ok", |r| r.error.is_none().to_string()),
     ("error", |r| r.error.clone().unwrap_or_default()),
 ];
+
+/// Empty where no photons are traced.
+fn of_photons(row: &Row, value: u32) -> String {
+    if row.mode.traces_photons() { value.to_string() } else { String::new() }
+}
 
 /// All digits that count, without an exponent that a spreadsheet may not read.
 fn number(x: f64) -> String {
