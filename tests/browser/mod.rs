@@ -5,7 +5,7 @@
 
 use std::{
     env,
-    io::{BufRead, BufReader, Read, Write},
+    io::{self, BufRead, BufReader, Read, Write},
     net::TcpStream,
     path::Path,
     process::{Child, Command, Stdio},
@@ -33,7 +33,9 @@ pub struct Browser {
     driver: Child,
     port: u16,
     session: String,
-    _profile: TempDir,
+    /// The browser's own process.
+    process: String,
+    profile: TempDir,
 }
 
 impl Browser {
@@ -57,14 +59,14 @@ impl Browser {
             })
             .expect("chromedriver tells its port");
         let profile = tempfile::tempdir().expect("a temporary folder");
-        let mut browser = Self { driver, port, session: String::new(), _profile: profile };
+        let mut browser = Self { driver, port, session: String::new(), process: String::new(), profile };
         browser.start(width, height);
         Some(browser)
     }
 
     fn start(&mut self, width: u32, height: u32) {
         let mut arguments: Vec<String> = ARGUMENTS.map(String::from).to_vec();
-        arguments.push(format!("--user-data-dir={}", self._profile.path().display()));
+        arguments.push(format!("--user-data-dir={}", self.profile.path().display()));
         arguments.push(format!("--window-size={width},{height}"));
         let capabilities = json!({"capabilities": {"alwaysMatch": {
             "browserName": "chrome",
@@ -73,6 +75,7 @@ impl Browser {
         }}});
         let session = self.call("POST", "/session", &capabilities);
         self.session = session["sessionId"].as_str().expect("a session has a name").to_string();
+        self.process = session["capabilities"]["goog:processID"].to_string();
     }
 
     /// Shows a file; what was logged before is forgotten.
@@ -144,13 +147,7 @@ impl Browser {
 
     /// One request to chromedriver; the `value` of its answer.
     fn call(&self, method: &str, path: &str, body: &Value) -> Value {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("chromedriver listens");
-        stream.set_read_timeout(Some(Duration::from_secs(120))).expect("a timeout can be set");
-        let body = if body.is_null() { String::new() } else { body.to_string() };
-        let length = body.len();
-        write!(stream, "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {length}\r\n\r\n{body}")
-            .expect("chromedriver reads");
-        let mut reader = BufReader::new(stream);
+        let mut reader = BufReader::new(self.send(method, path, body).expect("chromedriver listens"));
         let mut length = 0;
         loop {
             let mut line = String::new();
@@ -169,12 +166,27 @@ impl Browser {
         assert!(value.get("error").is_none_or(Value::is_null), "{method} {path}: {}", value["message"]);
         value
     }
+
+    /// Sends a request; where its answer will come.
+    fn send(&self, method: &str, path: &str, body: &Value) -> io::Result<TcpStream> {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
+        stream.set_read_timeout(Some(Duration::from_secs(120)))?;
+        let body = if body.is_null() { String::new() } else { body.to_string() };
+        let length = body.len();
+        write!(stream, "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {length}\r\n\r\n{body}")?;
+        Ok(stream)
+    }
 }
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        if !self.session.is_empty() && !std::thread::panicking() {
-            self.command("DELETE", "", &Value::Null);
+        // Also after a failed test; a browser that does not end by itself is ended.
+        let ended = self.send("DELETE", &format!("/session/{}", self.session), &Value::Null).and_then(|mut answer| {
+            answer.set_read_timeout(Some(Duration::from_secs(10)))?;
+            answer.read(&mut [0; 1])
+        });
+        if ended.is_err() && !self.process.is_empty() {
+            let _ = Command::new("kill").args(["-KILL", &self.process]).status();
         }
         let _ = self.driver.kill();
         let _ = self.driver.wait();
