@@ -7,7 +7,7 @@
 //! photons and samples, which [`settings::Mode`] of illumination, and the seed that decides all randomness. Out comes
 //! an [`image::Frame`] of scene-linear radiance, depth, normal and albedo, which [`image`] writes as OpenEXR or PNG, and
 //! [`stats::Stats`] of what happened. [`renderer::Session`] makes several pictures of the same photons, and
-//! [`compare::compare`] holds the search on the device against a kd-tree on the CPU. [`study::run`] renders and measures
+//! [`compare::compare`] holds the search on the device against a kd-tree on the CPU. [`fn@study::run`] renders and measures
 //! many combinations of settings. A [`progress::Progress`] listens meanwhile and can stop the work.
 //!
 //! ```no_run

@@ -102,7 +102,7 @@ fn the_preset_answers_every_claim_and_its_page_sorts() {
         let values = browser.run(&script);
         let values = values.as_array().expect("a list").iter();
         // Cells without a value are left out.
-        values.map(|v| v.as_str().and_then(|v| v.parse().ok())).flatten().collect::<Vec<f64>>()
+        values.filter_map(|v| v.as_str()?.parse().ok()).collect::<Vec<f64>>()
     };
     let rises = |values: &[f64]| values.windows(2).all(|w| w[0] <= w[1]);
     const NEIGHBORS: u32 = 4;

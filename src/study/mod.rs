@@ -1,9 +1,9 @@
 //! Photons against neighbours: renders many combinations of settings, measures each, and reports them together.
 //!
 //! A [`Plan`] lists [`Combination`]s of a scene and settings, and [`Figure`]s that arrange them in rows and columns and
-//! put [`Question`]s to them. [`run`] makes one render a combination and repeat, a cell, with photons traced once for
+//! put [`Question`]s to them. [`fn@run`] makes one render a combination and repeat, a cell, with photons traced once for
 //! all cells that share them. Finished cells are kept in the folder under a hash of all that decides them, so that an
-//! interrupted study goes on where it stopped. Out come [`Results`]: a [`Row`] a combination, and answers. [`write`]
+//! interrupted study goes on where it stopped. Out come [`Results`]: a [`Row`] a combination, and answers. [`fn@write`]
 //! makes tables, a contact sheet, plots and a page of them.
 
 mod cells;

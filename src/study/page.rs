@@ -88,20 +88,27 @@ fn fill(parts: &[(&str, String)]) -> String {
 }
 
 fn summary(plan: &Plan, results: &Results) -> String {
-    let combinations = results.rows.len();
     let references = match results.references.as_slice() {
         [] => "none".to_string(),
         lines => lines.iter().map(|line| escape(line)).collect::<Vec<_>>().join("; "),
     };
     let size = results.rows.iter().find(|row| row.width > 0);
-    let size = size.map(|r| format!(", {} x {} pixels, {} samples each", r.width, r.height, r.spp)).unwrap_or_default();
+    let size = size
+        .map(|r| format!(", {} x {} pixels, {} a pixel", r.width, r.height, counted(r.spp as usize, "sample")))
+        .unwrap_or_default();
     format!(
-        "{combinations} combinations in {} figures{size}. {} ({}). Caustica {}. References: {references}.",
-        plan.figures.len(),
+        "{} in {}{size}. {} ({}). Caustica {}. References: {references}.",
+        counted(results.rows.len(), "combination"),
+        counted(plan.figures.len(), "figure"),
         escape(&results.device.name),
         escape(&results.device.driver),
         env!("CARGO_PKG_VERSION"),
     )
+}
+
+/// "1 figure", "2 figures".
+fn counted(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }
 
 fn show_figure(figure: &Figure, results: &Results) -> io::Result<String> {
