@@ -35,6 +35,9 @@ pub enum Error {
     /// What should be equal is not.
     #[error("{0}")]
     Differs(String),
+    /// Part of the work failed; the rest was done.
+    #[error("{0}")]
+    Incomplete(String),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,

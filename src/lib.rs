@@ -7,8 +7,8 @@
 //! photons and samples, which [`settings::Mode`] of illumination, and the seed that decides all randomness. Out comes
 //! an [`image::Frame`] of scene-linear radiance, depth, normal and albedo, which [`image`] writes as OpenEXR or PNG, and
 //! [`stats::Stats`] of what happened. [`renderer::Session`] makes several pictures of the same photons, and
-//! [`compare::compare`] holds the search on the device against a kd-tree on the CPU. A [`progress::Progress`] listens
-//! meanwhile and can stop the work.
+//! [`compare::compare`] holds the search on the device against a kd-tree on the CPU. [`fn@study::run`] renders and measures
+//! many combinations of settings. A [`progress::Progress`] listens meanwhile and can stop the work.
 //!
 //! ```no_run
 //! use std::path::Path;
@@ -54,5 +54,6 @@ pub mod renderer;
 pub mod scene;
 pub mod settings;
 pub mod stats;
+pub mod study;
 
 pub use error::{Error, Result};

@@ -166,7 +166,7 @@ impl<'a> Session<'a> {
 }
 
 /// The asked size, or the default height at the camera's aspect.
-fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32, u32)> {
+pub(crate) fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32, u32)> {
     let (width, height) = settings.size.unwrap_or_else(|| {
         let width = (DEFAULT_HEIGHT as f32 * camera.aspect.unwrap_or(1.0)).round();
         ((width as u32).max(1), DEFAULT_HEIGHT)

@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Seconds by stage.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
     pub load: f64,
     pub bvh: f64,
@@ -18,7 +18,7 @@ pub struct Seconds {
 }
 
 /// One photon map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MapStats {
     /// Paths that the map is normalised by.
     pub emitted: u64,
@@ -27,7 +27,7 @@ pub struct MapStats {
 }
 
 /// Both maps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PhotonStats {
     pub global: MapStats,
     pub caustic: MapStats,
@@ -36,14 +36,14 @@ pub struct PhotonStats {
 }
 
 /// Adapter and driver.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DeviceStats {
     pub name: String,
     pub driver: String,
 }
 
 /// Everything that one render reports.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stats {
     pub device: DeviceStats,
     pub seconds: Seconds,

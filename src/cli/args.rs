@@ -10,6 +10,7 @@ use clap::{
 
 use super::{
     options::{RenderOptions, SearchArg},
+    study_args::StudyArgs,
     values::{output, tolerance},
 };
 
@@ -30,6 +31,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Gather every visible point on the grid and on a kd-tree, and show how they differ
     Compare(Box<CompareArgs>),
+    /// Render many combinations of photons and neighbours, measure them and report them together
+    Study(Box<StudyArgs>),
     /// List the adapters: name, driver, kind, limits, usable or why not
     Devices,
     /// Say what a scene holds and how it will be read

@@ -17,16 +17,16 @@ use super::{args::CompareArgs, progress::Display, render::log_library, say::prin
 pub fn run(args: &CompareArgs) -> Result<()> {
     let started = Instant::now();
     let options = &args.options;
-    if options.verbose {
+    if options.shared.verbose {
         log_library();
     }
-    let display = Display::new(options.quiet, options.verbose);
+    let display = Display::new(options.shared.quiet, options.shared.verbose);
     display.report(Stage::Load, 0, 0);
     let scene = Scene::load(&args.scene)?;
     display.check()?;
     prepare(args)?;
     let settings = options.settings();
-    let gpu = Gpu::open(options.device.as_deref())?;
+    let gpu = Gpu::open(options.shared.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
     let asked = Options { tolerance: args.tolerance, sabotage: args.sabotage };
     let result = compare(&gpu, &scene, &settings, &asked, &display);
@@ -38,9 +38,9 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let stats = &comparison.stats;
     let origin = Origin { scene: &scene.file_name, scene_hash: &scene.hash, settings: &settings, stats };
     display.check()?;
-    comparison.write(&args.output, &origin, options.exposure, options.tonemap.into())?;
+    comparison.write(&args.output, &origin, options.shared.exposure, options.shared.tonemap.into())?;
     display.note(&format!("wrote {} in {:.1} s", args.output.display(), started.elapsed().as_secs_f64()));
-    if !options.quiet {
+    if !options.shared.quiet {
         print(&comparison.report.table());
     }
     comparison.verdict()

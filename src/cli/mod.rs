@@ -9,6 +9,9 @@ mod progress;
 mod render;
 mod say;
 mod signals;
+mod study;
+mod study_args;
+mod study_progress;
 mod values;
 
 use std::process::ExitCode;
@@ -38,6 +41,7 @@ fn work(command: Command) -> Result<()> {
     match command {
         Command::Render(args) => render::render(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Study(args) => study::run(&args),
         Command::Devices => devices::devices(),
         Command::Info { scene } => info::info(&scene),
     }

@@ -8,20 +8,12 @@ use clap::ValueEnum;
 
 use super::values::{cone_constant, count, exposure, photons, radius, size};
 
-/// What is rendered, how, and what is said of it meanwhile.
+/// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
 pub struct RenderOptions {
     /// Which light reaches the picture and how, by name or number
     #[arg(long, value_enum, default_value = "hybrid", help_heading = "Light")]
     pub mode: ModeArg,
-
-    /// How photon paths are dealt to lights
-    #[arg(long, value_name = "HOW", value_enum, default_value = "power", help_heading = "Light")]
-    pub light_sampling: LightSamplingArg,
-
-    /// How the file's light intensities are read
-    #[arg(long, value_name = "UNIT", value_enum, default_value = "radiometric", help_heading = "Light")]
-    pub light_unit: LightUnitArg,
 
     /// Photons that each map can hold, as 100000, 200k or 1.5M [default: 100k]
     #[arg(long, value_name = "N", value_parser = photons, help_heading = "Photons")]
@@ -35,6 +27,26 @@ pub struct RenderOptions {
     #[arg(long, value_name = "N", value_parser = photons, help_heading = "Photons")]
     pub caustic_photons: Option<u32>,
 
+    /// Neighbours in the radiance estimate, 1 to 1000
+    #[arg(short = 'k', long, value_name = "K", default_value_t = 100, help_heading = "Estimate")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub neighbors: u32,
+
+    #[command(flatten)]
+    pub shared: SharedOptions,
+}
+
+/// Options of all work on a scene that makes pictures: what is rendered, how, and what is said of it meanwhile.
+#[derive(Debug, clap::Args)]
+pub struct SharedOptions {
+    /// How photon paths are dealt to lights
+    #[arg(long, value_name = "HOW", value_enum, default_value = "power", help_heading = "Light")]
+    pub light_sampling: LightSamplingArg,
+
+    /// How the file's light intensities are read
+    #[arg(long, value_name = "UNIT", value_enum, default_value = "radiometric", help_heading = "Light")]
+    pub light_unit: LightUnitArg,
+
     /// Photon paths emitted at most [default: 100 times the capacity]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
     pub max_paths: Option<u64>,
@@ -45,11 +57,6 @@ pub struct RenderOptions {
     #[arg(value_parser = clap::value_parser!(u32).range(0..=65535))]
     pub max_bounces: u32,
 
-    /// Neighbours in the radiance estimate, 1 to 1000
-    #[arg(short = 'k', long, value_name = "K", default_value_t = 100, help_heading = "Estimate")]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub neighbors: u32,
-
     /// Constant of the cone filter, at least 1
     #[arg(long, value_name = "C", default_value_t = 2.0, value_parser = cone_constant, help_heading = "Estimate")]
     pub cone_constant: f32,
@@ -58,10 +65,9 @@ pub struct RenderOptions {
     #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
     pub max_radius: Option<f32>,
 
-    /// Jittered camera samples per pixel, averaged over the pixel's square; 1 is the pixel's centre
-    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Picture")]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
-    pub spp: u32,
+    /// Jittered camera samples per pixel, averaged over the pixel's square; 1 is the pixel's centre [default: 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
+    pub spp: Option<u32>,
 
     /// Size in pixels; the vertical angle of view stays [default: 512 high, as wide as the camera says or square]
     #[arg(long, value_name = "WxH", value_parser = size, help_heading = "Picture")]
@@ -101,18 +107,28 @@ pub struct RenderOptions {
 impl RenderOptions {
     /// The library's settings that these arguments ask for.
     pub fn settings(&self) -> Settings {
-        let defaults = Settings::default();
+        let settings = self.shared.settings();
         let capacity = |specific: Option<u32>, default| specific.or(self.photons).unwrap_or(default);
         Settings {
             mode: self.mode.into(),
-            global_photons: capacity(self.global_photons, defaults.global_photons),
-            caustic_photons: capacity(self.caustic_photons, defaults.caustic_photons),
-            max_paths: self.max_paths,
+            global_photons: capacity(self.global_photons, settings.global_photons),
+            caustic_photons: capacity(self.caustic_photons, settings.caustic_photons),
             neighbors: self.neighbors,
+            ..settings
+        }
+    }
+}
+
+impl SharedOptions {
+    /// The library's settings that these arguments ask for; mode, photons and neighbours are the defaults.
+    pub fn settings(&self) -> Settings {
+        let defaults = Settings::default();
+        Settings {
+            max_paths: self.max_paths,
             cone_constant: self.cone_constant,
             max_radius: self.max_radius,
             max_bounces: self.max_bounces,
-            spp: self.spp,
+            spp: self.spp.unwrap_or(defaults.spp),
             size: self.size,
             camera: self.camera.clone(),
             seed: self.seed,

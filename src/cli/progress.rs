@@ -46,6 +46,21 @@ impl Display {
         }
     }
 
+    /// A study's state in a line; on a terminal a bar shows it all the time, elsewhere it is a line when it is `new`.
+    pub fn study(&self, line: &str, done: f64, new: bool) {
+        match &self.0 {
+            Target::Nowhere => {}
+            Target::Lines(_) if new => say(line),
+            Target::Lines(_) => {}
+            Target::Bar(bar, _) => {
+                bar.set_style(study_style());
+                bar.set_length(1000);
+                bar.set_position((1000.0 * done) as u64);
+                bar.set_message(line.to_string());
+            }
+        }
+    }
+
     /// Takes the bar away.
     pub fn finish(&self) {
         if let Target::Bar(bar, _) = &self.0 {
@@ -126,6 +141,10 @@ fn style(stage: Stage) -> ProgressStyle {
         None => "{msg}".to_string(),
     };
     ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+fn study_style() -> ProgressStyle {
+    ProgressStyle::with_template("{bar:24} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 #[cfg(test)]

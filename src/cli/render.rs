@@ -23,10 +23,10 @@ use super::{args::RenderArgs, progress::Display, values::extension};
 pub fn render(args: &RenderArgs) -> Result<()> {
     let started = Instant::now();
     let options = &args.options;
-    if options.verbose {
+    if options.shared.verbose {
         log_library();
     }
-    let display = Display::new(options.quiet, options.verbose);
+    let display = Display::new(options.shared.quiet, options.shared.verbose);
     check_files(args)?;
     let settings = args.settings();
 
@@ -39,7 +39,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
         display.note(&format!("warning: {warning}"));
     }
 
-    let gpu = Gpu::open(options.device.as_deref())?;
+    let gpu = Gpu::open(options.shared.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
     let result = renderer::render(&gpu, &scene, &settings, &display);
     display.finish();
@@ -59,7 +59,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     }
     stats.seconds.load = load_seconds;
     stats.seconds.total = started.elapsed().as_secs_f64();
-    if options.verbose {
+    if options.shared.verbose {
         display.note(&summary(&stats));
     }
     args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats))
@@ -91,7 +91,7 @@ fn identity(path: &Path) -> PathBuf {
 
 fn write_picture(path: &Path, frame: &Frame, origin: &Origin, args: &RenderArgs) -> Result<()> {
     match extension(path).as_str() {
-        "png" => write_png(path, frame, args.options.exposure, args.options.tonemap.into()),
+        "png" => write_png(path, frame, args.options.shared.exposure, args.options.shared.tonemap.into()),
         _ => write_exr(path, frame, origin),
     }
 }

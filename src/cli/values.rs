@@ -54,6 +54,11 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "a relative difference of at least 0, as 1e-4".to_string())
 }
 
+/// A factor above 0.
+pub fn scale(text: &str) -> Result<f64, String> {
+    number(text).filter(|s| *s > 0.0).map(f64::from).ok_or_else(|| "a number above 0".to_string())
+}
+
 /// Stops of exposure.
 pub fn exposure(text: &str) -> Result<f32, String> {
     number(text).filter(|e| e.abs() <= 100.0).ok_or_else(|| "a number of stops, -100 to 100".to_string())

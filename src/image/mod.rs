@@ -4,6 +4,7 @@ mod canvas;
 pub mod difference;
 mod exr;
 mod file;
+pub mod flip;
 mod png;
 mod tonemap;
 

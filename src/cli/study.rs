@@ -1,0 +1,123 @@
+//! `caustica study`.
+
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    sync::Mutex,
+    time::Instant,
+};
+
+use caustica::{
+    Error, Result,
+    gpu::Gpu,
+    image::{check_output, read_exr},
+    scene::Scene,
+    settings::{Mode, Settings},
+    study::{self, Finer, Look, Plan, Reference, Results, Subject},
+};
+
+use super::{
+    progress::Display,
+    render::log_library,
+    say::print,
+    study_args::{PresetArg, ReferenceArg, StudyArgs},
+    study_progress::StudyDisplay,
+};
+
+/// Folder of the project's scenes.
+const SCENES: &str = "scenes";
+/// Pictures of the preset, unless asked for otherwise: all of it should take minutes on software Vulkan.
+const PRESET_SIZE: (u32, u32) = (256, 256);
+const PRESET_SPP: u32 = 1;
+/// Renders per combination of the preset's plane: noise needs two.
+const PRESET_REPEATS: u32 = 2;
+
+/// Runs the study, writes its files and says what failed.
+pub fn run(args: &StudyArgs) -> Result<()> {
+    let started = Instant::now();
+    let options = &args.options;
+    if options.verbose {
+        log_library();
+    }
+    let display = Display::new(options.quiet, options.verbose);
+    let plan = plan(args)?;
+    plan.check()?;
+    for warning in plan.subjects.iter().flat_map(|s| &s.scene.warnings).collect::<BTreeSet<_>>() {
+        display.note(&format!("warning: {warning}"));
+    }
+    prepare(&args.output)?;
+    let gpu = Gpu::open(options.device.as_deref())?;
+    display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
+    let watch = StudyDisplay { display: &display, told: Mutex::default() };
+    let result = study::run(&gpu, &plan, &args.output, &watch);
+    display.finish();
+    let results = result?;
+    for reference in &results.references {
+        display.note(&format!("reference: {reference}"));
+    }
+    for failure in &results.failures {
+        display.note(&format!("failed: {failure}"));
+    }
+    let written = study::write(&plan, &results, &args.output)?;
+    display.note(&format!(
+        "{} cells rendered, {} kept from before, {} files in {} after {:.1} s",
+        results.rendered,
+        results.kept,
+        written.len(),
+        args.output.display(),
+        started.elapsed().as_secs_f64()
+    ));
+    if !options.quiet {
+        print(&study::summary(&plan, &results));
+    }
+    verdict(&results, &args.output)
+}
+
+fn verdict(results: &Results, folder: &Path) -> Result<()> {
+    match results.failures.as_slice() {
+        [] => Ok(()),
+        [first, ..] => Err(Error::Incomplete(format!(
+            "{} of {} cells failed, the first: {first}; {} has the others",
+            results.failures.len(),
+            results.failures.len() + results.rendered + results.kept,
+            folder.join("study.csv").display()
+        ))),
+    }
+}
+
+fn plan(args: &StudyArgs) -> Result<Plan> {
+    let options = &args.options;
+    let look = Look { exposure: options.exposure, tonemap: options.tonemap.into() };
+    let settings = options.settings();
+    if args.preset == Some(PresetArg::Report) {
+        let folder = args.scene.clone().unwrap_or_else(|| PathBuf::from(SCENES));
+        let size = Some(options.size.unwrap_or(PRESET_SIZE));
+        let settings = Settings { size, spp: options.spp.unwrap_or(PRESET_SPP), ..settings };
+        return study::report(&folder, &settings, args.repeat.unwrap_or(PRESET_REPEATS), args.preset_scale, look);
+    }
+    // clap has seen to it that all three are there.
+    let scene = Scene::load(args.scene.as_deref().unwrap_or(Path::new("")))?;
+    let modes: Vec<Mode> = args.modes.iter().map(|&mode| mode.into()).collect();
+    let most = args.photons.iter().copied().max().unwrap_or(1);
+    let (reference, size) = match &args.reference {
+        None => (Reference::None, options.size),
+        Some(ReferenceArg::Auto) => (Reference::Finer(Finer::than(most, settings.spp)), options.size),
+        Some(ReferenceArg::File(path)) => {
+            let frame = read_exr(path)?;
+            let size = options.size.unwrap_or((frame.width, frame.height));
+            (Reference::Picture { name: path.display().to_string(), frame: Box::new(frame) }, Some(size))
+        }
+    };
+    let settings = Settings { size, ..settings };
+    let subject = Subject { scene, reference };
+    let repeats = args.repeat.unwrap_or(1);
+    Ok(study::grid(subject, &settings, &modes, &args.photons, &args.neighbors, repeats, look))
+}
+
+/// Makes the folder and finds out before the work that files can be written there.
+fn prepare(folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_path_buf(), source })?;
+    ["study.csv", "study.json", "contact-sheet.png", "report.html"]
+        .iter()
+        .try_for_each(|name| check_output(&folder.join(name)))
+}

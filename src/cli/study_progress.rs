@@ -1,0 +1,65 @@
+//! How far a study is: each cell is told once, with the time left.
+
+use std::sync::{Mutex, PoisonError};
+
+use caustica::study::{State, Watch};
+
+use super::{progress::Display, signals};
+
+/// Shows a study to the user and hands signals on to it.
+#[derive(Debug)]
+pub struct StudyDisplay<'a> {
+    pub display: &'a Display,
+    /// Number of the cell that was told last.
+    pub told: Mutex<usize>,
+}
+
+impl Watch for StudyDisplay<'_> {
+    fn report(&self, state: &State) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let new = state.number != *told;
+        *told = state.number;
+        self.display.study(&line(state), state.done, new);
+    }
+
+    fn stop_requested(&self) -> bool {
+        signals::stop_requested()
+    }
+}
+
+fn line(state: &State) -> String {
+    let kept = if state.kept > 0 { format!(", {} kept", state.kept) } else { String::new() };
+    let left = state.seconds_left.map(|s| format!(", {} left", duration(s))).unwrap_or_default();
+    format!("study: {:.0} %{left}; cell {} of {}{kept}: {}", 100.0 * state.done, state.number, state.total, state.cell)
+}
+
+/// About that long: `40 s`, `12 min`, `3 h 20 min`.
+fn duration(seconds: f64) -> String {
+    let minutes = (seconds / 60.0).round() as u64;
+    match seconds {
+        s if s < 90.0 => format!("{s:.0} s"),
+        _ if minutes < 60 => format!("{minutes} min"),
+        _ => format!("{} h {} min", minutes / 60, minutes % 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_tells_the_cell_and_the_time_left() {
+        let mut state = State {
+            cell: "a.gltf, hybrid".to_string(),
+            number: 3,
+            total: 8,
+            kept: 0,
+            done: 0.251,
+            seconds_left: Some(75.2),
+        };
+        assert_eq!(line(&state), "study: 25 %, 75 s left; cell 3 of 8: a.gltf, hybrid");
+        (state.kept, state.seconds_left) = (2, None);
+        assert_eq!(line(&state), "study: 25 %; cell 3 of 8, 2 kept: a.gltf, hybrid");
+        assert_eq!([91.0, 3500.0, 12_000.0].map(duration), ["2 min", "58 min", "3 h 20 min"]);
+    }
+}

@@ -1,0 +1,129 @@
+//! Where two surfaces meet in a corner that is open to the viewer: there the nearest photons lie on both, and an
+//! estimate that takes them for one plane is too bright.
+
+use glam::Vec3;
+
+use crate::{image::Frame, scene::Camera};
+
+/// Cosine between normals below which surfaces meet in a corner and not in a curve.
+const BENT: f32 = 0.7;
+/// Half of the width of the region, as a part of the picture's height.
+const REACH: f32 = 1.0 / 48.0;
+
+/// The pixels near such corners.
+pub(super) fn corner_region(frame: &Frame, camera: &Camera) -> Vec<bool> {
+    let (width, height) = (frame.width as usize, frame.height as usize);
+    let points = Points::new(frame, camera);
+    let reach = ((height as f32 * REACH).ceil() as usize).max(1);
+    let mut region = vec![false; width * height];
+    for y in 0..height {
+        for x in 0..width {
+            let here = y * width + x;
+            for step in 1..=reach {
+                let across = (x + step < width).then_some(here + step);
+                let down = (y + step < height).then_some(here + step * width);
+                for there in [across, down].into_iter().flatten() {
+                    if points.meet(here, there, step) {
+                        region[here] = true;
+                        region[there] = true;
+                    }
+                }
+            }
+        }
+    }
+    region
+}
+
+/// First hits in world space.
+struct Points<'a> {
+    frame: &'a Frame,
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    /// Width of a pixel at distance 1, metres.
+    pixel: f32,
+}
+
+impl<'a> Points<'a> {
+    fn new(frame: &'a Frame, camera: &Camera) -> Self {
+        let (width, height) = (frame.width as usize, frame.height as f32);
+        let half = (camera.yfov / 2.0).tan();
+        let pixel = 2.0 * half / height;
+        let ray = |i: usize| {
+            let x = ((i % width) as f32 + 0.5 - width as f32 / 2.0) * pixel;
+            let y = (height / 2.0 - (i / width) as f32 - 0.5) * pixel;
+            camera.forward + camera.right * x + camera.up * y
+        };
+        let positions: Vec<_> = (0..frame.pixels()).map(|i| camera.position + ray(i) * frame.depth[i]).collect();
+        let towards_viewer = |i: usize| {
+            let normal = Vec3::from(frame.normal[i]);
+            if normal.dot(positions[i] - camera.position) > 0.0 { -normal } else { normal }
+        };
+        let normals = (0..frame.pixels()).map(towards_viewer).collect();
+        Self { frame, positions, normals, pixel }
+    }
+
+    /// Whether the surfaces at two pixels, `step` apart, belong to one concave corner: neither is the silhouette of
+    /// something before the other, and each lies before the other's plane.
+    fn meet(&self, a: usize, b: usize, step: usize) -> bool {
+        // Pixels that hold more than one surface have no normal of their own.
+        let whole = |i: usize| self.frame.alpha[i] > 0.99 && self.normals[i].length_squared() > 0.98;
+        let (na, nb, between) = (self.normals[a], self.normals[b], self.positions[b] - self.positions[a]);
+        let near = 8.0 * self.pixel * step as f32 * self.frame.depth[a].min(self.frame.depth[b]);
+        let slack = 0.05 * between.length();
+        whole(a)
+            && whole(b)
+            && na.dot(nb) < BENT
+            && between.length() < near
+            && between.dot(na) > slack
+            && -between.dot(nb) > slack
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: u32 = 48;
+
+    /// What a camera at the origin sees of two planes that meet on its axis at depth 2; `depth` of the tangent.
+    fn wedge(sign: f32) -> (Frame, Camera) {
+        let camera = Camera {
+            name: String::new(),
+            position: Vec3::ZERO,
+            right: Vec3::X,
+            up: Vec3::Y,
+            forward: -Vec3::Z,
+            yfov: std::f32::consts::FRAC_PI_2,
+            aspect: None,
+        };
+        let mut frame = Frame { width: SIZE, height: SIZE, ..Frame::default() };
+        for i in 0..SIZE * SIZE {
+            let tangent = ((i % SIZE) as f32 + 0.5) / SIZE as f32 * 2.0 - 1.0;
+            // |x| = sign (2 - depth): a corner, or an edge that points at the viewer.
+            frame.depth.push(2.0 / (1.0 + sign * tangent.abs()));
+            frame.normal.push(Vec3::new(-sign * tangent.signum(), 0.0, 1.0).normalize().to_array());
+            frame.alpha.push(1.0);
+            frame.radiance.push([1.0; 3]);
+        }
+        (frame, camera)
+    }
+
+    #[test]
+    fn a_corner_is_found_where_the_planes_meet() {
+        let (frame, camera) = wedge(1.0);
+        let region = corner_region(&frame, &camera);
+        let row: Vec<usize> = (0..SIZE as usize).filter(|&x| region[5 * SIZE as usize + x]).collect();
+        assert_eq!(row, [23, 24]);
+    }
+
+    #[test]
+    fn an_edge_towards_the_viewer_is_none_nor_is_a_wall_behind_another() {
+        let (edge, camera) = wedge(-0.5);
+        assert!(corner_region(&edge, &camera).iter().all(|found| !found));
+        let (mut apart, camera) = wedge(1.0);
+        for (i, depth) in apart.depth.iter_mut().enumerate() {
+            *depth *= if i % SIZE as usize >= 24 { 10.0 } else { 1.0 };
+        }
+        assert!(corner_region(&apart, &camera).iter().all(|found| !found));
+    }
+}

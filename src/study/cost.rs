@@ -1,0 +1,156 @@
+//! How far a study is, and how long it will still take.
+
+use std::{
+    fmt,
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
+
+use crate::{
+    progress::{Progress, Stage},
+    settings::Settings,
+};
+
+/// How far a study is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// What is being rendered, as `diffuse.gltf, hybrid, n = 10k, k = 50`.
+    pub cell: String,
+    /// Its number, from 1, of those that are to be rendered now.
+    pub number: usize,
+    /// Cells to be rendered now.
+    pub total: usize,
+    /// Cells that were there already.
+    pub kept: usize,
+    /// Part of the work that is done, 0 to 1.
+    pub done: f64,
+    /// Estimate; `None` until there is one.
+    pub seconds_left: Option<f64>,
+}
+
+/// Listener of a study. Its methods are called often and must return at once.
+pub trait Watch: Sync {
+    fn report(&self, state: &State);
+    /// The study should end as soon as it can; what is finished is kept.
+    fn stop_requested(&self) -> bool;
+}
+
+impl Watch for crate::progress::Silent {
+    fn report(&self, _: &State) {}
+    fn stop_requested(&self) -> bool {
+        false
+    }
+}
+
+/// Work of a cell, in arbitrary units: samples times neighbours, and photons. Only its proportions count.
+pub(super) fn work(settings: &Settings) -> f64 {
+    let (width, height) = settings.size.unwrap_or((512, 512));
+    let samples = f64::from(width) * f64::from(height) * f64::from(settings.spp);
+    let gather = if settings.mode.traces_photons() { 30.0 + f64::from(settings.neighbors) } else { 0.0 };
+    1e5 + samples * (10.0 + gather) + f64::from(settings.global_photons)
+}
+
+/// Turns the stages of one render after the other into the progress of the whole.
+pub(super) struct Meter<'a> {
+    watch: &'a dyn Watch,
+    started: Instant,
+    total_work: f64,
+    state: Mutex<(State, Work)>,
+}
+
+/// Work in the units of [`work`].
+#[derive(Clone, Copy, Default)]
+struct Work {
+    finished: f64,
+    current: f64,
+}
+
+impl<'a> Meter<'a> {
+    pub fn new(watch: &'a dyn Watch, total: usize, kept: usize, total_work: f64) -> Self {
+        let state = State { cell: String::new(), number: 0, total, kept, done: 0.0, seconds_left: None };
+        Self { watch, started: Instant::now(), total_work, state: Mutex::new((state, Work::default())) }
+    }
+
+    /// A cell begins.
+    pub fn begin(&self, cell: String, settings: &Settings) {
+        self.update(|state, work_done| {
+            state.cell = cell;
+            state.number += 1;
+            work_done.current = work(settings);
+            0.0
+        });
+    }
+
+    /// The cell is done, or has failed.
+    pub fn end(&self) {
+        self.update(|_, work_done| {
+            work_done.finished += work_done.current;
+            work_done.current = 0.0;
+            0.0
+        });
+    }
+
+    /// `change` returns the part of the current cell that is done.
+    fn update(&self, change: impl FnOnce(&mut State, &mut Work) -> f64) {
+        let mut guard = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let (state, work_done) = &mut *guard;
+        let part = change(state, work_done);
+        state.done = ((work_done.finished + part * work_done.current) / self.total_work.max(1.0)).min(1.0);
+        let elapsed = self.started.elapsed().as_secs_f64();
+        state.seconds_left = (state.done > 0.0).then(|| elapsed * (1.0 - state.done) / state.done);
+        self.watch.report(state);
+    }
+}
+
+impl Progress for Meter<'_> {
+    fn report(&self, stage: Stage, done: u64, total: u64) {
+        if stage == Stage::Camera && total > 0 {
+            self.update(|_, _| done as f64 / total as f64);
+        }
+    }
+
+    fn stop_requested(&self) -> bool {
+        self.watch.stop_requested()
+    }
+}
+
+impl fmt::Debug for Meter<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.debug_struct("Meter").finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Last(Mutex<Option<State>>);
+
+    impl Watch for Last {
+        fn report(&self, state: &State) {
+            *self.0.lock().unwrap() = Some(state.clone());
+        }
+        fn stop_requested(&self) -> bool {
+            false
+        }
+    }
+
+    #[test]
+    fn progress_runs_over_all_cells_in_proportion_to_their_work() {
+        let last = Last(Mutex::default());
+        let settings = |neighbors| Settings { neighbors, size: Some((100, 100)), ..Settings::default() };
+        let (small, large) = (settings(1), settings(1000));
+        let meter = Meter::new(&last, 2, 3, work(&small) + work(&large));
+        let seen = || last.0.lock().unwrap().clone().expect("it was told");
+        meter.begin("a".to_string(), &small);
+        assert_eq!((seen().number, seen().kept, seen().done, seen().seconds_left), (1, 3, 0.0, None));
+        meter.end();
+        let after_small = seen().done;
+        assert!(after_small > 0.0 && after_small < 0.2 && seen().seconds_left.is_some());
+        meter.begin("b".to_string(), &large);
+        Progress::report(&meter, Stage::Camera, 1, 2);
+        assert!((seen().done - (after_small + 1.0) / 2.0).abs() < 1e-9 && seen().number == 2);
+        meter.end();
+        assert!((seen().done - 1.0).abs() < 1e-9);
+    }
+}

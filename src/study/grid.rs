@@ -1,0 +1,58 @@
+//! The plan of a plain study: every mode with every n and every k.
+
+use super::{Combination, Figure, Look, Plan, Question, Subject};
+use crate::settings::{Mode, Settings};
+
+/// Every combination of the modes, photon counts and neighbours with the other settings as given.
+#[must_use]
+pub fn grid(
+    subject: Subject,
+    settings: &Settings,
+    modes: &[Mode],
+    photons: &[u32],
+    neighbors: &[u32],
+    repeats: u32,
+    look: Look,
+) -> Plan {
+    let title = format!("Study of {}", subject.scene.file_name);
+    let mut plan = Plan { title, subjects: vec![subject], combinations: Vec::new(), figures: Vec::new(), look };
+    for &mode in modes {
+        let base = Settings { mode, ..settings.clone() };
+        let title = format!("Mode {}", mode.name());
+        add_plane(&mut plan, 0, &base, photons, neighbors, repeats, title);
+    }
+    plan
+}
+
+/// Adds a figure of n down and k across, with its combinations.
+pub(super) fn add_plane(
+    plan: &mut Plan,
+    subject: usize,
+    base: &Settings,
+    photons: &[u32],
+    neighbors: &[u32],
+    repeats: u32,
+    title: String,
+) {
+    let rows = photons.iter().map(|&n| {
+        let cells = neighbors.iter().map(|&k| {
+            let settings = Settings { global_photons: n, caustic_photons: n, neighbors: k, ..base.clone() };
+            Some(plan.add(Combination { subject, settings, repeats, measured: true }))
+        });
+        (format!("n = {}", short(n)), cells.collect())
+    });
+    let rows = rows.collect();
+    let columns = neighbors.iter().map(|k| format!("k = {k}")).collect();
+    let questions = if base.mode.traces_photons() { Question::OF_A_PLANE.to_vec() } else { Vec::new() };
+    plan.figures.push(Figure { title, columns, rows, questions, plane: base.mode.traces_photons() });
+}
+
+/// 1000 as `1k`, 1500000 as `1.5M`; exact.
+pub(super) fn short(n: u32) -> String {
+    match n {
+        0 => "0".to_string(),
+        _ if n.is_multiple_of(100_000) && n >= 1_000_000 => format!("{}M", f64::from(n) / 1e6),
+        _ if n.is_multiple_of(100) && n >= 1000 => format!("{}k", f64::from(n) / 1e3),
+        _ => n.to_string(),
+    }
+}

@@ -1,0 +1,263 @@
+//! What is measured of a combination's renders.
+
+use serde::Serialize;
+
+use super::{
+    Combination, Plan, Radii,
+    cells::Measured,
+    corners::corner_region,
+    grid::short,
+    plan::Look,
+    spread::{bias, noise},
+};
+use crate::{
+    image::{
+        Frame, Rgb8,
+        difference::{mean, rel_mse, rmse},
+        flip::flip,
+        srgb_encode,
+    },
+    settings::{Mode, Settings},
+    stats::{MapStats, Seconds},
+};
+
+/// One combination: a line of the table. Numbers are means over its repeats unless said otherwise; all are zero or
+/// missing if it failed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// File name.
+    pub scene: String,
+    pub mode: Mode,
+    /// Photons that each map can hold; means nothing, as `neighbors`, where the mode traces none.
+    pub photons: u32,
+    pub neighbors: u32,
+    /// Seed of the first repeat.
+    pub seed: u32,
+    pub repeats: u32,
+    /// Pixels.
+    pub width: u32,
+    pub height: u32,
+    pub spp: u32,
+    /// By stage. Those of `bvh`, `photons` and `grid` are shared by all combinations of the same photons.
+    pub seconds: Seconds,
+    pub global: MapRow,
+    pub caustic: MapRow,
+    /// Of each channel over all pixels, W/(m² sr).
+    pub mean_radiance: [f64; 3],
+    /// Standard deviation between the repeats, root of the mean over pixels and channels, W/(m² sr); from two repeats.
+    pub noise: Option<f64>,
+    /// Against the reference, over all pixels and channels.
+    pub rel_mse: Option<f64>,
+    /// W/(m² sr).
+    pub rmse: Option<f64>,
+    /// Mean FLIP error of the tone-mapped pictures, 0 to 1.
+    pub flip: Option<f64>,
+    /// What all repeats share of the error, root of the mean square over pixels and channels, W/(m² sr); from two repeats.
+    pub bias: Option<f64>,
+    /// A smaller bias cannot be told from noise, W/(m² sr).
+    pub bias_limit: Option<f64>,
+    /// Mean radiance near open corners over the reference's there, 1 is right.
+    pub corner_ratio: Option<f64>,
+    /// Why it failed.
+    pub error: Option<String>,
+    /// Of the first repeat.
+    #[serde(skip)]
+    pub(super) thumbnail: Thumbnail,
+}
+
+/// One of a combination's photon maps, of the first repeat.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MapRow {
+    /// Paths that the map is normalised by.
+    pub emitted: u64,
+    /// Photons in the map.
+    pub stored: u64,
+    /// Of the estimates at all visible points.
+    pub radius: Option<Radii>,
+}
+
+impl Row {
+    /// Mean of the channels of [`Self::mean_radiance`].
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.mean_radiance.iter().sum::<f64>() / 3.0
+    }
+
+    /// The combination in words.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let mode = self.mode.name();
+        if self.mode.traces_photons() {
+            format!("{}, {mode}, n = {}, k = {}", self.scene, short(self.photons), self.neighbors)
+        } else {
+            format!("{}, {mode}", self.scene)
+        }
+    }
+}
+
+/// A render in words.
+pub(super) fn name(scene: &str, s: &Settings) -> String {
+    format!("{scene}, {}, n = {}, k = {}, seed {}", s.mode.name(), short(s.global_photons), s.neighbors, s.seed)
+}
+
+/// Measures the renders, one a repeat; none if the combination failed.
+pub(super) fn measure(
+    plan: &Plan,
+    combination: &Combination,
+    renders: &[(Frame, Measured)],
+    reference: Option<&Frame>,
+    error: Option<String>,
+) -> Row {
+    let settings = &combination.settings;
+    let scene = &plan.subjects[combination.subject].scene;
+    let mut row = Row {
+        scene: scene.file_name.clone(),
+        mode: settings.mode,
+        photons: settings.global_photons,
+        neighbors: settings.neighbors,
+        seed: settings.seed,
+        repeats: combination.repeats,
+        width: 0,
+        height: 0,
+        spp: settings.spp,
+        seconds: Seconds::default(),
+        global: MapRow::default(),
+        caustic: MapRow::default(),
+        mean_radiance: [0.0; 3],
+        noise: None,
+        rel_mse: None,
+        rmse: None,
+        flip: None,
+        bias: None,
+        bias_limit: None,
+        corner_ratio: None,
+        error,
+        thumbnail: Thumbnail::default(),
+    };
+    let Some((first, measured)) = renders.first() else { return row };
+    (row.width, row.height) = (first.width, first.height);
+    row.seconds = mean_seconds(renders);
+    row.global = map_row(measured.stats.photons.global, measured.radii[0]);
+    row.caustic = map_row(measured.stats.photons.caustic, measured.radii[1]);
+    row.mean_radiance = std::array::from_fn(|c| average(renders, |frame| mean(&frame.radiance)[c]));
+    row.noise = noise(&frames(renders));
+    row.thumbnail = Thumbnail::new(first, plan.look);
+    if let Some(reference) = reference.filter(|r| (r.width, r.height) == (first.width, first.height)) {
+        compare(&mut row, renders, reference, plan.look);
+        row.corner_ratio = scene.camera(settings.camera.as_deref()).ok().and_then(|camera| {
+            let region = corner_region(first, camera);
+            let right = mean_in(reference, &region)?;
+            let found = average(renders, |frame| mean_in(frame, &region).unwrap_or(0.0));
+            (right > 0.0).then_some(found / right)
+        });
+    }
+    row
+}
+
+fn compare(row: &mut Row, renders: &[(Frame, Measured)], reference: &Frame, look: Look) {
+    let right = &reference.radiance;
+    row.rel_mse = Some(average(renders, |frame| rel_mse(&frame.radiance, right, None)));
+    row.rmse = Some(average(renders, |frame| rmse(&frame.radiance, right, None).powi(2)).sqrt());
+    row.flip = Some(average(renders, |frame| flip(&frame.radiance, right, frame.width, look.exposure, look.tonemap)));
+    let bias = bias(&frames(renders), reference);
+    (row.bias, row.bias_limit) = (bias.map(|b| b.value), bias.map(|b| b.limit));
+}
+
+fn frames(renders: &[(Frame, Measured)]) -> Vec<&Frame> {
+    renders.iter().map(|(frame, _)| frame).collect()
+}
+
+fn average(renders: &[(Frame, Measured)], value: impl Fn(&Frame) -> f64) -> f64 {
+    renders.iter().map(|(frame, _)| value(frame)).sum::<f64>() / renders.len() as f64
+}
+
+fn mean_seconds(renders: &[(Frame, Measured)]) -> Seconds {
+    let of = |stage: fn(&Seconds) -> f64| {
+        renders.iter().map(|(_, m)| stage(&m.stats.seconds)).sum::<f64>() / renders.len() as f64
+    };
+    Seconds {
+        load: of(|s| s.load),
+        bvh: of(|s| s.bvh),
+        photons: of(|s| s.photons),
+        grid: of(|s| s.grid),
+        camera: of(|s| s.camera),
+        direct: of(|s| s.direct),
+        gather: of(|s| s.gather),
+        total: of(|s| s.total),
+    }
+}
+
+fn map_row(map: MapStats, radius: Option<Radii>) -> MapRow {
+    MapRow { emitted: map.emitted, stored: map.stored, radius }
+}
+
+/// Mean of the channels over the pixels of the region.
+fn mean_in(frame: &Frame, region: &[bool]) -> Option<f64> {
+    let inside = || frame.radiance.iter().zip(region).filter(|(_, inside)| **inside).map(|(pixel, _)| pixel);
+    let count = inside().count();
+    (count > 0).then(|| inside().flatten().map(|&x| f64::from(x)).sum::<f64>() / (3 * count) as f64)
+}
+
+/// A small picture for the contact sheet, in sRGB.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Thumbnail {
+    pub width: u32,
+    pub height: u32,
+    pub pixels: Vec<Rgb8>,
+}
+
+impl Thumbnail {
+    /// Longest side, pixels.
+    const SIDE: u32 = 192;
+
+    /// The picture made smaller by a whole factor, so that its noise stays what it looks like.
+    pub fn new(frame: &Frame, look: Look) -> Self {
+        let factor = frame.width.max(frame.height).div_ceil(Self::SIDE).max(1);
+        let (width, height) = ((frame.width / factor).max(1), (frame.height / factor).max(1));
+        let scale = look.exposure.exp2();
+        let pixel = |x: u32, y: u32| {
+            let (mut sum, mut count) = ([0.0_f32; 3], 0.0);
+            for row in (y * factor)..((y + 1) * factor).min(frame.height) {
+                for column in (x * factor)..((x + 1) * factor).min(frame.width) {
+                    let radiance = frame.radiance[(row * frame.width + column) as usize];
+                    let shown = look.tonemap.apply(radiance.map(|v| v * scale));
+                    (0..3).for_each(|c| sum[c] += shown[c]);
+                    count += 1.0;
+                }
+            }
+            sum.map(|s| (srgb_encode(s / count) * 255.0).round() as u8)
+        };
+        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
+        Self { width, height, pixels }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{image::Tonemap, stats::Stats};
+
+    fn render(values: &[f32]) -> (Frame, Measured) {
+        let radiance = values.iter().map(|&v| [v; 3]).collect();
+        let frame = Frame { width: values.len() as u32, height: 1, radiance, ..Frame::default() };
+        (frame, Measured { stats: Stats::default(), radii: [None; 2] })
+    }
+
+    #[test]
+    fn a_region_has_its_own_mean() {
+        let (frame, _) = render(&[1.0, 3.0, 100.0]);
+        assert_eq!(mean_in(&frame, &[true, true, false]), Some(2.0));
+        assert_eq!(mean_in(&frame, &[false; 3]), None);
+    }
+
+    #[test]
+    fn a_thumbnail_is_no_larger_than_its_side() {
+        let frame = Frame { width: 400, height: 100, radiance: vec![[1.0; 3]; 40_000], ..Frame::default() };
+        let look = Look { exposure: 0.0, tonemap: Tonemap::None };
+        let small = Thumbnail::new(&frame, look);
+        assert_eq!((small.width, small.height, small.pixels.len()), (133, 33, 133 * 33));
+        assert!(small.pixels.iter().all(|p| *p == [255; 3]));
+        let darker = Thumbnail::new(&frame, Look { exposure: -1.0, ..look });
+        assert_eq!(darker.pixels[0], [188; 3]);
+    }
+}
