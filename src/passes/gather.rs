@@ -1,7 +1,7 @@
 //! Radiance from the k nearest photons. Kernels: `key_points`, `aim_search`,
 //! `count_photons`, `gather`, `finish_gather`.
 
-use super::{photon_map::PhotonMap, radix_sort::RadixSort, sort_photons::KEY_BITS};
+use super::{photon_map::PhotonMap, radix_sort::RadixSort};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
@@ -11,15 +11,15 @@ use crate::{
 
 /// Points that are searched together; more go in several batches.
 const BATCH: u32 = 65_536;
+/// Bits of a point's key: 30 of its place on the curve, and one that puts those without a place last.
+const POINT_KEY_BITS: u32 = 31;
 /// Queries of one invocation.
 const PACKET: u32 = 4;
 /// Packets that are searched or wait together.
 const BLOCK: u64 = 8;
 /// Of how many blocks of packets one is searched in each dispatch of the search: pilots first, the others start from
-/// their radius.
-const STRIDES: [u32; 3] = [64, 8, 1];
-/// Rounds of counting in one submission.
-const ROUNDS: u32 = 4;
+/// their radius; and rounds of counting in one submission.
+const STRIDES: [(u32, u32); 3] = [(64, 4), (8, 3), (1, 2)];
 
 /// The radiance estimate that is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,6 +82,7 @@ struct Scratch {
     states: Buffer,
     sums: Buffer,
     open: Buffer,
+    valid: Buffer,
 }
 
 impl Gather {
@@ -140,56 +141,80 @@ impl Gather {
         progress: &dyn Progress,
     ) -> Result<u32> {
         let scratch = self.scratch.as_ref().expect("run has made it");
+        let (entries, valid) = self.order(gpu, map, info, points, scratch)?;
+        if valid == 0 {
+            return Ok(0);
+        }
         let Search { aim, count, sum, finish } =
             self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
-        let infos = STRIDES.map(|stride| gpu.uniform("gather info", &GatherInfo { stride, ..*info }));
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
-            ("gather_info", &infos[0]),
             ("points", points),
-            ("keyed", &scratch.entries[0]),
+            ("entries", entries),
             ("states", &scratch.states),
             ("open_count", &scratch.open),
             ("sums_left", &scratch.sums),
             ("radiance", radiance),
             ("gathered", gathered),
         ]);
-        let mut encoder = gpu.encoder();
-        encoder.clear_buffer(&scratch.states, 0, None);
-        encoder.clear_buffer(&scratch.sums, 0, None);
-        self.key.dispatch(&mut encoder, &self.key.bind(gpu, &buffers), info.count.into());
-        gpu.submit(encoder);
-        let sorted = self.radix.sort(gpu, [&scratch.entries[0], &scratch.entries[1]], info.count, KEY_BITS)?;
-        buffers.push(("entries", &scratch.entries[sorted]));
-        let (sum_bindings, finish_bindings) = (sum.bind(gpu, &buffers), finish.bind(gpu, &buffers));
-        let search_bindings = infos.each_ref().map(|info| {
-            buffers.retain(|(name, _)| *name != "gather_info");
-            buffers.push(("gather_info", info));
-            (aim.bind(gpu, &buffers), count.bind(gpu, &buffers))
-        });
-        let packets = u64::from(info.count.div_ceil(PACKET));
-        let blocks = packets.div_ceil(BLOCK);
+        let with_info = |info| [buffers.as_slice(), &[("gather_info", info)]].concat();
+        let infos =
+            STRIDES.map(|(stride, _)| gpu.uniform("gather info", &GatherInfo { count: valid, stride, ..*info }));
+        let search_bindings =
+            infos.each_ref().map(|info| (aim.bind(gpu, &with_info(info)), count.bind(gpu, &with_info(info))));
+        let (sum_bindings, finish_bindings) =
+            (sum.bind(gpu, &with_info(&infos[0])), finish.bind(gpu, &with_info(&infos[0])));
+        let packets = u64::from(valid.div_ceil(PACKET));
         let mut dispatches = 0;
         loop {
             progress.check()?;
             let mut encoder = gpu.encoder();
+            if dispatches == 0 {
+                encoder.clear_buffer(&scratch.states, 0, None);
+                encoder.clear_buffer(&scratch.sums, 0, None);
+            }
             encoder.clear_buffer(&scratch.open, 0, None);
-            for ((aim_bindings, count_bindings), stride) in search_bindings.iter().zip(STRIDES) {
-                let packets = blocks.div_ceil(stride.into()) * BLOCK;
-                for _ in 0..ROUNDS {
+            for ((aim_bindings, count_bindings), (stride, rounds)) in search_bindings.iter().zip(STRIDES) {
+                let packets = packets.div_ceil(BLOCK).div_ceil(stride.into()) * BLOCK;
+                for _ in 0..rounds {
                     aim.dispatch(&mut encoder, aim_bindings, packets * u64::from(PACKET));
                     count.dispatch(&mut encoder, count_bindings, packets);
                 }
                 aim.dispatch(&mut encoder, aim_bindings, packets * u64::from(PACKET));
             }
             sum.dispatch(&mut encoder, &sum_bindings, packets);
-            finish.dispatch(&mut encoder, &finish_bindings, info.count.into());
+            finish.dispatch(&mut encoder, &finish_bindings, valid.into());
             gpu.submit(encoder);
             dispatches += 1;
             if gpu.read::<u32>(&scratch.open, 0, 1)?[0] == 0 {
                 return Ok(dispatches);
             }
         }
+    }
+
+    /// Sorts the points of a batch, the valid ones first; returns their order and the number of valid ones.
+    fn order<'s>(
+        &self,
+        gpu: &Gpu,
+        map: &PhotonMap,
+        info: &GatherInfo,
+        points: &Buffer,
+        scratch: &'s Scratch,
+    ) -> Result<(&'s Buffer, u32)> {
+        let uniform = gpu.uniform("gather info", info);
+        let mut buffers = map.bindings().to_vec();
+        buffers.extend([
+            ("gather_info", &uniform),
+            ("points", points),
+            ("keyed", &scratch.entries[0]),
+            ("valid_count", &scratch.valid),
+        ]);
+        let mut encoder = gpu.encoder();
+        encoder.clear_buffer(&scratch.valid, 0, None);
+        self.key.dispatch(&mut encoder, &self.key.bind(gpu, &buffers), info.count.into());
+        gpu.submit(encoder);
+        let sorted = self.radix.sort(gpu, [&scratch.entries[0], &scratch.entries[1]], info.count, POINT_KEY_BITS)?;
+        Ok((&scratch.entries[sorted], gpu.read::<u32>(&scratch.valid, 0, 1)?[0]))
     }
 
     /// Compiles search and sum for maps of that many windows, once.
@@ -224,6 +249,7 @@ impl Scratch {
             states: gpu.storage::<[u8; SEARCH_STATE_BYTES]>("search states", packets * u64::from(PACKET))?,
             sums: gpu.storage::<[u8; GATHER_STATE_BYTES]>("unfinished sums", packets)?,
             open: gpu.storage::<u32>("open packets", 1)?,
+            valid: gpu.storage::<u32>("valid points", 1)?,
         })
     }
 }
