@@ -45,6 +45,7 @@ pub mod bvh;
 pub mod compare;
 pub mod error;
 pub mod gpu;
+mod html;
 pub mod image;
 pub mod layout;
 pub mod passes;

@@ -7,6 +7,7 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use super::{Comparison, measure::Histogram, report::grouped};
 use crate::{
     error::{Error, Result},
+    html::{escaped, filled},
     image::{Frame, Origin, Tonemap, encode_png},
 };
 
@@ -34,37 +35,27 @@ pub(super) fn page(
     let facts = report.facts().iter().fold(String::new(), |all, (what, value)| all + &row(&[what, value]));
     let rows = report.rows().iter().fold(String::new(), |all, r| all + &row(&[r.what, &r.grid, &r.kdtree]));
     let width = comparison.grid.width;
-    Ok(fill(&[
-        ("scene", &escaped(origin.scene)),
-        ("origin", &escaped(&subtitle(comparison, origin))),
-        ("verdict_class", class),
-        ("verdict", &escaped(&verdict)),
-        ("rendering", if width < PIXELATED_BELOW { "pixelated" } else { "auto" }),
-        ("width", &width.to_string()),
-        ("height", &comparison.grid.height.to_string()),
-        ("difference_width", &width.max(640).to_string()),
-        ("histogram", &histogram(&comparison.histogram, comparison.tolerance)),
-        ("none", &grouped(comparison.histogram.none)),
-        ("tied", &grouped(report.neighbors.tied)),
-        ("facts", facts.trim_end()),
-        ("rows", rows.trim_end()),
-        ("grid_png", &picture(&comparison.grid)?),
-        ("kdtree_png", &picture(&comparison.kdtree)?),
-        ("difference_png", &BASE64_STANDARD.encode(difference)),
-    ]))
-}
-
-/// The template with each `{{name}}` replaced.
-fn fill(values: &[(&str, &str)]) -> String {
-    let mut parts = TEMPLATE.split("{{");
-    let mut page = parts.next().unwrap_or_default().to_string();
-    for part in parts {
-        let (name, rest) = part.split_once("}}").unwrap_or((part, ""));
-        let value = values.iter().find(|(n, _)| *n == name);
-        page.push_str(value.unwrap_or_else(|| panic!("the page has no {name}")).1);
-        page.push_str(rest);
-    }
-    page
+    Ok(filled(
+        TEMPLATE,
+        &[
+            ("scene", &escaped(origin.scene)),
+            ("origin", &escaped(&subtitle(comparison, origin))),
+            ("verdict_class", class),
+            ("verdict", &escaped(&verdict)),
+            ("rendering", if width < PIXELATED_BELOW { "pixelated" } else { "auto" }),
+            ("width", &width.to_string()),
+            ("height", &comparison.grid.height.to_string()),
+            ("difference_width", &width.max(640).to_string()),
+            ("histogram", &histogram(&comparison.histogram, comparison.tolerance)),
+            ("none", &grouped(comparison.histogram.none)),
+            ("tied", &grouped(report.neighbors.tied)),
+            ("facts", facts.trim_end()),
+            ("rows", rows.trim_end()),
+            ("grid_png", &picture(&comparison.grid)?),
+            ("kdtree_png", &picture(&comparison.kdtree)?),
+            ("difference_png", &BASE64_STANDARD.encode(difference)),
+        ],
+    ))
 }
 
 fn subtitle(comparison: &Comparison, origin: &Origin) -> String {
@@ -139,11 +130,6 @@ fn short(count: u64) -> String {
         10_000..1_000_000 => format!("{}k", count / 1000),
         _ => format!("{}M", count / 1_000_000),
     }
-}
-
-/// Text that cannot be taken for markup.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use super::{
     plots::Plot,
     sheet::{brief, contact_sheet},
 };
+use crate::html::{escaped, filled};
 
 const TEMPLATE: &str = include_str!("page.html");
 
@@ -59,10 +60,10 @@ impl Value {
 
 pub(super) fn page(plan: &Plan, results: &Results, plots: &[Plot]) -> io::Result<String> {
     let figures = plan.figures.iter().map(|figure| show_figure(figure, results)).collect::<io::Result<String>>()?;
-    let failures = results.failures.iter().map(|line| format!("<p class=\"failure\">Failed: {}</p>", escape(line)));
+    let failures = results.failures.iter().map(|line| format!("<p class=\"failure\">Failed: {}</p>", escaped(line)));
     let headers = COLUMNS.iter().map(|(name, _)| format!("<th scope=\"col\"><button>{name}</button></th>"));
     let parts = [
-        ("title", escape(&plan.title)),
+        ("title", escaped(&plan.title)),
         ("summary", summary(plan, results)),
         ("failures", failures.collect()),
         ("figures", figures),
@@ -70,27 +71,13 @@ pub(super) fn page(plan: &Plan, results: &Results, plots: &[Plot]) -> io::Result
         ("headers", headers.collect()),
         ("rows", results.rows.iter().map(table_row).collect()),
     ];
-    Ok(fill(&parts))
-}
-
-/// Puts each part in its place; what stands in a part is not looked at again.
-fn fill(parts: &[(&str, String)]) -> String {
-    let mut page = String::new();
-    let mut rest = TEMPLATE;
-    while let Some((before, after)) = rest.split_once("{{") {
-        let (name, after) = after.split_once("}}").expect("the template closes its places");
-        let (_, part) = parts.iter().find(|(known, _)| *known == name).expect("the template has no other places");
-        page.push_str(before);
-        page.push_str(part);
-        rest = after;
-    }
-    page + rest
+    Ok(filled(TEMPLATE, &parts.each_ref().map(|(name, part)| (*name, part.as_str()))))
 }
 
 fn summary(plan: &Plan, results: &Results) -> String {
     let references = match results.references.as_slice() {
         [] => "none".to_string(),
-        lines => lines.iter().map(|line| escape(line)).collect::<Vec<_>>().join("; "),
+        lines => lines.iter().map(|line| escaped(line)).collect::<Vec<_>>().join("; "),
     };
     let size = results.rows.iter().find(|row| row.width > 0);
     let size = size
@@ -100,8 +87,8 @@ fn summary(plan: &Plan, results: &Results) -> String {
         "{} in {}{size}. {} ({}). Caustica {}. References: {references}.",
         counted(results.rows.len(), "combination"),
         counted(plan.figures.len(), "figure"),
-        escape(&results.device.name),
-        escape(&results.device.driver),
+        escaped(&results.device.name),
+        escaped(&results.device.driver),
         env!("CARGO_PKG_VERSION"),
     )
 }
@@ -113,7 +100,7 @@ fn counted(n: usize, what: &str) -> String {
 
 fn show_figure(figure: &Figure, results: &Results) -> io::Result<String> {
     let picture = STANDARD.encode(contact_sheet(std::slice::from_ref(figure), &results.rows)?);
-    let title = escape(&figure.title);
+    let title = escaped(&figure.title);
     let claims: String = answers(figure, &results.rows).iter().map(show_claim).collect();
     Ok(format!(
         "<h2>{title}</h2>\n<figure><img class=\"sheet\" alt=\"Contact sheet: {title}\" \
@@ -130,9 +117,9 @@ fn show_claim(claim: &Claim) -> String {
     format!(
         "<div class=\"claim {class}\"><p><strong>{}</strong> <span class=\"verdict\">{verdict}</span></p>\
          <p>Measured: {}.</p><p class=\"soft\">Holds if {}.</p></div>\n",
-        escape(claim.claim),
-        escape(&claim.measured),
-        escape(claim.rule)
+        escaped(claim.claim),
+        escaped(&claim.measured),
+        escaped(claim.rule)
     )
 }
 
@@ -142,31 +129,7 @@ fn inline(svg: &str) -> String {
 }
 
 fn table_row(row: &Row) -> String {
-    let cell = |value: Value| format!("<td data-value=\"{}\">{}</td>", escape(&value.sorted), escape(&value.shown));
+    let cell = |value: Value| format!("<td data-value=\"{}\">{}</td>", escaped(&value.sorted), escaped(&value.shown));
     let cells: String = COLUMNS.iter().map(|(_, value)| cell(value(row))).collect();
     format!("<tr>{cells}</tr>\n")
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parts_are_filled_in_once() {
-        let names = ["title", "summary", "failures", "figures", "plots", "headers", "rows"];
-        let page = fill(&names.map(|name| (name, format!("<{name}> {{{{title}}}}"))));
-        assert!(names.iter().all(|name| page.contains(&format!("<{name}>"))));
-        // Twice in the template; what parts hold stays as it is.
-        assert_eq!(page.matches("<title> {{title}}").count(), 2);
-        assert_eq!(page.matches("{{title}}").count(), names.len() + 1);
-    }
-
-    #[test]
-    fn text_from_files_is_escaped() {
-        assert_eq!(escape("<b a=\"1\">&"), "&lt;b a=&quot;1&quot;&gt;&amp;");
-    }
 }

@@ -1,0 +1,44 @@
+//! Pages that need no other file: a template's `{{name}}` filled in, and the style that all pages share.
+
+/// Colours in light and dark, and type; for the place `{{style}}` of a template.
+const STYLE: &str = include_str!("html.css");
+
+/// The template with each `{{name}}` replaced, once: what is filled in stays as it is.
+///
+/// # Panics
+/// If the template has a name that `values` lacks.
+#[must_use]
+pub fn filled(template: &str, values: &[(&str, &str)]) -> String {
+    let mut parts = template.split("{{");
+    let mut page = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        let (name, rest) = part.split_once("}}").unwrap_or((part, ""));
+        let value = values.iter().chain(&[("style", STYLE)]).find(|(n, _)| *n == name);
+        page.push_str(value.unwrap_or_else(|| panic!("the page has no {name}")).1);
+        page.push_str(rest);
+    }
+    page
+}
+
+/// Text that cannot be taken for markup.
+#[must_use]
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_filled_in_once() {
+        let page = filled("<title>{{a}}</title>{{b}}{{a}}", &[("a", "{{b}}"), ("b", "2")]);
+        assert_eq!(page, "<title>{{b}}</title>2{{b}}");
+        assert!(filled("{{style}}", &[]).contains("prefers-color-scheme: dark"));
+    }
+
+    #[test]
+    fn text_is_escaped() {
+        assert_eq!(escaped("<b a=\"1\">&"), "&lt;b a=&quot;1&quot;&gt;&amp;");
+    }
+}
