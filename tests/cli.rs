@@ -163,7 +163,7 @@ fn help_and_version_go_to_stdout() {
     assert_eq!(help("--version"), format!("caustica {}\n", env!("CARGO_PKG_VERSION")));
     let general = help("--help");
     assert!(
-        ["render", "compare", "devices", "info", "Exit codes"].iter().all(|said| general.contains(said)),
+        ["render", "compare", "study", "devices", "info", "Exit codes"].iter().all(|said| general.contains(said)),
         "{general}"
     );
     let of_render = help("render --help");

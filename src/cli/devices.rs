@@ -20,7 +20,7 @@ pub fn devices() -> Result<()> {
 }
 
 fn describe((index, adapter): (usize, &AdapterReport)) -> String {
-    let AdapterReport { name, driver, backend, kind, limits, unusable, .. } = adapter;
+    let AdapterReport { name, driver, backend, kind, limits, subgroup, unusable, .. } = adapter;
     let mut text = String::new();
     let mut line = |label: &str, value: &str| {
         writeln!(text, "   {label:<26}{value}").expect("a String can be written");
@@ -32,6 +32,7 @@ fn describe((index, adapter): (usize, &AdapterReport)) -> String {
     line("largest buffer", &mebibytes(limits.max_buffer_size));
     line("storage buffers a kernel", &limits.max_storage_buffers_per_shader_stage.to_string());
     line("invocations a workgroup", &limits.max_compute_invocations_per_workgroup.to_string());
+    line("invocations a subgroup", &subgroup_sizes(*subgroup));
     line("workgroups a dimension", &limits.max_compute_workgroups_per_dimension.to_string());
     match (unusable, index) {
         (Some(why), _) => line("usable", &format!("no: {why}")),
@@ -39,6 +40,11 @@ fn describe((index, adapter): (usize, &AdapterReport)) -> String {
         (None, _) => line("usable", "yes"),
     }
     format!("{index}: {name}\n{text}")
+}
+
+/// One size, or the smallest and the largest.
+fn subgroup_sizes((least, most): (u32, u32)) -> String {
+    if least == most { least.to_string() } else { format!("{least} to {most}") }
 }
 
 fn mebibytes(bytes: u64) -> String {

@@ -11,6 +11,8 @@ pub struct AdapterReport {
     /// `discrete`, `integrated`, `virtual`, `software` or `other`.
     pub kind: &'static str,
     pub limits: wgpu::Limits,
+    /// Invocations of the smallest and of the largest subgroup; 0 and 0 without subgroup operations.
+    pub subgroup: (u32, u32),
     /// Why it cannot be used, if so.
     pub unusable: Option<String>,
     pub(super) adapter: wgpu::Adapter,
@@ -92,19 +94,36 @@ fn report(adapter: wgpu::Adapter) -> AdapterReport {
         .iter()
         .find(|(_, has, needed)| has < needed)
         .map(|(what, has, needed)| format!("it has {has} {what}, {needed} are needed"));
-    let unusable = unusable.or_else(|| no_subgroups(&adapter, info.subgroup_min_size));
+    let subgroup = match adapter.features().contains(wgpu::Features::SUBGROUP) {
+        true => (info.subgroup_min_size, info.subgroup_max_size),
+        false => (0, 0),
+    };
+    let unusable = unusable.or_else(|| no_subgroups(subgroup.0));
     let driver = format!("{} {}", info.driver, info.driver_info).trim().to_string();
     let backend = format!("{:?}", info.backend);
-    AdapterReport { name: info.name, driver, backend, kind, limits, unusable, adapter }
+    AdapterReport { name: info.name, driver, backend, kind, limits, subgroup, unusable, adapter }
 }
 
 /// Invocations that share what they load; the smallest subgroup that the kernels work with.
 const NEEDED_SUBGROUP: u32 = 8;
 
-/// Why the adapter's subgroups do not do, if so.
-fn no_subgroups(adapter: &wgpu::Adapter, size: u32) -> Option<String> {
-    if !adapter.features().contains(wgpu::Features::SUBGROUP) {
-        return Some("its driver lacks subgroup operations in compute shaders".to_string());
+/// Why subgroups of so many invocations, or none at all, do not do.
+fn no_subgroups(least: u32) -> Option<String> {
+    match least {
+        0 => Some("its driver lacks subgroup operations in compute shaders".to_string()),
+        1..NEEDED_SUBGROUP => Some(format!("its subgroups may have {least} invocations, {NEEDED_SUBGROUP} are needed")),
+        _ => None,
     }
-    (size < NEEDED_SUBGROUP).then(|| format!("its subgroups may have {size} invocations, {NEEDED_SUBGROUP} are needed"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_subgroups_are_refused() {
+        assert!(no_subgroups(0).is_some_and(|why| why.contains("lacks subgroup operations")));
+        assert!(no_subgroups(4).is_some_and(|why| why.contains("4 invocations")));
+        assert!(no_subgroups(8).is_none() && no_subgroups(32).is_none());
+    }
 }
