@@ -136,7 +136,10 @@ fn rays() -> Vec<(Vec3, Vec3)> {
 /// A closed room with a height field of `side` x `side` quads as its floor.
 fn room(side: i32) -> Scene {
     let surface = Surface::Diffuse { albedo: Vec3::splat(0.5) };
-    let mut scene = Scene { materials: vec![Material { name: String::new(), surface }], ..Scene::default() };
+    let mut scene = Scene {
+        materials: vec![Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false }],
+        ..Scene::default()
+    };
     let mut quad = |corners: [Vec3; 4]| {
         for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
             let positions = [corners[a], corners[b], corners[c]];

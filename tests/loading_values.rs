@@ -73,7 +73,7 @@ fn lights_keep_their_candela_whatever_the_scale() {
     assert_eq!(light.position, Vec3::new(-0.5, -0.5, 2.0));
     assert_eq!(light.intensity_in(LightUnit::Radiometric), light.intensity);
     assert!((light.intensity_in(LightUnit::Photometric) - Vec3::new(1.0, 0.5, 0.0)).length() < 1e-6);
-    assert!((light.power().x / (4.0 * std::f32::consts::PI * 683.0) - 1.0).abs() < 1e-6);
+    assert!((light.power(1.0).x / (4.0 * std::f32::consts::PI * 683.0) - 1.0).abs() < 1e-6);
 }
 
 #[test]

@@ -69,7 +69,7 @@ impl Scene {
                 .map(|light| LightInfo {
                     name: light.name.clone(),
                     position: world(light.position),
-                    power: light.power().to_array(),
+                    power: light.power(0.5 * bounds.diagonal()).to_array(),
                 })
                 .collect(),
             cameras: (self.cameras.iter())

@@ -43,4 +43,9 @@ impl fmt::Display for Surface {
 pub struct Material {
     pub name: String,
     pub surface: Surface,
+    /// Radiance that it sends out by itself, W/(m² sr) in each channel, alike in all directions of its front side, where a
+    /// triangle's corners run counterclockwise, or a sphere's outside.
+    pub emission: Vec3,
+    /// Its back sends out as much.
+    pub double_sided: bool,
 }

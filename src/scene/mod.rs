@@ -10,6 +10,7 @@ use crate::{Error, Result};
 
 mod camera;
 mod describe;
+mod environment;
 mod gltf;
 mod light;
 mod material;
@@ -17,7 +18,8 @@ mod shape;
 
 pub use camera::Camera;
 pub use describe::{CameraInfo, LightInfo, MaterialInfo, SceneInfo};
-pub use light::{LUMENS_PER_WATT, Light};
+pub use environment::Environment;
+pub use light::{LEAST_FALLOFF, LUMENS_PER_WATT, Light, LightKind};
 pub use material::{Material, Surface};
 pub use shape::{Bounds, Sphere, Triangle};
 
@@ -35,7 +37,10 @@ pub struct Scene {
     pub triangles: Vec<Triangle>,
     pub spheres: Vec<Sphere>,
     pub materials: Vec<Material>,
+    /// Lights without extent.
     pub lights: Vec<Light>,
+    /// Light from infinitely far away, all around.
+    pub environment: Option<Environment>,
     /// Never empty after [`Scene::load`]: a camera that frames the scene stands in where the file has none.
     pub cameras: Vec<Camera>,
     /// What was ignored or read in a special way, one line each.

@@ -7,7 +7,7 @@ use caustica::{
     gpu::Gpu,
     progress::Silent,
     renderer::{Render, render},
-    scene::{Camera, Light, Material, Scene, Sphere, Surface, Triangle},
+    scene::{Camera, Light, LightKind, Material, Scene, Sphere, Surface, Triangle},
     settings::{Mode, Settings},
 };
 use glam::Vec3;
@@ -27,12 +27,21 @@ pub fn glass() -> Surface {
 }
 
 pub fn scene(surfaces: &[Surface]) -> Scene {
-    let materials = surfaces.iter().map(|&surface| Material { name: String::new(), surface }).collect();
+    let materials = surfaces
+        .iter()
+        .map(|&surface| Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false })
+        .collect();
     Scene { materials, ..Scene::default() }
 }
 
 pub fn point_light(position: Vec3, intensity: f32) -> Light {
-    Light { name: String::new(), position, intensity: Vec3::splat(intensity) }
+    Light {
+        name: String::new(),
+        kind: LightKind::Point,
+        position,
+        direction: Vec3::NEG_Z,
+        intensity: Vec3::splat(intensity),
+    }
 }
 
 /// A camera at `position` that looks at `target`; full vertical angle in degrees.

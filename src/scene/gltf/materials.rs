@@ -22,7 +22,7 @@ fn name(material: &json::Material, index: usize) -> String {
 pub(super) fn default_material(notes: &mut Notes) -> Read<Material> {
     let name = "default material".to_owned();
     let surface = surface(&json::Material::default(), &name, "materials", notes)?;
-    Ok(Material { name, surface })
+    Ok(Material { name, surface, emission: Vec3::ZERO, double_sided: false })
 }
 
 /// A material of the file.
@@ -31,7 +31,7 @@ pub(super) fn read(root: &json::Root, index: usize, notes: &mut Notes) -> Read<M
     let name = name(material, index);
     let surface = surface(material, &name, &format!("materials[{index}]"), notes)?;
     note_unread(material, &name, notes);
-    Ok(Material { name, surface })
+    Ok(Material { name, surface, emission: Vec3::ZERO, double_sided: false })
 }
 
 /// The surface that comes nearest.

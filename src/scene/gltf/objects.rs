@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::fault::{Notes, Read, fault};
 use super::nodes::{self, Placed};
-use crate::scene::{Camera, Light};
+use crate::scene::{Camera, Light, LightKind};
 
 /// Largest relative difference of a transform's axes that still counts as a uniform scale.
 const UNIFORM: f64 = 1e-4;
@@ -67,7 +67,10 @@ pub(super) fn light(root: &json::Root, placed: &Placed, notes: &mut Notes) -> Re
     if light.range.is_some() {
         notes.add("the range of lights is not read: they reach everywhere");
     }
-    Ok(Some(PlacedLight::Point(placed.world.w_axis.truncate(), Light { name, position: Vec3::ZERO, intensity })))
+    Ok(Some(PlacedLight::Point(
+        placed.world.w_axis.truncate(),
+        Light { name, kind: LightKind::Point, position: Vec3::ZERO, direction: Vec3::NEG_Z, intensity },
+    )))
 }
 
 /// The perspective camera that a node carries, with its number in the file and its place in the world.
