@@ -10,7 +10,7 @@ mod radiance;
 mod tonemap;
 
 pub use canvas::{Canvas, Rgb8};
-pub use exr::{Origin, read_exr, read_exr_attributes, write_exr};
+pub use exr::{EnvironmentOrigin, Origin, read_exr, read_exr_attributes, write_exr};
 pub use file::{check_output, close_files, write_file};
 pub use png::{encode_png, write_png};
 pub(crate) use radiance::{decode_radiance, read_radiance_bytes};

@@ -118,3 +118,82 @@ impl Environment {
 fn hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::FRAC_1_SQRT_2;
+
+    use super::*;
+
+    /// Eight columns and four rows, each pixel of a colour of its own: red counts columns, green rows.
+    fn map() -> Environment {
+        let pixels = (0..32).map(|i| [(i % 8) as f32, (i / 8) as f32, 1.0]).collect();
+        Environment { width: 8, height: 4, pixels, ..Environment::uniform(Vec3::ZERO) }
+    }
+
+    fn assert_near(found: Vec3, expected: Vec3) {
+        assert!((found - expected).length() < 1e-5, "{found}, expected {expected}");
+    }
+
+    #[test]
+    fn directions_lie_where_three_js_has_them() {
+        let map = map();
+        // u = 0.5 + atan2(z, x)/2π: +X is the middle of the picture, +Z three quarters, -Z one quarter, -X both ends.
+        // Between two columns both count half; the horizon is between the rows 1 and 2.
+        for (direction, column, row) in [
+            (Vec3::X, 3.5, 1.5),
+            (Vec3::Z, 5.5, 1.5),
+            (Vec3::NEG_Z, 1.5, 1.5),
+            (Vec3::NEG_X, 3.5, 1.5),
+            (Vec3::new(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0), 3.5, 0.5),
+            (Vec3::new(0.0, -FRAC_1_SQRT_2, FRAC_1_SQRT_2), 5.5, 2.5),
+        ] {
+            assert_near(map.radiance(direction), Vec3::new(column, row, 1.0));
+        }
+        // The poles take the outer rows as they are.
+        assert_eq!((map.radiance(Vec3::Y).y, map.radiance(Vec3::NEG_Y).y), (0.0, 3.0));
+        // The middle of a pixel is that pixel.
+        let (sin, cos) = (std::f32::consts::TAU * (2.5 / 8.0 - 0.5)).sin_cos();
+        let v = std::f32::consts::PI * 2.5 / 4.0;
+        assert_near(map.radiance(Vec3::new(cos * v.sin(), v.cos(), sin * v.sin())), Vec3::new(2.0, 2.0, 1.0));
+    }
+
+    #[test]
+    fn the_seam_is_none_and_pixels_blend() {
+        let map = map();
+        let at = |u: f32| {
+            let (sin, cos) = (std::f32::consts::TAU * (u - 0.5)).sin_cos();
+            map.radiance(Vec3::new(cos, 0.0, sin)).x
+        };
+        // From the middle of the last column to that of the first: 7, then 0.
+        for (u, expected) in [(7.5, 7.0), (7.75, 5.25), (8.0, 3.5), (0.0, 3.5), (0.25, 1.75), (0.5, 0.0), (1.25, 0.75)]
+        {
+            assert!((at(u / 8.0) - expected).abs() < 1e-4, "{u}: {}", at(u / 8.0));
+        }
+    }
+
+    #[test]
+    fn rotation_turns_the_map_and_strength_scales_it() {
+        let (plain, degrees) = (map(), 40.0_f32);
+        let turned = Environment { rotation: degrees.to_radians(), strength: 3.0, ..map() };
+        let turn = |by: f32| glam::Quat::from_rotation_y(by.to_radians());
+        for d in [Vec3::X, Vec3::new(0.3, 0.2, -0.8).normalize(), Vec3::new(-0.5, -0.7, 0.1).normalize()] {
+            assert_near(turned.radiance(turn(degrees) * d) / 3.0, plain.radiance(d));
+            assert!((turned.radiance(turn(-degrees) * d) / 3.0 - plain.radiance(d)).length() > 0.1, "control: {d}");
+        }
+        // Counterclockwise from above: a quarter turn takes +X to -Z.
+        let quarter = Environment { rotation: 90_f32.to_radians(), ..map() };
+        assert_near(quarter.radiance(Vec3::NEG_Z), plain.radiance(Vec3::X));
+    }
+
+    #[test]
+    fn a_uniform_one_is_the_same_from_everywhere() {
+        let (sky, other) = (Environment::uniform(Vec3::new(1.0, 2.0, 3.0)), Environment::uniform(Vec3::ONE));
+        for d in [Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(-0.6, 0.0, 0.8)] {
+            assert_near(sky.radiance(d), Vec3::new(1.0, 2.0, 3.0));
+        }
+        assert!(!sky.is_dark() && Environment::uniform(Vec3::ZERO).is_dark());
+        assert!(Environment { strength: 0.0, ..sky.clone() }.is_dark());
+        assert!(sky.hash.len() == 64 && sky.hash != other.hash);
+    }
+}

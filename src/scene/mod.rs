@@ -5,7 +5,12 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 
-use crate::{Error, Result};
+use crate::{
+    Error, Result,
+    image::{EnvironmentOrigin, Origin},
+    settings::Settings,
+    stats::Stats,
+};
 
 mod camera;
 mod describe;
@@ -82,6 +87,19 @@ impl Scene {
         let is_such = |material: u32| such.get(material as usize) == Some(&true);
         self.triangles.iter().any(|triangle| is_such(triangle.material))
             || self.spheres.iter().any(|sphere| is_such(sphere.material))
+    }
+
+    /// What a picture's file is to tell of where it comes from.
+    #[must_use]
+    pub fn origin<'a>(&'a self, settings: &'a Settings, stats: &'a Stats) -> Origin<'a> {
+        let environment = self.environment.as_ref().map(|environment| EnvironmentOrigin {
+            name: &environment.name,
+            hash: &environment.hash,
+            radiance: (environment.pixels.len() == 1).then(|| environment.pixels[0]),
+            strength: environment.strength,
+            rotation: environment.rotation,
+        });
+        Origin { scene: &self.file_name, scene_hash: &self.hash, environment, settings, stats }
     }
 
     /// The camera of that name, or of that number in [`Scene::cameras`]; the first if none is asked for.
