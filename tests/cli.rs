@@ -115,7 +115,7 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_right() {
         ("render scene.gltf -o a.exr --background 1,1", "three numbers"),
         ("render scene.gltf -o a.exr --background=-1,0,0", "three numbers"),
         ("render scene.gltf -o a.exr --env-strength 2", "--env <FILE>"),
-        ("render scene.gltf -o a.exr --background 1,1,1 --env-rotation 2", "--env <FILE>"),
+        ("render scene.gltf -o a.exr --background 1,1,1 --env-rotation 2", "cannot be used with"),
         ("render scene.gltf -o a.exr --env a.hdr --env-strength=-1", "at least 0"),
         ("render scene.gltf -o a.exr --env a.hdr --env-rotation north", "degrees"),
         ("render scene.gltf -o a.exr --tonemap film", "reinhard"),
