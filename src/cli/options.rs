@@ -6,6 +6,7 @@ use caustica::{
 };
 use clap::ValueEnum;
 
+use super::environment::EnvironmentOptions;
 use super::values::{cone_constant, count, exposure, photons, radius, size};
 
 /// Options of commands that make one picture.
@@ -46,6 +47,9 @@ pub struct SharedOptions {
     /// How the file's light intensities are read
     #[arg(long, value_name = "UNIT", value_enum, default_value = "radiometric", help_heading = "Light")]
     pub light_unit: LightUnitArg,
+
+    #[command(flatten)]
+    pub environment: EnvironmentOptions,
 
     /// Photon paths emitted at most [default: 100 times the capacity]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
