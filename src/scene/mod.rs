@@ -76,6 +76,17 @@ impl Scene {
             || self.spheres.iter().any(|sphere| is_delta(sphere.material))
     }
 
+    /// Something shines: a light, a surface, or what is all around.
+    #[must_use]
+    pub fn has_light(&self) -> bool {
+        let emission = |material: u32| self.materials.get(material as usize).map_or(0.0, |m| m.emission.max_element());
+        let shines = |material: u32| emission(material) > 0.0;
+        !self.lights.is_empty()
+            || self.environment.is_some()
+            || self.triangles.iter().any(|triangle| shines(triangle.material))
+            || self.spheres.iter().any(|sphere| shines(sphere.material))
+    }
+
     /// The camera of that name, or of that number in [`Scene::cameras`]; the first if none is asked for.
     ///
     /// # Errors
@@ -111,7 +122,7 @@ impl Scene {
                 if self.warnings.is_empty() { String::new() } else { format!(" ({})", self.warnings.join("; ")) };
             return Err(error("scene", format!("nothing to draw: it holds no triangle and no sphere{notes}")));
         }
-        if self.lights.is_empty() {
+        if !self.has_light() {
             let unread: Vec<String> = self.unread_lights.iter().map(|(kind, n)| counted(*n, kind)).collect();
             let problem = if unread.is_empty() {
                 "no light: add a point light (KHR_lights_punctual)".to_owned()
