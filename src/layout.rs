@@ -245,6 +245,9 @@ pub struct PhotonBatch {
     pub pad1: u32,
 }
 
+/// Streams of random numbers: of general photon paths, and of those aimed at mirrors and glass.
+pub const STREAM_PHOTON: u32 = 0;
+pub const STREAM_CAUSTIC: u32 = 2;
 /// The global map still takes photons.
 pub const STORE_GLOBAL: u32 = 1;
 /// The global map takes photons that come straight from a light.

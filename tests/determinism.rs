@@ -68,8 +68,7 @@ fn emitted_directions(count: u32) -> Vec<Vec3> {
     let bvh = Bvh::build(&scene);
     let buffers = SceneBuffers::new(gpu, &scene, &bvh, &Settings::default()).expect("the scene fits");
     let emit = buffers.kernel(gpu, "emit_photons");
-    let batch =
-        PhotonBatch { seed: 3, paths: count, light_count: 1, turns: 1, target_count: 1, ..Default::default() };
+    let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns: 1, target_count: 1, ..Default::default() };
     let uniform = gpu.uniform("batch", &batch);
     let paths = gpu.storage::<layout::Path>("paths", u64::from(count)).expect("fits");
     let queue = gpu.storage::<u32>("queue", u64::from(count)).expect("fits");

@@ -91,6 +91,8 @@ fn constants() -> Vec<(&'static str, u64)> {
         TRIANGLE_LIGHT,
         SPHERE_LIGHT,
         ENVIRONMENT_LIGHT,
+        STREAM_PHOTON,
+        STREAM_CAUSTIC,
         STORE_GLOBAL,
         STORE_DIRECT,
         STORE_CAUSTIC,

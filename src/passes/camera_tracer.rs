@@ -182,12 +182,8 @@ impl CameraTracer {
     /// Faults of the driver.
     pub fn light_directly(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
-        let buffers = [
-            ("tile", &uniform),
-            ("points", &self.points),
-            ("radiance", &self.radiance),
-            ("counters", &self.counters),
-        ];
+        let buffers =
+            [("tile", &uniform), ("points", &self.points), ("radiance", &self.radiance), ("counters", &self.counters)];
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
         self.direct.add(gpu, scene, &mut encoder, self.point_count(tile), &buffers);

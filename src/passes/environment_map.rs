@@ -28,7 +28,8 @@ impl EnvironmentMap {
     #[must_use]
     pub fn new(environment: &Environment, bytes: u64) -> Self {
         let mut size = (environment.width as usize, environment.height as usize);
-        let mut pixels: Vec<[f32; 3]> = environment.pixels.iter().map(|p| p.map(|x| x * environment.strength)).collect();
+        let mut pixels: Vec<[f32; 3]> =
+            environment.pixels.iter().map(|p| p.map(|x| x * environment.strength)).collect();
         while size.0 > 1 && (size.0 * size.1 * size_of::<[f32; 4]>()) as u64 > bytes {
             (pixels, size) = halved(&pixels, size);
         }
@@ -122,8 +123,7 @@ mod tests {
     #[test]
     fn neighbours_of_a_lonely_pixel_can_be_drawn() {
         let pixels = (0..8 * 4).map(|i| [if i == 16 { 1.0 } else { 0.0 }; 3]).collect();
-        let environment =
-            Environment { width: 8, height: 4, pixels, ..Environment::uniform(glam::Vec3::ZERO) };
+        let environment = Environment { width: 8, height: 4, pixels, ..Environment::uniform(glam::Vec3::ZERO) };
         let map = EnvironmentMap::new(&environment, u64::MAX);
         let in_row: Vec<f32> = map.pixels[16..24].iter().map(|p| p[3]).collect();
         assert!(in_row[0] > 0.4 && in_row[1] > 0.7 && in_row[6] == in_row[1] && in_row[7] == 1.0, "{in_row:?}");

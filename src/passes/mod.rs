@@ -19,9 +19,9 @@ pub mod targets;
 
 pub use camera_tracer::{CameraTracer, StepCount, Tile};
 pub use gather::{Gather, GatherOptions, GatherSettings};
-pub use photon_map::{MapKernels, PhotonMap, PhotonStore};
 pub use light_table::LightGroup;
 pub use photon_batch::BOUNCE_CEILING;
+pub use photon_map::{MapKernels, PhotonMap, PhotonStore};
 pub use photon_tracer::{PhotonTracer, TracedPhotons};
 pub use raw_map::RawMap;
 pub use scene_buffers::SceneBuffers;

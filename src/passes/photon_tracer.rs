@@ -24,9 +24,6 @@ const MAX_BATCH: u64 = 1 << 19;
 const GROWTH_WINDOW: u64 = 1 << 17;
 /// Fixed-point unit of lost flux, as a fraction of a path's mean flux.
 const LOST_UNIT: f64 = 1.0 / 4096.0;
-/// Streams of random numbers, as in `shaders/lib/rng.wesl`.
-const STREAM_PHOTON: u32 = 0;
-const STREAM_CAUSTIC: u32 = 2;
 
 /// What the photon pass leaves.
 #[derive(Debug)]
@@ -151,11 +148,7 @@ impl PhotonTracer {
                 traced.warnings.extend(idle);
             }
             let (global, caustic) = (&traced.global, &traced.caustic);
-            progress.report(
-                Stage::Photons,
-                global.stored + caustic.stored,
-                global.expected() + caustic.expected(),
-            );
+            progress.report(Stage::Photons, global.stored + caustic.stored, global.expected() + caustic.expected());
         }
         if plan.fills_global {
             let flux = LOST_UNIT * scene.lights.table.power();
@@ -172,7 +165,7 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &Settings, caustics: bool) -> Ve
     let aimed = settings.emission == Emission::Aimed;
     let general = EmissionPlan {
         choices: &lights.photons,
-        stream: STREAM_PHOTON,
+        stream: layout::STREAM_PHOTON,
         first_target: 0,
         target_count: 1,
         rules: rule(aimed, layout::AIM | layout::CAUSTICS_APART)
@@ -183,7 +176,7 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &Settings, caustics: bool) -> Ve
     };
     let caustic = EmissionPlan {
         choices: &lights.aimed,
-        stream: STREAM_CAUSTIC,
+        stream: layout::STREAM_CAUSTIC,
         first_target: 1,
         target_count: lights.delta_targets,
         rules: layout::AIM | layout::CAUSTICS_APART,
@@ -196,7 +189,10 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &Settings, caustics: bool) -> Ve
 
 impl EmissionPlan<'_> {
     /// The maps that it fills, by name.
-    fn maps<'t>(&self, traced: &'t mut TracedPhotons) -> impl Iterator<Item = (&'static str, &'t mut RawMap)> + use<'t> {
+    fn maps<'t>(
+        &self,
+        traced: &'t mut TracedPhotons,
+    ) -> impl Iterator<Item = (&'static str, &'t mut RawMap)> + use<'t> {
         let global = self.fills_global.then_some(("global", &mut traced.global));
         global.into_iter().chain(self.fills_caustic.then_some(("caustic", &mut traced.caustic)))
     }
