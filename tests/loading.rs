@@ -15,6 +15,11 @@ fn refusal(change: impl FnOnce(&mut Value)) -> String {
     message(load(&gltf))
 }
 
+/// The box of an orthographic camera.
+fn camera_box(xmag: f64, ymag: f64) -> Value {
+    json!({ "xmag": xmag, "ymag": ymag, "znear": 0.1, "zfar": 10 })
+}
+
 #[test]
 fn faults_are_named_with_their_place() {
     let check = |change: fn(&mut Value), expected: &str| assert_eq!(refusal(change), expected);
@@ -34,6 +39,19 @@ fn faults_are_named_with_their_place() {
         |g| g["cameras"][0]["perspective"]["yfov"] = 4.into(),
         "cameras[0].perspective.yfov: 4 is not between 0 and pi",
     );
+    check(
+        |g| g["cameras"][0] = json!({ "type": "orthographic", "orthographic": camera_box(1.0, 0.0) }),
+        "cameras[0].orthographic.ymag: 0 is not a positive number",
+    );
+    check(
+        |g| g["cameras"][0] = json!({ "type": "orthographic", "orthographic": camera_box(-1.0, 1.0) }),
+        "cameras[0].orthographic.xmag: -1 is not a positive number",
+    );
+    check(
+        |g| g["cameras"][0] = json!({ "type": "orthographic", "orthographic": camera_box(1e30, 1e-30) }),
+        "cameras[0].orthographic: xmag / ymag is not a positive number",
+    );
+    check(|g| g["cameras"][0]["type"] = "orthographic".into(), "cameras[0]: orthographic is missing");
     check(|g| g["meshes"][0]["primitives"][0]["material"] = 2.into(), "meshes[0].primitives[0].material: 2 of 1");
     check(|g| g["meshes"][0]["primitives"][0]["mode"] = 9.into(), "meshes[0].primitives[0].mode: is not one of glTF's");
     check(

@@ -2,7 +2,7 @@
 
 mod gltf;
 
-use caustica::scene::Surface;
+use caustica::scene::{Projection, Surface};
 use caustica::settings::LightUnit;
 use glam::Vec3;
 use gltf::{lambert, loaded, triangle};
@@ -90,14 +90,30 @@ fn cameras_are_found_by_name_and_number_and_made_if_missing() {
 
     gltf["scenes"][0]["nodes"] = json!([0, 1]);
     let scene = loaded(&gltf);
-    assert_eq!(scene.warnings, ["no perspective camera: one is made that frames the whole scene"]);
+    assert_eq!(scene.warnings, ["no camera: one is made that frames the whole scene"]);
     let camera = scene.camera(None).expect("a framing camera");
     let sees = |p: Vec3| {
-        let (v, half) = (p - camera.position, (0.5 * camera.yfov).tan());
-        v.dot(camera.up).abs().max(v.dot(camera.right).abs()) <= half * v.dot(camera.forward)
+        let v = p - camera.position;
+        let half = camera.projection.half_height_at(v.dot(camera.forward));
+        v.dot(camera.up).abs().max(v.dot(camera.right).abs()) <= half
     };
     assert!(scene.triangles[0].positions.iter().all(|p| sees(*p)));
     assert!(!sees(Vec3::new(0.0, 3.0, 0.0)), "not everything is in view");
+}
+
+#[test]
+fn orthographic_cameras_keep_their_height_and_aspect() {
+    let mut gltf = triangle();
+    gltf["cameras"][0] =
+        json!({ "type": "orthographic", "orthographic": { "xmag": 3, "ymag": 2, "znear": 0, "zfar": 9 } });
+    // A camera ignores its node's scale (glTF 2.0, 3.10.2).
+    gltf["nodes"][2]["scale"] = json!([5, 5, 5]);
+    let scene = loaded(&gltf);
+    let camera = scene.camera(None).expect("a camera");
+    assert_eq!((camera.projection, camera.aspect), (Projection::Orthographic { ymag: 2.0 }, Some(1.5)));
+    assert_eq!(scene.warnings, [""; 0]);
+    let info = scene.describe().to_string();
+    assert!(info.contains("0  view  at 0 0 3  orthographic, ymag 2 m  aspect 1.5\n"), "{info}");
 }
 
 #[test]

@@ -3,10 +3,10 @@
 
 use super::{SceneBuffers, direct_light::DirectLighting};
 use crate::{
-    error::Result,
+    error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
     layout::{CameraTile, Counters, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
-    scene::Camera,
+    scene::{Camera, Projection},
     settings::Settings,
 };
 
@@ -65,7 +65,7 @@ pub struct StepCount {
 
 impl CameraTracer {
     /// # Errors
-    /// Limits of the adapter.
+    /// Limits of the adapter; an orthographic camera.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -90,7 +90,7 @@ impl CameraTracer {
             gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
-            view: CameraTile { branches, ..view(camera, size, settings) },
+            view: CameraTile { branches, ..view(camera, size, settings)? },
         })
     }
 
@@ -235,11 +235,15 @@ impl From<Counters> for StepCount {
 }
 
 /// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows from the aspect.
-fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> CameraTile {
-    let half_height = (camera.yfov / 2.0).tan();
+fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Result<CameraTile> {
+    let Projection::Perspective { .. } = camera.projection else {
+        let problem = "is orthographic, which is not rendered yet; choose a perspective one".to_owned();
+        return Err(Error::Setting { name: "camera", value: format!("{:?}", camera.name), problem });
+    };
+    let half_height = camera.projection.half_height_at(1.0);
     let half_width = half_height * width as f32 / height as f32;
     let bounces = if settings.max_bounces == 0 { super::BOUNCE_CEILING } else { settings.max_bounces };
-    CameraTile {
+    Ok(CameraTile {
         position: camera.position.to_array(),
         seed: settings.seed,
         right: (camera.right * half_width).to_array(),
@@ -250,5 +254,5 @@ fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Ca
         spp: settings.spp,
         max_bounces: bounces.min(super::BOUNCE_CEILING),
         ..Default::default()
-    }
+    })
 }

@@ -4,9 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::Scene;
+use super::{Projection, Scene};
 
-/// Facts about a scene. Coordinates and angles are the file's: metres in its world, degrees.
+/// Facts about a scene. Coordinates are the file's: metres in its world. Angles are in radians.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneInfo {
     pub file_name: String,
@@ -33,13 +33,12 @@ pub struct LightInfo {
     pub power: [f32; 3],
 }
 
-/// A perspective camera.
+/// A camera.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CameraInfo {
     pub name: String,
     pub position: [f64; 3],
-    /// Full vertical angle of view, degrees.
-    pub yfov: f32,
+    pub projection: Projection,
     /// Width over height, where the file says.
     pub aspect: Option<f32>,
 }
@@ -76,7 +75,7 @@ impl Scene {
                 .map(|camera| CameraInfo {
                     name: camera.name.clone(),
                     position: world(camera.position),
-                    yfov: camera.yfov.to_degrees(),
+                    projection: camera.projection,
                     aspect: camera.aspect,
                 })
                 .collect(),
@@ -117,7 +116,11 @@ impl fmt::Display for SceneInfo {
         })?;
         section(f, "cameras", self.cameras.iter(), |camera| {
             let aspect = camera.aspect.map_or(String::new(), |aspect| format!("  aspect {aspect}"));
-            format!("{}  at {}  yfov {:.2}°{aspect}", camera.name, triple(camera.position), camera.yfov)
+            let view = match camera.projection {
+                Projection::Perspective { yfov } => format!("yfov {:.2}°", yfov.to_degrees()),
+                Projection::Orthographic { ymag } => format!("orthographic, ymag {ymag} m"),
+            };
+            format!("{}  at {}  {view}{aspect}", camera.name, triple(camera.position))
         })?;
         section(f, "materials", self.materials.iter(), |material| format!("{}  {}", material.name, material.read_as))?;
         section(f, "notes", self.notes.iter(), Clone::clone)

@@ -16,7 +16,7 @@ mod light;
 mod material;
 mod shape;
 
-pub use camera::Camera;
+pub use camera::{Camera, Projection};
 pub use describe::{CameraInfo, LightInfo, MaterialInfo, SceneInfo};
 pub use environment::Environment;
 pub use light::{LEAST_FALLOFF, LUMENS_PER_WATT, Light, LightKind};

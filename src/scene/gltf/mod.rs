@@ -15,6 +15,7 @@ use crate::{Error, Result};
 
 mod accessor;
 mod buffers;
+mod cameras;
 mod container;
 mod fault;
 mod materials;
@@ -138,7 +139,7 @@ impl Carried {
                 }
                 Some(PlacedLight::Dark) | None => {}
             }
-            carried.cameras.extend(objects::camera(root, placed, notes)?);
+            carried.cameras.extend(cameras::read(root, placed)?);
             carried.spheres.extend(objects::sphere(root, placed, notes)?);
         }
         carried.cameras.sort_by_key(|(index, ..)| *index);
@@ -155,7 +156,7 @@ impl Carried {
         if scene.cameras.is_empty() {
             let bounds = scene.bounds();
             if bounds != Bounds::EMPTY {
-                notes.add("no perspective camera: one is made that frames the whole scene");
+                notes.add("no camera: one is made that frames the whole scene");
             }
             scene.cameras.push(Camera::framing(bounds));
         }

@@ -1,8 +1,7 @@
-//! What nodes carry besides meshes: lights, cameras, spheres. Positions are still the world's, in f64.
+//! What nodes carry besides meshes and cameras: lights, spheres. Positions are still the world's, in f64.
 
 use glam::{DMat4, DVec3, Vec3};
 use gltf::json;
-use json::camera::Type as CameraType;
 use json::extensions::scene::khr_lights_punctual::Type as LightType;
 use json::validation::Checked;
 use serde::Deserialize;
@@ -10,7 +9,7 @@ use serde_json::Value;
 
 use super::fault::{Notes, Read, fault};
 use super::nodes::{self, Placed};
-use crate::scene::{Camera, Light, LightKind};
+use crate::scene::{Light, LightKind};
 
 /// Largest relative difference of a transform's axes that still counts as a uniform scale.
 const UNIFORM: f64 = 1e-4;
@@ -71,40 +70,6 @@ pub(super) fn light(root: &json::Root, placed: &Placed, notes: &mut Notes) -> Re
         placed.world.w_axis.truncate(),
         Light { name, kind: LightKind::Point, position: Vec3::ZERO, direction: Vec3::NEG_Z, intensity },
     )))
-}
-
-/// The perspective camera that a node carries, with its number in the file and its place in the world.
-pub(super) fn camera(root: &json::Root, placed: &Placed, notes: &mut Notes) -> Read<Option<(usize, DVec3, Camera)>> {
-    let node = &root.nodes[placed.node];
-    let Some(index) = node.camera.map(|camera| camera.value()) else { return Ok(None) };
-    let camera = &root.cameras[index];
-    let place = format!("cameras[{index}]");
-    let own_name = camera.name.clone().unwrap_or_else(|| format!("camera {index}"));
-    let name = node.name.clone().filter(|name| !name.is_empty()).unwrap_or(own_name);
-    let perspective = match (&camera.type_, &camera.perspective) {
-        (Checked::Valid(CameraType::Perspective), Some(perspective)) => perspective,
-        (Checked::Valid(CameraType::Orthographic), _) => {
-            notes.add(format!("camera {name:?} is orthographic, which is not read yet"));
-            return Ok(None);
-        }
-        (Checked::Valid(CameraType::Perspective), None) => return fault(place, "perspective is missing"),
-        (Checked::Invalid, _) => return fault(place, "type is not perspective or orthographic"),
-    };
-    let (yfov, aspect) = (perspective.yfov, perspective.aspect_ratio);
-    if !(yfov > 0.0 && yfov < std::f32::consts::PI) {
-        return fault(format!("{place}.perspective.yfov"), format!("{yfov} is not between 0 and pi"));
-    }
-    if aspect.is_some_and(|aspect| !(aspect.is_finite() && aspect > 0.0)) {
-        return fault(format!("{place}.perspective.aspectRatio"), "is not a positive number");
-    }
-    let (forward, up) = (-placed.world.z_axis.truncate().normalize_or_zero(), placed.world.y_axis.truncate());
-    let right = forward.cross(up.normalize_or_zero()).normalize_or_zero();
-    if right == DVec3::ZERO {
-        return fault(format!("nodes[{}]", placed.node), "its transform leaves its camera no direction");
-    }
-    let (right, up, forward) = (right.as_vec3(), right.cross(forward).as_vec3(), forward.as_vec3());
-    let camera = Camera { name, position: Vec3::ZERO, right, up, forward, yfov, aspect };
-    Ok(Some((index, placed.world.w_axis.truncate(), camera)))
 }
 
 #[derive(Deserialize)]
