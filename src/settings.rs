@@ -17,7 +17,7 @@ pub enum Mode {
     DirectRays,
     /// 3: light straight from the lights or through delta surfaces only, by photons.
     DirectPhotons,
-    /// 4: what mode 0 takes from photons.
+    /// 4: what mode 0 takes from photons. The only one that does not show what shines.
     IndirectPhotons,
 }
 
@@ -36,6 +36,12 @@ impl Mode {
     #[must_use]
     pub fn direct_by_rays(self) -> bool {
         matches!(self, Mode::Hybrid | Mode::DirectRays)
+    }
+
+    /// The picture shows what shines, straight, in mirrors and through glass.
+    #[must_use]
+    pub fn sees_lights(self) -> bool {
+        self != Mode::IndirectPhotons
     }
 
     /// Photons are traced at all.
@@ -64,8 +70,19 @@ pub enum LightSampling {
     /// In proportion to power: all photons start with like flux.
     #[default]
     Power,
-    /// In turn, whatever the power.
+    /// In turn, whatever the power. What shines by one material is one light.
     Uniform,
+}
+
+/// Where photon paths are sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Emission {
+    /// Towards the scene, for the global map; and apart from that towards mirrors and glass, for the caustic map.
+    #[default]
+    Aimed,
+    /// Wherever the lights shine, for both maps at once.
+    Unaimed,
 }
 
 /// How the file's light intensities are read.
@@ -119,6 +136,18 @@ pub struct Settings {
     pub light_unit: LightUnit,
     #[serde(default)]
     pub search: Search,
+    /// Lights by name, and the factor on their share of the photons, each > 0.
+    #[serde(default)]
+    pub light_photons: Vec<(String, f64)>,
+    #[serde(default)]
+    pub emission: Emission,
+    /// Samples of the direct light of emissive surfaces and the environment per visible point, 1 to 4096.
+    #[serde(default = "default_light_samples")]
+    pub light_samples: u32,
+}
+
+fn default_light_samples() -> u32 {
+    Settings::default().light_samples
 }
 
 impl Default for Settings {
@@ -139,6 +168,9 @@ impl Default for Settings {
             light_sampling: LightSampling::Power,
             light_unit: LightUnit::Radiometric,
             search: Search::Grid,
+            light_photons: Vec::new(),
+            emission: Emission::Aimed,
+            light_samples: 4,
         }
     }
 }
@@ -165,6 +197,12 @@ impl Settings {
         }
         if self.spp == 0 {
             return fail("spp", "0".to_string(), "must be at least 1");
+        }
+        if !(1..=4096).contains(&self.light_samples) {
+            return fail("light-samples", self.light_samples.to_string(), "must be from 1 to 4096");
+        }
+        if let Some((light, weight)) = self.light_photons.iter().find(|(_, w)| !(*w > 0.0 && w.is_finite())) {
+            return fail("light-photons", format!("{light}={weight}"), "the weight must be above 0");
         }
         if self.max_paths == Some(0) {
             return fail("max-paths", "0".to_string(), "must be at least 1");

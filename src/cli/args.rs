@@ -111,7 +111,7 @@ impl RenderArgs {
 
 #[cfg(test)]
 mod tests {
-    use caustica::settings::{LightSampling, LightUnit, Mode, Search};
+    use caustica::settings::{Emission, LightSampling, LightUnit, Mode, Search};
 
     use super::*;
 
@@ -153,7 +153,8 @@ mod tests {
     fn every_option_reaches_the_settings() {
         let s = settings(
             "--max-paths 3M -k 50 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
-             --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree",
+             --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
+             --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
         let expected = Settings {
             max_paths: Some(3_000_000),
@@ -168,6 +169,9 @@ mod tests {
             light_sampling: LightSampling::Uniform,
             light_unit: LightUnit::Photometric,
             search: Search::KdTree,
+            light_photons: vec![("lamp".into(), 2.0), ("sky".into(), 0.5)],
+            light_samples: 9,
+            emission: Emission::Unaimed,
             ..Settings::default()
         };
         assert_eq!(s, expected);

@@ -2,12 +2,12 @@
 
 use caustica::{
     image::Tonemap,
-    settings::{LightSampling, LightUnit, Mode, Search, Settings},
+    settings::{Emission, LightSampling, LightUnit, Mode, Search, Settings},
 };
 use clap::ValueEnum;
 
 use super::environment::EnvironmentOptions;
-use super::values::{cone_constant, count, exposure, photons, radius, size};
+use super::values::{cone_constant, count, exposure, light_weight, photons, radius, size};
 
 /// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
@@ -43,6 +43,20 @@ pub struct SharedOptions {
     /// How photon paths are dealt to lights
     #[arg(long, value_name = "HOW", value_enum, default_value = "power", help_heading = "Light")]
     pub light_sampling: LightSamplingArg,
+
+    /// Multiplies the share of a light's photons, by the name of the light, emissive material or environment; may be given
+    /// several times
+    #[arg(long, value_name = "NAME=WEIGHT", value_parser = light_weight, help_heading = "Light")]
+    pub light_photons: Vec<(String, f64)>,
+
+    /// Samples of the direct light of emissive surfaces and the environment per visible point
+    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Light")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub light_samples: u32,
+
+    /// Where photon paths are sent
+    #[arg(long, value_name = "HOW", value_enum, default_value = "aimed", help_heading = "Photons")]
+    pub emission: EmissionArg,
 
     /// How the file's light intensities are read
     #[arg(long, value_name = "UNIT", value_enum, default_value = "radiometric", help_heading = "Light")]
@@ -138,6 +152,9 @@ impl SharedOptions {
             seed: self.seed,
             light_sampling: self.light_sampling.into(),
             light_unit: self.light_unit.into(),
+            light_photons: self.light_photons.clone(),
+            light_samples: self.light_samples,
+            emission: self.emission.into(),
             ..defaults
         }
     }
@@ -180,6 +197,13 @@ value_enum!(LightSamplingArg => LightSampling {
     Power,
     /// In turn, whatever the power
     Uniform,
+});
+
+value_enum!(EmissionArg => Emission {
+    /// Towards the scene for the global map, and apart from that towards mirrors and glass for the caustic map
+    Aimed,
+    /// Wherever the lights shine, for both maps at once
+    Unaimed,
 });
 
 value_enum!(LightUnitArg => LightUnit {
