@@ -1,12 +1,14 @@
-//! Radiance from the k nearest photons. Kernels: `key_points`, `aim_search`,
+//! Radiance from the photons around a point. Kernels: `key_points`, `aim_search`,
 //! `count_photons`, `gather`, `finish_gather`.
 
 use super::{photon_map::PhotonMap, radix_sort::RadixSort};
 use crate::{
+    density::Density,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
     layout::{GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
     progress::Progress,
+    settings::{Search, Settings},
 };
 
 /// Points that are searched together; more go in several batches.
@@ -26,10 +28,23 @@ const STRIDES: [(u32, u32); 3] = [(64, 4), (8, 3), (1, 2)];
 pub struct GatherSettings {
     /// k, photons of an estimate, 1 to 1000.
     pub neighbors: u32,
-    /// C of the cone filter, ≥ 1.
-    pub cone_constant: f32,
+    /// Radius of the estimate, metres: all photons within it count, whatever `neighbors` and `max_radius` are.
+    pub radius: Option<f32>,
     /// Largest radius, metres.
     pub max_radius: Option<f32>,
+    /// The kernel.
+    pub density: Density,
+}
+
+impl From<&Settings> for GatherSettings {
+    fn from(settings: &Settings) -> Self {
+        Self {
+            neighbors: settings.neighbors,
+            radius: settings.radius.filter(|_| settings.search == Search::Radius),
+            max_radius: settings.max_radius,
+            density: settings.density(),
+        }
+    }
 }
 
 /// How the kernels are compiled; for tests and benchmarks.
@@ -62,13 +77,25 @@ pub struct Gather {
     options: GatherOptions,
     key: Kernel,
     radix: RadixSort,
-    /// Search and sum for maps of one window and of two, compiled when first needed.
-    search: [Option<Search>; 2],
+    /// Search and sum, each variant compiled when first needed.
+    compiled: Vec<(Variant, Compiled)>,
     scratch: Option<Scratch>,
 }
 
+/// What the kernels are compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Variant {
+    /// Windows of the map.
+    windows: u32,
+    /// Coefficients of the kernel's polynomial, and its power of the distance.
+    moments: u32,
+    power: u32,
+    /// The search does not know how many photons are summed.
+    counts: bool,
+}
+
 #[derive(Debug)]
-struct Search {
+struct Compiled {
     aim: Kernel,
     count: Kernel,
     sum: Kernel,
@@ -86,13 +113,11 @@ struct Scratch {
 }
 
 impl Gather {
-    /// Compiles the kernels.
+    /// Compiles what all gathers share.
     #[must_use]
     pub fn new(gpu: &Gpu, options: GatherOptions) -> Self {
         let key = Kernel::new(gpu, "key_points", &[]);
-        let mut gather = Self { options, key, radix: RadixSort::new(gpu), search: [None, None], scratch: None };
-        gather.compile(gpu, 1);
-        gather
+        Self { options, key, radix: RadixSort::new(gpu), compiled: Vec::new(), scratch: None }
     }
 
     /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to `radiance` (`array<vec4f>`), and writes the
@@ -111,22 +136,35 @@ impl Gather {
         (radiance, gathered): (&Buffer, &Buffer),
         progress: &dyn Progress,
     ) -> Result<GatherStats> {
-        self.compile(gpu, map.windows());
+        let polynomial = settings.density.polynomial();
+        let compiled = self.compile(
+            gpu,
+            Variant {
+                windows: map.windows(),
+                moments: polynomial.moments,
+                power: polynomial.power,
+                counts: settings.radius.is_some(),
+            },
+        );
         if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
             self.scratch = Some(Scratch::new(gpu, count.min(BATCH))?);
         }
+        let [first_four @ .., fifth] = polynomial.coefficients.map(|c| c as f32);
         let mut stats = GatherStats::default();
         for first in (0..count).step_by(BATCH as usize) {
             let info = GatherInfo {
                 count: BATCH.min(count - first),
                 first,
                 neighbors: settings.neighbors,
-                cone_constant: settings.cone_constant,
-                max_radius_squared: settings.max_radius.map_or(-1.0, |r| r * r),
+                takes_all: u32::from(settings.radius.is_some()),
+                max_radius_squared: settings.radius.or(settings.max_radius).map_or(-1.0, |r| r * r),
                 per_path: (1.0 / map.emitted().max(1) as f64) as f32,
+                kernel_mean: polynomial.mean() as f32,
+                kernel: first_four,
+                kernel_fifth: fifth,
                 ..GatherInfo::default()
             };
-            stats.dispatches += self.run_batch(gpu, map, &info, [points, radiance, gathered], progress)?;
+            stats.dispatches += self.run_batch(gpu, map, &self.compiled[compiled].1, &info, [points, radiance, gathered], progress)?;
         }
         Ok(stats)
     }
@@ -136,6 +174,7 @@ impl Gather {
         &self,
         gpu: &Gpu,
         map: &PhotonMap,
+        Compiled { aim, count, sum, finish }: &Compiled,
         info: &GatherInfo,
         [points, radiance, gathered]: [&Buffer; 3],
         progress: &dyn Progress,
@@ -145,8 +184,6 @@ impl Gather {
         if valid == 0 {
             return Ok(0);
         }
-        let Search { aim, count, sum, finish } =
-            self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
             ("points", points),
@@ -217,23 +254,29 @@ impl Gather {
         Ok((&scratch.entries[sorted], gpu.read::<u32>(&scratch.valid, 0, 1)?[0]))
     }
 
-    /// Compiles search and sum for maps of that many windows, once.
-    fn compile(&mut self, gpu: &Gpu, windows: u32) {
-        let common = [
-            ("WINDOWS", f64::from(windows)),
+    /// Place of the kernels of a variant, which are compiled once.
+    fn compile(&mut self, gpu: &Gpu, variant: Variant) -> usize {
+        if let Some(place) = self.compiled.iter().position(|(v, _)| *v == variant) {
+            return place;
+        }
+        let overrides = [
+            ("WINDOWS", f64::from(variant.windows)),
+            ("MOMENTS", f64::from(variant.moments)),
+            ("POWER", f64::from(variant.power)),
+            ("COUNTS", f64::from(u8::from(variant.counts))),
             ("SIDE_TEST", f64::from(u8::from(self.options.side_test))),
             ("STEP_BUDGET", f64::from(self.options.step_budget)),
             ("FINGERPRINT", f64::from(u8::from(self.options.fingerprint))),
         ];
-        self.search[windows as usize - 1].get_or_insert_with(|| {
-            let kernel = |stem| Kernel::new(gpu, stem, &common);
-            Search {
-                aim: kernel("aim_search"),
-                count: kernel("count_photons"),
-                sum: kernel("gather"),
-                finish: kernel("finish_gather"),
-            }
-        });
+        let kernel = |stem| Kernel::new(gpu, stem, &overrides);
+        let compiled = Compiled {
+            aim: kernel("aim_search"),
+            count: kernel("count_photons"),
+            sum: kernel("gather"),
+            finish: kernel("finish_gather"),
+        };
+        self.compiled.push((variant, compiled));
+        self.compiled.len() - 1
     }
 }
 

@@ -72,6 +72,7 @@ struct BatchBuffers {
     counters: Buffer,
     dispatch_arguments: Buffer,
     staged: Buffer,
+    staged_keys: Buffer,
     counts: Buffer,
     places: Buffer,
     staging_capacity: u64,
@@ -169,6 +170,7 @@ impl PhotonTracer {
                 ("counters", &buffers.counters),
                 ("dispatch_arguments", &buffers.dispatch_arguments),
                 ("staged", &buffers.staged),
+                ("staged_keys", &buffers.staged_keys),
                 ("counts", &buffers.counts),
             ])
         };
@@ -220,6 +222,7 @@ impl PhotonTracer {
                     &[
                         ("store", &uniform),
                         ("staged", &buffers.staged),
+                        ("staged_keys", &buffers.staged_keys),
                         ("places", &buffers.places),
                         ("photons", window),
                     ],
@@ -241,6 +244,7 @@ impl BatchBuffers {
             counters: gpu.storage::<Counters>("photon counters", 1)?,
             dispatch_arguments: gpu.storage::<[u32; 3]>("photon dispatch arguments", 1)?,
             staged: gpu.storage::<Photon>("staged photons", staging_capacity)?,
+            staged_keys: gpu.storage::<u32>("keys of staged photons", staging_capacity)?,
             counts: gpu.storage::<u32>("photon counts", paths)?,
             places: gpu.storage::<u32>("photon places", 2 * paths)?,
             staging_capacity,

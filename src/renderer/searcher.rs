@@ -19,7 +19,7 @@ pub(super) enum Searcher<'a> {
 impl<'a> Searcher<'a> {
     pub fn new(gpu: &Gpu, maps: &PhotonMaps, settings: &'a Settings) -> Result<Self> {
         Ok(match settings.search {
-            Search::Grid => Self::Grid(Box::new(Gather::new(gpu, GatherOptions::default()))),
+            Search::Grid | Search::Radius => Self::Grid(Box::new(Gather::new(gpu, GatherOptions::default()))),
             Search::KdTree => {
                 let trees = maps.maps.iter().map(|map| kd_map(gpu, map)).collect::<Result<_>>()?;
                 Self::KdTree(trees, settings)
