@@ -447,6 +447,8 @@ pub struct GridStep {
 
 /// Bytes of `SearchState` in the shaders, in which a query waits for its next dispatch.
 pub const SEARCH_STATE_BYTES: usize = 112;
+/// Bytes of `Disc` in the shaders: the surface around a query.
+pub const DISC_BYTES: usize = 48;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
 pub const GATHER_STATE_BYTES: usize = 576;
 

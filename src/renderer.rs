@@ -15,7 +15,7 @@ use crate::{
     error::{Error, Result},
     gpu::Gpu,
     image::Frame,
-    passes::{MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
+    passes::{Gather, GatherOptions, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::Settings,
@@ -141,7 +141,7 @@ impl<'a> Session<'a> {
     pub fn picture(&self, maps: &PhotonMaps, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
         let mut stats = maps.stats.clone();
         let pass = CameraPass::new(self, settings)?;
-        let mut searcher = timed(&mut stats.seconds.grid, || Searcher::new(self.gpu, maps, settings))?;
+        let mut searcher = timed(&mut stats.seconds.grid, || Searcher::new(self, maps, settings))?;
         let mut film = pass.film();
         let tiles = pass.tracer.tiles();
         for (done, tile) in tiles.iter().enumerate() {
@@ -154,6 +154,14 @@ impl<'a> Session<'a> {
         progress.report(Stage::Camera, tiles.len() as u64, tiles.len() as u64);
         self.close(&mut stats);
         Ok(Render { frame: film.finish(settings.spp), stats })
+    }
+
+    /// The gather of the estimate that the settings ask for.
+    pub(crate) fn gather(&self, settings: &Settings) -> Gather<'_> {
+        if settings.raw_estimate {
+            return Gather::new(self.gpu, GatherOptions::default());
+        }
+        Gather::over(self.gpu, &self.buffers, GatherOptions::flat())
     }
 
     /// What can be said of a picture only when it is finished.

@@ -95,14 +95,18 @@ fn constants() -> Vec<(&'static str, u64)> {
         SCAN_SPAN,
         BOUND_LANES,
         SEARCH_STATE_BYTES,
+        DISC_BYTES,
         GATHER_STATE_BYTES
     ]
     .to_vec()
 }
 
 /// Structs that only the device fills and reads, and the bytes that the host allots them.
-const OPAQUE: [(&str, usize); 2] =
-    [("SearchState", layout::SEARCH_STATE_BYTES), ("GatherState", layout::GATHER_STATE_BYTES)];
+const OPAQUE: [(&str, usize); 3] = [
+    ("SearchState", layout::SEARCH_STATE_BYTES),
+    ("GatherState", layout::GATHER_STATE_BYTES),
+    ("Disc", layout::DISC_BYTES),
+];
 
 fn opaque_bytes(name: Option<&str>) -> Option<u32> {
     OPAQUE.iter().find(|(n, _)| Some(*n) == name).map(|(_, bytes)| *bytes as u32)

@@ -21,8 +21,8 @@ use photons::{Random, caustic_box, coincident, point, uniform_box};
 struct Bench {
     gpu: Gpu,
     kernels: MapKernels,
-    one_sided: Gather,
-    two_sided: Gather,
+    one_sided: Gather<'static>,
+    two_sided: Gather<'static>,
 }
 
 /// What a gather returned.

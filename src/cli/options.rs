@@ -66,6 +66,10 @@ pub struct SharedOptions {
     #[arg(long, value_name = "C", default_value_t = 2.0, value_parser = cone_constant, help_heading = "Estimate")]
     pub cone_constant: f32,
 
+    /// Count photons of neighbouring surfaces and take the disc for whole: bright corners, dark edges, as in the report
+    #[arg(long, help_heading = "Estimate")]
+    pub raw_estimate: bool,
+
     /// Bound of the search radius in metres [default: none]
     #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
     pub max_radius: Option<f32>,
@@ -131,6 +135,7 @@ impl SharedOptions {
         Settings {
             max_paths: self.max_paths,
             kernel: self.kernel.into(),
+            raw_estimate: self.raw_estimate,
             cone_constant: self.cone_constant,
             max_radius: self.max_radius,
             max_bounces: self.max_bounces,

@@ -18,7 +18,7 @@ const WARM_UP: u32 = 64;
 /// Gathers on the grid.
 pub(super) struct GridGather<'a> {
     pub maps: &'a [PhotonMap],
-    gather: Gather,
+    gather: Gather<'static>,
     /// Radiance by one map alone.
     radiance: Option<Buffer>,
     warm: bool,

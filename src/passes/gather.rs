@@ -1,12 +1,12 @@
 //! Radiance from the photons around a point. Kernels: `key_points`, `aim_search`,
-//! `count_photons`, `gather`, `finish_gather`.
+//! `count_photons`, `survey_surface`, `gather`, `finish_gather`.
 
-use super::{photon_map::PhotonMap, radix_sort::RadixSort};
+use super::{SceneBuffers, photon_map::PhotonMap, radix_sort::RadixSort};
 use crate::{
     density::Density,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
+    layout::{DISC_BYTES, GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
     progress::Progress,
     settings::{Search, Settings},
 };
@@ -47,6 +47,11 @@ impl From<&Settings> for GatherSettings {
     }
 }
 
+/// Rays that measure the area of a disc of which some is missing.
+const SURVEY_SAMPLES: usize = 32;
+/// Nodes and primitives that one of them visits at most; together they stay within what software Vulkan can loop.
+const SURVEY_TRACE_BUDGET: f64 = 700.0;
+
 /// How the kernels are compiled; for tests and benchmarks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherOptions {
@@ -56,11 +61,27 @@ pub struct GatherOptions {
     pub step_budget: u32,
     /// Makes [`Gathered::fingerprint`]: the wrapping sum of a hash of the places in the sorted map of the photons summed.
     pub fingerprint: bool,
+    /// Photons that do not lie on the point's surface, as far as it is flat and no wall stands on it, are not summed.
+    pub rejects: bool,
+    /// The estimate divides by the area of that surface that is there.
+    pub corrects: bool,
+}
+
+impl GatherOptions {
+    /// Both halves of the estimate on flat surfaces; each alone is wrong at edges and corners.
+    #[must_use]
+    pub fn flat() -> Self {
+        Self { rejects: true, corrects: true, ..Self::default() }
+    }
+
+    fn surveys(self) -> bool {
+        self.rejects || self.corrects
+    }
 }
 
 impl Default for GatherOptions {
     fn default() -> Self {
-        Self { side_test: true, step_budget: 25_000, fingerprint: false }
+        Self { side_test: true, step_budget: 25_000, fingerprint: false, rejects: false, corrects: false }
     }
 }
 
@@ -73,8 +94,10 @@ pub struct GatherStats {
 
 /// The compiled kernels and the memory of one batch.
 #[derive(Debug)]
-pub struct Gather {
+pub struct Gather<'s> {
     options: GatherOptions,
+    /// Where the surfaces are, if they matter.
+    scene: Option<&'s SceneBuffers>,
     key: Kernel,
     radix: RadixSort,
     /// Search and sum, each variant compiled when first needed.
@@ -98,6 +121,7 @@ struct Variant {
 struct Compiled {
     aim: Kernel,
     count: Kernel,
+    survey: Option<Kernel>,
     sum: Kernel,
     finish: Kernel,
 }
@@ -108,16 +132,27 @@ struct Scratch {
     entries: [Buffer; 2],
     states: Buffer,
     sums: Buffer,
+    discs: Buffer,
     open: Buffer,
     valid: Buffer,
 }
 
-impl Gather {
-    /// Compiles what all gathers share.
+impl<'s> Gather<'s> {
+    /// A gather that knows nothing of surfaces: `rejects` and `corrects` are passed over.
     #[must_use]
     pub fn new(gpu: &Gpu, options: GatherOptions) -> Self {
+        Self::with_scene(gpu, None, GatherOptions { rejects: false, corrects: false, ..options })
+    }
+
+    /// A gather among the surfaces of the scene.
+    #[must_use]
+    pub fn over(gpu: &Gpu, scene: &'s SceneBuffers, options: GatherOptions) -> Self {
+        Self::with_scene(gpu, Some(scene), options)
+    }
+
+    fn with_scene(gpu: &Gpu, scene: Option<&'s SceneBuffers>, options: GatherOptions) -> Self {
         let key = Kernel::new(gpu, "key_points", &[]);
-        Self { options, key, radix: RadixSort::new(gpu), compiled: Vec::new(), scratch: None }
+        Self { options, scene, key, radix: RadixSort::new(gpu), compiled: Vec::new(), scratch: None }
     }
 
     /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to `radiance` (`array<vec4f>`), and writes the
@@ -147,9 +182,11 @@ impl Gather {
             },
         );
         if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
-            self.scratch = Some(Scratch::new(gpu, count.min(BATCH))?);
+            self.scratch = Some(Scratch::new(gpu, count.min(BATCH), self.options.surveys())?);
         }
         let [first_four @ .., fifth] = polynomial.coefficients.map(|c| c as f32);
+        let quantile = |i| polynomial.quantile((i as f64 + 0.5) / SURVEY_SAMPLES as f64) as f32;
+        let radii = gpu.storage_with("survey radii", &(0..SURVEY_SAMPLES).map(quantile).collect::<Vec<_>>())?;
         let mut stats = GatherStats::default();
         for first in (0..count).step_by(BATCH as usize) {
             let info = GatherInfo {
@@ -164,7 +201,7 @@ impl Gather {
                 kernel_fifth: fifth,
                 ..GatherInfo::default()
             };
-            stats.dispatches += self.run_batch(gpu, map, &self.compiled[compiled].1, &info, [points, radiance, gathered], progress)?;
+            stats.dispatches += self.run_batch(gpu, map, &self.compiled[compiled].1, &info, [points, radiance, gathered, &radii], progress)?;
         }
         Ok(stats)
     }
@@ -174,9 +211,9 @@ impl Gather {
         &self,
         gpu: &Gpu,
         map: &PhotonMap,
-        Compiled { aim, count, sum, finish }: &Compiled,
+        Compiled { aim, count, survey, sum, finish }: &Compiled,
         info: &GatherInfo,
-        [points, radiance, gathered]: [&Buffer; 3],
+        [points, radiance, gathered, radii]: [&Buffer; 4],
         progress: &dyn Progress,
     ) -> Result<u32> {
         let scratch = self.scratch.as_ref().expect("run has made it");
@@ -191,6 +228,8 @@ impl Gather {
             ("states", &scratch.states),
             ("open_count", &scratch.open),
             ("sums_left", &scratch.sums),
+            ("discs", &scratch.discs),
+            ("radii", radii),
             ("radiance", radiance),
             ("gathered", gathered),
         ]);
@@ -201,6 +240,8 @@ impl Gather {
             infos.each_ref().map(|info| (aim.bind(gpu, &with_info(info)), count.bind(gpu, &with_info(info))));
         let (sum_bindings, finish_bindings) =
             (sum.bind(gpu, &with_info(&infos[0])), finish.bind(gpu, &with_info(&infos[0])));
+        let survey = survey.as_ref().zip(self.scene);
+        let survey = survey.map(|(kernel, scene)| (kernel, kernel.bind(gpu, &scene.with(&with_info(&infos[0])))));
         let packets = u64::from(valid.div_ceil(PACKET));
         let mut dispatches = 0;
         loop {
@@ -209,6 +250,7 @@ impl Gather {
             if dispatches == 0 {
                 encoder.clear_buffer(&scratch.states, 0, None);
                 encoder.clear_buffer(&scratch.sums, 0, None);
+                encoder.clear_buffer(&scratch.discs, 0, None);
             }
             encoder.clear_buffer(&scratch.open, 0, None);
             for ((aim_bindings, count_bindings), (stride, rounds)) in search_bindings.iter().zip(STRIDES) {
@@ -218,6 +260,9 @@ impl Gather {
                     count.dispatch(&mut encoder, count_bindings, packets);
                 }
                 aim.dispatch(&mut encoder, aim_bindings, packets * u64::from(PACKET));
+            }
+            if let Some((survey, bindings)) = &survey {
+                survey.dispatch(&mut encoder, bindings, valid.into());
             }
             sum.dispatch(&mut encoder, &sum_bindings, packets);
             finish.dispatch(&mut encoder, &finish_bindings, valid.into());
@@ -230,14 +275,14 @@ impl Gather {
     }
 
     /// Sorts the points of a batch, the valid ones first; returns their order and the number of valid ones.
-    fn order<'s>(
+    fn order<'b>(
         &self,
         gpu: &Gpu,
         map: &PhotonMap,
         info: &GatherInfo,
         points: &Buffer,
-        scratch: &'s Scratch,
-    ) -> Result<(&'s Buffer, u32)> {
+        scratch: &'b Scratch,
+    ) -> Result<(&'b Buffer, u32)> {
         let uniform = gpu.uniform("gather info", info);
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
@@ -267,11 +312,16 @@ impl Gather {
             ("SIDE_TEST", f64::from(u8::from(self.options.side_test))),
             ("STEP_BUDGET", f64::from(self.options.step_budget)),
             ("FINGERPRINT", f64::from(u8::from(self.options.fingerprint))),
+            ("REJECTS", f64::from(u8::from(self.options.rejects))),
+            ("CORRECTS", f64::from(u8::from(self.options.corrects))),
         ];
         let kernel = |stem| Kernel::new(gpu, stem, &overrides);
+        let with_budget = [overrides.as_slice(), &[("TRACE_BUDGET", SURVEY_TRACE_BUDGET)]].concat();
+        let survey = |scene: &SceneBuffers| scene.kernel_with(gpu, "survey_surface", &with_budget);
         let compiled = Compiled {
             aim: kernel("aim_search"),
             count: kernel("count_photons"),
+            survey: self.scene.filter(|_| self.options.surveys()).map(survey),
             sum: kernel("gather"),
             finish: kernel("finish_gather"),
         };
@@ -281,7 +331,7 @@ impl Gather {
 }
 
 impl Scratch {
-    fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
+    fn new(gpu: &Gpu, capacity: u32, surveys: bool) -> Result<Self> {
         let packets = u64::from(capacity.div_ceil(PACKET));
         Ok(Self {
             capacity,
@@ -291,6 +341,7 @@ impl Scratch {
             ],
             states: gpu.storage::<[u8; SEARCH_STATE_BYTES]>("search states", packets * u64::from(PACKET))?,
             sums: gpu.storage::<[u8; GATHER_STATE_BYTES]>("unfinished sums", packets)?,
+            discs: gpu.storage::<[u8; DISC_BYTES]>("discs", if surveys { u64::from(capacity) + 3 } else { 1 })?,
             open: gpu.storage::<u32>("open packets", 1)?,
             valid: gpu.storage::<u32>("valid points", 1)?,
         })

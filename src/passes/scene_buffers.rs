@@ -58,12 +58,19 @@ impl SceneBuffers {
     /// Compiles a kernel that uses the scene.
     #[must_use]
     pub fn kernel(&self, gpu: &Gpu, stem: &str) -> Kernel {
-        let overrides = [
+        self.kernel_with(gpu, stem, &[])
+    }
+
+    /// The same with further `override` constants.
+    #[must_use]
+    pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
+        let mut overrides = vec![
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
             ("SPLIT", f64::from(u8::from(self.nodes.window + self.primitives.window > 0))),
             ("NODE_WINDOW", window_or_all(self.nodes.window)),
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
         ];
+        overrides.extend_from_slice(others);
         Kernel::new(gpu, stem, &overrides)
     }
 
