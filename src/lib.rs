@@ -37,6 +37,7 @@
 
 pub mod bvh;
 pub mod compare;
+pub mod density;
 pub mod error;
 pub mod gpu;
 mod html;

@@ -76,6 +76,14 @@ pub fn color(text: &str) -> Result<[f32; 3], String> {
     color.ok_or_else(|| "three numbers of at least 0, as 0.5,0.7,1".to_string())
 }
 
+/// `NAME=WEIGHT`; the name may hold a `=` itself.
+pub fn light_weight(text: &str) -> Result<(String, f64), String> {
+    let wrong = || "a light's name, '=' and a number above 0, as lamp=2".to_string();
+    let (name, weight) = text.rsplit_once('=').ok_or_else(wrong)?;
+    let weight = weight.parse::<f64>().ok().filter(|w| *w > 0.0 && w.is_finite()).ok_or_else(wrong)?;
+    Ok((name.to_string(), weight))
+}
+
 /// Stops of exposure.
 pub fn exposure(text: &str) -> Result<f32, String> {
     number(text).filter(|e| e.abs() <= 100.0).ok_or_else(|| "a number of stops, -100 to 100".to_string())
@@ -148,6 +156,8 @@ mod tests {
             assert!(color(text).is_err(), "{text}");
         }
         assert!(exposure("-2.5").is_ok() && exposure("101").is_err());
+        assert_eq!(light_weight("a=b=0.5"), Ok(("a=b".to_string(), 0.5)));
+        assert!(["lamp", "lamp=", "lamp=0", "lamp=-1", "lamp=inf"].iter().all(|text| light_weight(text).is_err()));
         assert!(output("a.EXR".into()).is_ok() && output("a.jpg".into()).is_err() && output("exr".into()).is_err());
     }
 }

@@ -1,11 +1,11 @@
 //! The camera pass: the picture's samples, tile by tile: camera rays to their visible points, direct light, and the
 //! sum over each pixel's samples. Memory depends on the size of a tile alone.
 
-use super::SceneBuffers;
+use super::{SceneBuffers, direct_light::DirectLighting};
 use crate::{
     error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CameraTile, Counters, DirectLight, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
+    layout::{CameraTile, Counters, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
     scene::{Camera, Projection},
     settings::Settings,
 };
@@ -38,7 +38,7 @@ pub struct CameraTracer {
     start: Kernel,
     advance: Kernel,
     trace: Kernel,
-    direct: Kernel,
+    direct: DirectLighting,
     resolve: Kernel,
     paths: Buffer,
     queues: [Buffer; 2],
@@ -53,7 +53,6 @@ pub struct CameraTracer {
     first_hits: Buffer,
     pixels: Buffer,
     view: CameraTile,
-    lights: u32,
 }
 
 /// What one step did, for the statistics.
@@ -79,8 +78,12 @@ impl CameraTracer {
         Ok(Self {
             start: Kernel::new(gpu, "start_camera", &[]),
             advance: Kernel::new(gpu, "advance_queue", &[]),
-            trace: scene.kernel(gpu, "trace_camera"),
-            direct: scene.kernel(gpu, "light_directly"),
+            trace: scene.kernel_with(
+                gpu,
+                "trace_camera",
+                &[("SEES_LIGHTS", f64::from(u8::from(settings.mode.sees_lights())))],
+            ),
+            direct: DirectLighting::new(gpu, scene, settings.light_samples),
             resolve: Kernel::new(gpu, "resolve", &[]),
             paths: gpu.storage::<Path>("camera paths", TILE_POINTS)?,
             queues: [queue()?, queue()?],
@@ -92,7 +95,6 @@ impl CameraTracer {
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
             view: CameraTile { branches, ..view(camera, size, settings)? },
-            lights: scene.light_table.len() as u32,
         })
     }
 
@@ -183,22 +185,12 @@ impl CameraTracer {
     /// # Errors
     /// Faults of the driver.
     pub fn light_directly(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
-        let points = self.point_count(tile);
+        let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
+        let buffers =
+            [("tile", &uniform), ("points", &self.points), ("radiance", &self.radiance), ("counters", &self.counters)];
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
-        for light in 0..self.lights {
-            let uniform = gpu.uniform("direct light", &DirectLight { light, points, ..Default::default() });
-            let bindings = self.direct.bind(
-                gpu,
-                &scene.with(&[
-                    ("direct", &uniform),
-                    ("points", &self.points),
-                    ("radiance", &self.radiance),
-                    ("counters", &self.counters),
-                ]),
-            );
-            self.direct.dispatch(&mut encoder, &bindings, u64::from(points));
-        }
+        self.direct.add(gpu, scene, &mut encoder, self.point_count(tile), &buffers);
         gpu.submit(encoder);
         let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
         Ok(StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) })

@@ -47,13 +47,22 @@ impl Light {
         }
     }
 
-    /// Power, W in each channel: of a point light 4π I. A directional light sends as much as a disc of `scene_radius`,
-    /// metres, catches.
+    /// Integral over all directions of the share of `intensity` that goes there, sr; 0 for a directional light.
+    #[must_use]
+    pub fn solid_angle(&self) -> f32 {
+        match self.kind {
+            LightKind::Point => 4.0 * PI,
+            LightKind::Spot { inner, outer } => spot_solid_angle(inner, outer),
+            LightKind::Directional => 0.0,
+        }
+    }
+
+    /// Power, W in each channel: intensity times solid angle. A directional light sends as much as a disc of
+    /// `scene_radius`, metres, catches.
     #[must_use]
     pub fn power(&self, scene_radius: f32) -> Vec3 {
         match self.kind {
-            LightKind::Point => 4.0 * PI * self.intensity,
-            LightKind::Spot { inner, outer } => self.intensity * spot_solid_angle(inner, outer),
+            LightKind::Point | LightKind::Spot { .. } => self.solid_angle() * self.intensity,
             LightKind::Directional => PI * scene_radius * scene_radius * self.intensity,
         }
     }

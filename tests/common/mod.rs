@@ -44,6 +44,11 @@ pub fn point_light(position: Vec3, intensity: f32) -> Light {
     }
 }
 
+/// A diffuse material that shines.
+pub fn emissive(name: &str, albedo: f32, emission: f32, double_sided: bool) -> Material {
+    Material { name: name.to_owned(), surface: diffuse(albedo), emission: Vec3::splat(emission), double_sided }
+}
+
 /// A camera at `position` that looks at `target`; full vertical angle in degrees.
 pub fn camera(position: Vec3, target: Vec3, degrees: f32) -> Camera {
     let forward = (target - position).normalize();
