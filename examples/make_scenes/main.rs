@@ -79,7 +79,7 @@ fn area_light() -> Builder {
     let mut b = Builder::new("area light");
     let white = add_room(&mut b);
     add_block(&mut b, white);
-    let (glass, lamp) = (b.glass("glass", 1.5), b.emissive("lamp", 0.8, [1.0, 0.85, 0.6], 16.0));
+    let (glass, lamp) = (b.glass("glass", 1.5), b.emissive("lamp", 0.8, [1.0, 0.85, 0.6], 30.0));
     b.sphere("glass ball", Vec3::new(0.42, 0.35, 0.3), 0.35, glass);
     let corner = Vec3::new(-0.25, 1.98, -0.25);
     add_quads(&mut b, "lamp", &[Quad(corner, 0.5 * Vec3::X, 0.5 * Vec3::Z)], lamp);
@@ -93,8 +93,8 @@ fn spot() -> Builder {
     add_block(&mut b, white);
     let (glass, ball) = (b.glass("glass", 1.5), Vec3::new(0.42, 0.35, 0.3));
     b.sphere("glass ball", ball, 0.35, glass);
-    b.spot("spot", [Vec3::new(-0.5, 1.95, 0.6), ball], 8.0, [1.0, 0.8, 0.5], [10.0, 18.0]);
-    b.sun("sun", Vec3::new(-0.5, -0.5, -0.8), 1.5, [0.6, 0.75, 1.0]);
+    b.spot("spot", [Vec3::new(-0.5, 1.95, 0.6), ball], 12.0, [1.0, 0.8, 0.5], [14.0, 24.0]);
+    b.sun("sun", Vec3::new(-0.5, -0.5, -0.8), 2.5, [0.6, 0.75, 1.0]);
     b
 }
 
