@@ -2,7 +2,7 @@
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
-//! | flux | aimed and unaimed caustic maps hold the same flux, all over the scene, for every kind of light | a fifth more |
+//! | flux | aimed and unaimed caustic maps hold the same flux, all over the scene, for every kind of light | 30 % more |
 //! | picture | aimed and unaimed give the same picture | general paths keep L S+ D as well |
 //! | paths | aimed, a caustic photon takes far fewer paths | the unaimed count |
 
@@ -78,7 +78,7 @@ fn caustic_flux(scene: &Scene, emission: Emission) -> [(f64, f64); 3] {
     let settings = Settings {
         emission,
         caustic_photons: 100_000,
-        max_paths: Some(250_000),
+        max_paths: Some(150_000),
         ..settings(Mode::DirectPhotons, 1, 1)
     };
     let map = traced(scene, &settings).caustic;
@@ -100,8 +100,8 @@ fn aimed_paths_bring_the_flux_of_unaimed_ones() {
             let deviation = (aimed.1 + unaimed.1).sqrt();
             let (aimed, unaimed) = (aimed.0, unaimed.0);
             assert!((aimed - unaimed).abs() < 3.5 * deviation, "{name}, part {part}: {aimed} W, unaimed {unaimed} W");
-            let control = part > 0 || (1.2 * aimed - unaimed).abs() > 3.5 * deviation;
-            assert!(control, "{name}: control: a fifth more passes");
+            let control = part > 0 || (1.3 * aimed - unaimed).abs() > 3.5 * deviation;
+            assert!(control, "{name}: control: 30 % more pass");
         }
     }
 }
@@ -120,16 +120,16 @@ fn blocks(picture: &[f64]) -> Vec<f64> {
 #[test]
 fn aimed_paths_make_the_picture_of_unaimed_ones() {
     // A closed room, so that light passes the balls after diffuse bounces too.
-    let mut scene = scene(&[diffuse(0.7), glass(), Surface::Mirror { tint: Vec3::splat(0.9) }]);
+    let mut scene = scene(&[diffuse(0.35), glass(), Surface::Mirror { tint: Vec3::splat(0.9) }]);
     add_box(&mut scene, vec3(-1.0, 0.0, -1.0), vec3(1.0, 2.0, 3.0), 0);
     scene.spheres.push(sphere(vec3(0.45, 0.4, 0.2), 0.4, 1));
     scene.spheres.push(sphere(vec3(-0.45, 0.4, -0.2), 0.4, 2));
-    scene.materials.push(emissive("lamp", 0.5, 6.0, false));
+    scene.materials.push(emissive("lamp", 0.5, 2.0, false));
     add_quad(&mut scene, vec3(-0.3, 1.9, -0.3), vec3(0.6, 0.0, 0.0), vec3(0.0, 0.0, 0.6), 3);
-    scene.lights.push(point_light(vec3(0.7, 1.5, 1.0), 1.5));
-    scene.cameras.push(camera(vec3(0.0, 1.0, 2.9), vec3(0.0, 0.6, 0.0), 50.0));
+    scene.lights.push(point_light(vec3(0.7, 1.7, 0.6), 4.0));
+    scene.cameras.push(camera(vec3(0.0, 1.4, 2.9), vec3(0.0, 0.2, 0.0), 40.0));
     let picture = |emission, mode| {
-        let settings = Settings { emission, neighbors: 60, spp: 2, ..settings(mode, 250_000, 32) };
+        let settings = Settings { emission, neighbors: 50, ..settings(mode, 100_000, 32) };
         let render = render_scene(&scene, &settings);
         (reds(&render), render.stats)
     };
@@ -139,13 +139,13 @@ fn aimed_paths_make_the_picture_of_unaimed_ones() {
     let worst =
         |a: &[f64], b: &[f64]| blocks(a).iter().zip(blocks(b)).map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
     assert!(within(mean(&aimed), mean(&unaimed), 0.01), "means {} and {}", mean(&aimed), mean(&unaimed));
-    assert!(worst(&aimed, &unaimed) < 0.06, "blocks differ by up to {}", worst(&aimed, &unaimed));
+    assert!(worst(&aimed, &unaimed) < 0.03, "blocks differ by up to {}", worst(&aimed, &unaimed));
     // Mode 3 less mode 2 is L S+ D: what general paths must not store besides.
     let [(photons, _), (rays, _)] =
         [Mode::DirectPhotons, Mode::DirectRays].map(|mode| picture(Emission::Unaimed, mode));
     let both: Vec<f64> = (0..aimed.len()).map(|i| aimed[i] + photons[i] - rays[i]).collect();
     assert!(!within(mean(&both), mean(&unaimed), 0.01), "control: keeping both passes, mean {}", mean(&both));
-    assert!(worst(&both, &unaimed) > 0.15, "control: keeping both passes");
+    assert!(worst(&both, &unaimed) > 0.06, "control: keeping both passes");
     // The same statistics, far fewer paths.
     let paths = |stats: &Stats| stats.photons.caustic.emitted as f64 / stats.photons.caustic.stored as f64;
     let (few, many) = (paths(&aimed_stats), paths(&unaimed_stats));
