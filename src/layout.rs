@@ -171,8 +171,8 @@ pub struct Photon {
     pub wi: u32,
     /// Flux in W, before the division by the number of emitted paths.
     pub flux: [f32; 3],
-    /// While staged: path and place in it, see `bounce_photons`; of no use after that.
-    pub key: u32,
+    /// Normal of its surface on the side from which it came, octahedral.
+    pub normal: u32,
 }
 
 /// Where a camera path met a diffuse surface; asks for the light that leaves there.
@@ -390,8 +390,8 @@ pub struct PhotonPlace {
 pub struct PhotonFlux {
     /// Flux in W, before the division by the number of emitted paths.
     pub flux: [f32; 3],
-    /// Index of the photon before sorting.
-    pub index: u32,
+    /// Normal of its surface on the side from which it came, octahedral.
+    pub normal: u32,
 }
 
 /// Sizes of a photon map.
@@ -417,15 +417,22 @@ pub struct GatherInfo {
     pub first: u32,
     /// k.
     pub neighbors: u32,
-    /// C of the cone filter.
-    pub cone_constant: f32,
+    /// 1 if all photons within the largest radius are taken, however many.
+    pub takes_all: u32,
     /// Square of the largest radius, m²; negative if there is none.
     pub max_radius_squared: f32,
     /// 1 / number of emitted paths.
     pub per_path: f32,
     /// Of how many blocks of queries one is searched.
     pub stride: u32,
-    pub pad: u32,
+    /// Mean of the kernel over the disc.
+    pub kernel_mean: f32,
+    /// Coefficients of the kernel's polynomial, see [`crate::density`]: the first four, and the fifth.
+    pub kernel: [f32; 4],
+    pub kernel_fifth: f32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// What a query found.
@@ -519,8 +526,10 @@ pub struct GridStep {
 
 /// Bytes of `SearchState` in the shaders, in which a query waits for its next dispatch.
 pub const SEARCH_STATE_BYTES: usize = 112;
+/// Bytes of `Disc` in the shaders: the surface around a query.
+pub const DISC_BYTES: usize = 48;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
-pub const GATHER_STATE_BYTES: usize = 416;
+pub const GATHER_STATE_BYTES: usize = 576;
 
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of
 /// Efficient Representations for Independent Unit Vectors"); x in the low half. Twin of `encode_octahedral` in

@@ -15,7 +15,7 @@ use crate::{
     error::{Error, Result},
     gpu::Gpu,
     image::Frame,
-    passes::{LightGroup, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
+    passes::{Gather, GatherOptions, LightGroup, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::Settings,
@@ -143,7 +143,7 @@ impl<'a> Session<'a> {
     pub fn picture(&self, maps: &PhotonMaps, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
         let mut stats = maps.stats.clone();
         let pass = CameraPass::new(self, settings)?;
-        let mut searcher = timed(&mut stats.seconds.grid, || Searcher::new(self.gpu, maps, settings))?;
+        let mut searcher = timed(&mut stats.seconds.grid, || Searcher::new(self, maps, settings))?;
         let mut film = pass.film();
         let tiles = pass.tracer.tiles();
         for (done, tile) in tiles.iter().enumerate() {
@@ -156,6 +156,14 @@ impl<'a> Session<'a> {
         progress.report(Stage::Camera, tiles.len() as u64, tiles.len() as u64);
         self.close(&mut stats);
         Ok(Render { frame: film.finish(settings.spp), stats })
+    }
+
+    /// The gather of the estimate that the settings ask for.
+    pub(crate) fn gather(&self, settings: &Settings) -> Gather<'_> {
+        if settings.raw_estimate {
+            return Gather::new(self.gpu, GatherOptions::default());
+        }
+        Gather::over(self.gpu, &self.buffers, GatherOptions::flat())
     }
 
     /// What can be said of a picture only when it is finished.

@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
+use crate::{
+    density::{Density, DensityKernel},
+    error::{Error, Result},
+};
 
 /// Which light reaches the picture, and by which way (the report's five modes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -96,15 +99,17 @@ pub enum LightUnit {
     Photometric,
 }
 
-/// How the photons nearest to a point are found. Both ways give the same picture but for rounding.
+/// Which photons an estimate sums, and how they are found. Grid and kd-tree give the same picture but for rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Search {
-    /// The grid, on the device.
+    /// The nearest, by the grid on the device.
     #[default]
     Grid,
-    /// The kd-tree of [`crate::reference`], on the CPU.
+    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU.
     KdTree,
+    /// All within [`Settings::radius`], by the grid.
+    Radius,
 }
 
 /// Settings of one render.
@@ -144,6 +149,15 @@ pub struct Settings {
     /// Samples of the direct light of emissive surfaces and the environment per visible point, 1 to 4096.
     #[serde(default = "default_light_samples")]
     pub light_samples: u32,
+    /// Radius of the estimate with [`Search::Radius`], metres; `None` with the others.
+    #[serde(default)]
+    pub radius: Option<f32>,
+    /// Shape of the kernel that weighs the photons.
+    #[serde(default)]
+    pub kernel: DensityKernel,
+    /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the estimate of the report.
+    #[serde(default)]
+    pub raw_estimate: bool,
 }
 
 fn default_light_samples() -> u32 {
@@ -171,11 +185,20 @@ impl Default for Settings {
             light_photons: Vec::new(),
             emission: Emission::Aimed,
             light_samples: 4,
+            radius: None,
+            kernel: DensityKernel::Cone,
+            raw_estimate: false,
         }
     }
 }
 
 impl Settings {
+    /// The kernel with its constant.
+    #[must_use]
+    pub fn density(&self) -> Density {
+        Density { kernel: self.kernel, cone_constant: self.cone_constant }
+    }
+
     /// Checks every value against its range.
     ///
     /// # Errors
@@ -191,6 +214,14 @@ impl Settings {
         }
         if let Some(r) = self.max_radius.filter(|r| !(*r > 0.0 && r.is_finite())) {
             return fail("max-radius", r.to_string(), "must be above 0");
+        }
+        match (self.search, self.radius) {
+            (Search::Radius, None) => return fail("search", "radius".to_string(), "needs a radius"),
+            (Search::Radius, Some(r)) if !(r > 0.0 && r.is_finite()) => {
+                return fail("radius", r.to_string(), "must be above 0");
+            }
+            (Search::Radius, Some(_)) | (_, None) => {}
+            (_, Some(r)) => return fail("radius", r.to_string(), "goes with the search by radius only"),
         }
         if self.global_photons == 0 || self.caustic_photons == 0 {
             return fail("photons", "0".to_string(), "must be at least 1");

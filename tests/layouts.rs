@@ -47,7 +47,7 @@ fn twins() -> Vec<Twin> {
         LightChoice { cdf, probability }
         Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
         Path { origin, flags, direction, bounces, beta, media_count, media }
-        Photon { position, wi, flux, key }
+        Photon { position, wi, flux, normal }
         VisiblePoint { position, valid, weight, offset, ng, pad0, ns, pad1 }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
         PhotonBatch { seed, first_path, first_path_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
@@ -59,9 +59,9 @@ fn twins() -> Vec<Twin> {
         EmitterSample { points, sample, samples, light_count }
         Cell { lo, wi_lo, hi, wi_hi }
         PhotonPlace { position, wi }
-        PhotonFlux { flux, index }
+        PhotonFlux { flux, normal }
         MapInfo { count, levels, split, pad }
-        GatherInfo { count, first, neighbors, cone_constant, max_radius_squared, per_path, stride, pad }
+        GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, pad0, pad1, pad2 }
         Gathered { radius_squared, count, fingerprint }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
@@ -109,14 +109,18 @@ fn constants() -> Vec<(&'static str, u64)> {
         SCAN_SPAN,
         BOUND_LANES,
         SEARCH_STATE_BYTES,
+        DISC_BYTES,
         GATHER_STATE_BYTES
     ]
     .to_vec()
 }
 
 /// Structs that only the device fills and reads, and the bytes that the host allots them.
-const OPAQUE: [(&str, usize); 2] =
-    [("SearchState", layout::SEARCH_STATE_BYTES), ("GatherState", layout::GATHER_STATE_BYTES)];
+const OPAQUE: [(&str, usize); 3] = [
+    ("SearchState", layout::SEARCH_STATE_BYTES),
+    ("GatherState", layout::GATHER_STATE_BYTES),
+    ("Disc", layout::DISC_BYTES),
+];
 
 fn opaque_bytes(name: Option<&str>) -> Option<u32> {
     OPAQUE.iter().find(|(n, _)| Some(*n) == name).map(|(_, bytes)| *bytes as u32)
@@ -268,14 +272,14 @@ fn bound_names(wgsl: &str) -> Vec<String> {
 const GOOD: &str = "
     const WORKGROUP_SIZE: u32 = 64u;
     const SPHERE_BIT = 1u << 31u;
-    struct Photon { position: vec3f, wi: u32, flux: vec3f, key: u32 }
+    struct Photon { position: vec3f, wi: u32, flux: vec3f, normal: u32 }
     struct Path {
         origin: vec3f, flags: u32, direction: vec3f, bounces: u32, beta: vec3f, media_count: u32, media: array<u32, 4>,
     }
     @group(1) @binding(0) var<storage, read> photons: array<Photon>;
     @group(2) @binding(0) var<storage, read_write> paths: array<Path>;
     @compute @workgroup_size(WORKGROUP_SIZE)
-    fn probe() { paths[0].flags = photons[0].key | SPHERE_BIT; }
+    fn probe() { paths[0].flags = photons[0].normal | SPHERE_BIT; }
 ";
 
 #[test]
@@ -291,7 +295,7 @@ fn each_kind_of_disagreement_is_reported() {
         ("flux: vec3f", "flow: vec3f", "Photon is"),
         ("flux: vec3f", "flux: vec4f", "Photon takes"),
         ("media: array<u32, 4>", "media: array<u32, 8>", "Path takes"),
-        (", key: u32 }", ", key: u32, more: u32 }", "Photon takes"),
+        (", normal: u32 }", ", normal: u32, more: u32 }", "Photon takes"),
         ("SPHERE_BIT = 1u << 31u", "SPHERE_BIT = 1u << 30u", "SPHERE_BIT is"),
         ("= 64u", "= 32u", "WORKGROUP_SIZE is"),
         ("@workgroup_size(WORKGROUP_SIZE)", "@workgroup_size(8, 8)", "workgroups of"),

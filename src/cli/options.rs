@@ -1,11 +1,13 @@
 //! Options that all commands have that render.
 
 use caustica::{
+    density::DensityKernel,
     image::Tonemap,
     settings::{Emission, LightSampling, LightUnit, Mode, Search, Settings},
 };
 use clap::ValueEnum;
 
+use super::environment::EnvironmentOptions;
 use super::values::{cone_constant, count, exposure, light_weight, photons, radius, size};
 
 /// Options of commands that make one picture.
@@ -61,6 +63,9 @@ pub struct SharedOptions {
     #[arg(long, value_name = "UNIT", value_enum, default_value = "radiometric", help_heading = "Light")]
     pub light_unit: LightUnitArg,
 
+    #[command(flatten)]
+    pub environment: EnvironmentOptions,
+
     /// Photon paths emitted at most [default: 100 times the capacity]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
     pub max_paths: Option<u64>,
@@ -71,9 +76,17 @@ pub struct SharedOptions {
     #[arg(value_parser = clap::value_parser!(u32).range(0..=65535))]
     pub max_bounces: u32,
 
-    /// Constant of the cone filter, at least 1
+    /// Kernel that weighs the photons by their distance; each integrates to 1 over its disc
+    #[arg(long, value_name = "KERNEL", value_enum, default_value = "cone", help_heading = "Estimate")]
+    pub kernel: KernelArg,
+
+    /// Constant of the cone kernel, at least 1
     #[arg(long, value_name = "C", default_value_t = 2.0, value_parser = cone_constant, help_heading = "Estimate")]
     pub cone_constant: f32,
+
+    /// Count photons of neighbouring surfaces and take the disc for whole: bright corners, dark edges, as in the report
+    #[arg(long, help_heading = "Estimate")]
+    pub raw_estimate: bool,
 
     /// Bound of the search radius in metres [default: none]
     #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
@@ -139,6 +152,8 @@ impl SharedOptions {
         let defaults = Settings::default();
         Settings {
             max_paths: self.max_paths,
+            kernel: self.kernel.into(),
+            raw_estimate: self.raw_estimate,
             cone_constant: self.cone_constant,
             max_radius: self.max_radius,
             max_bounces: self.max_bounces,
@@ -209,12 +224,27 @@ value_enum!(LightUnitArg => LightUnit {
     Photometric,
 });
 
+value_enum!(KernelArg => DensityKernel {
+    /// 1 - q/C, q the distance over the radius
+    Cone,
+    /// 1
+    Constant,
+    /// 1 - q^2
+    Epanechnikov,
+    /// Jensen's Gaussian, which falls to 0.27 at the rim
+    Gaussian,
+    /// (1 - q^2)^2
+    Silverman,
+});
+
 value_enum!(SearchArg => Search {
-    /// In the grid on the device
+    /// The k nearest, in the grid on the device
     Grid,
-    /// In a kd-tree on the CPU: the same picture but for rounding
+    /// The k nearest, in a kd-tree on the CPU: the same as the grid's but for rounding
     #[value(name = "kdtree")]
     KdTree,
+    /// All photons within --radius, in the grid
+    Radius,
 });
 
 value_enum!(TonemapArg => Tonemap {

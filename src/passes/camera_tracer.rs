@@ -78,7 +78,11 @@ impl CameraTracer {
         Ok(Self {
             start: Kernel::new(gpu, "start_camera", &[]),
             advance: Kernel::new(gpu, "advance_queue", &[]),
-            trace: scene.kernel_with(gpu, "trace_camera", &[("SEES_LIGHTS", settings.mode.sees_lights())]),
+            trace: scene.kernel_with(
+                gpu,
+                "trace_camera",
+                &[("SEES_LIGHTS", f64::from(u8::from(settings.mode.sees_lights())))],
+            ),
             direct: DirectLighting::new(gpu, scene, settings.light_samples),
             resolve: Kernel::new(gpu, "resolve", &[]),
             paths: gpu.storage::<Path>("camera paths", TILE_POINTS)?,

@@ -30,6 +30,7 @@ pub(super) struct BatchBuffers {
     counters: Buffer,
     dispatch_arguments: Buffer,
     staged: Buffer,
+    staged_keys: Buffer,
     counts: Buffer,
     places: Buffer,
     /// Photons stored of each group of lights, `u32`.
@@ -74,6 +75,7 @@ impl PhotonKernels {
                 ("counters", &buffers.counters),
                 ("dispatch_arguments", &buffers.dispatch_arguments),
                 ("staged", &buffers.staged),
+                ("staged_keys", &buffers.staged_keys),
                 ("counts", &buffers.counts),
             ])
         };
@@ -126,6 +128,7 @@ impl PhotonKernels {
                     &[
                         ("store", &uniform),
                         ("staged", &buffers.staged),
+                        ("staged_keys", &buffers.staged_keys),
                         ("places", &buffers.places),
                         ("paths", &buffers.paths),
                         ("light_photons", &buffers.light_photons),
@@ -150,6 +153,7 @@ impl BatchBuffers {
             counters: gpu.storage::<Counters>("photon counters", 1)?,
             dispatch_arguments: gpu.storage::<[u32; 3]>("photon dispatch arguments", 1)?,
             staged: gpu.storage::<Photon>("staged photons", staging_capacity)?,
+            staged_keys: gpu.storage::<u32>("keys of staged photons", staging_capacity)?,
             counts: gpu.storage::<u32>("photon counts", paths)?,
             places: gpu.storage::<u32>("photon places", paths)?,
             light_photons: gpu.storage::<u32>("photons of lights", groups as u64)?,

@@ -64,9 +64,9 @@ impl SceneBuffers {
         self.kernel_with(gpu, stem, &[])
     }
 
-    /// As [`Self::kernel`], with switches of its own.
+    /// The same with further `override` constants.
     #[must_use]
-    pub fn kernel_with(&self, gpu: &Gpu, stem: &str, switches: &[(&str, bool)]) -> Kernel {
+    pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
@@ -74,7 +74,7 @@ impl SceneBuffers {
             ("NODE_WINDOW", window_or_all(self.nodes.window)),
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
         ];
-        overrides.extend(switches.iter().map(|(name, on)| (*name, f64::from(u8::from(*on)))));
+        overrides.extend_from_slice(others);
         Kernel::new(gpu, stem, &overrides)
     }
 

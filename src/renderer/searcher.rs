@@ -1,10 +1,10 @@
 //! Who looks for the nearest photons: the grid on the device, or the kd-tree on the CPU in its place.
 
-use super::{CameraPass, PhotonMaps};
+use super::{CameraPass, PhotonMaps, Session};
 use crate::{
     error::Result,
     gpu::Gpu,
-    passes::{Gather, GatherOptions, PhotonMap, Tile},
+    passes::{Gather, PhotonMap, Tile},
     progress::Progress,
     reference::KdMap,
     settings::{Search, Settings},
@@ -12,16 +12,16 @@ use crate::{
 
 /// A search over the maps, ready to gather.
 pub(super) enum Searcher<'a> {
-    Grid(Box<Gather>),
+    Grid(Box<Gather<'a>>),
     KdTree(Vec<KdMap>, &'a Settings),
 }
 
 impl<'a> Searcher<'a> {
-    pub fn new(gpu: &Gpu, maps: &PhotonMaps, settings: &'a Settings) -> Result<Self> {
+    pub fn new(session: &'a Session, maps: &PhotonMaps, settings: &'a Settings) -> Result<Self> {
         Ok(match settings.search {
-            Search::Grid => Self::Grid(Box::new(Gather::new(gpu, GatherOptions::default()))),
+            Search::Grid | Search::Radius => Self::Grid(Box::new(session.gather(settings))),
             Search::KdTree => {
-                let trees = maps.maps.iter().map(|map| kd_map(gpu, map)).collect::<Result<_>>()?;
+                let trees = maps.maps.iter().map(|map| kd_map(session.gpu, map)).collect::<Result<_>>()?;
                 Self::KdTree(trees, settings)
             }
         })

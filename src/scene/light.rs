@@ -4,6 +4,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use serde::Serialize;
 
 use crate::settings::LightUnit;
 
@@ -11,7 +12,8 @@ use crate::settings::LightUnit;
 pub const LUMENS_PER_WATT: f32 = 683.0;
 
 /// How a light without extent shines (KHR_lights_punctual).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum LightKind {
     /// Alike in all directions.
     Point,

@@ -1,15 +1,12 @@
-//! What nodes carry besides meshes and cameras: lights, spheres. Positions are still the world's, in f64.
+//! Exact spheres of nodes. Positions are still the world's, in f64.
 
-use glam::{DMat4, DVec3, Vec3};
+use glam::{DMat4, DVec3};
 use gltf::json;
-use json::extensions::scene::khr_lights_punctual::Type as LightType;
-use json::validation::Checked;
 use serde::Deserialize;
 use serde_json::Value;
 
 use super::fault::{Notes, Read, fault};
-use super::nodes::{self, Placed};
-use crate::scene::{Light, LightKind};
+use super::nodes::Placed;
 
 /// Largest relative difference of a transform's axes that still counts as a uniform scale.
 const UNIFORM: f64 = 1e-4;
@@ -21,55 +18,6 @@ pub(super) struct PlacedSphere {
     pub(super) radius: f64,
     /// Index into the file's materials, valid; `None` for the default one.
     pub(super) material: Option<usize>,
-}
-
-/// Light of a node: a point light in the world, or the kind that is not read.
-pub(super) enum PlacedLight {
-    Point(DVec3, Light),
-    Unread(&'static str),
-    Dark,
-}
-
-/// The light that a node carries.
-pub(super) fn light(root: &json::Root, placed: &Placed, notes: &mut Notes) -> Read<Option<PlacedLight>> {
-    let node = &root.nodes[placed.node];
-    let Some(reference) = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref())
-    else {
-        return Ok(None);
-    };
-    let index = reference.light.value();
-    let lights = root.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
-    let lights = lights.map_or(&[][..], |extension| &extension.lights);
-    let Some(light) = lights.get(index) else {
-        let at = format!("nodes[{}].extensions.KHR_lights_punctual.light", placed.node);
-        return fault(at, format!("{index} of {}", lights.len()));
-    };
-    let place = format!("extensions.KHR_lights_punctual.lights[{index}]");
-    match light.type_ {
-        Checked::Valid(LightType::Point) => {}
-        Checked::Valid(LightType::Spot) => return Ok(Some(PlacedLight::Unread("spot light"))),
-        Checked::Valid(LightType::Directional) => return Ok(Some(PlacedLight::Unread("directional light"))),
-        Checked::Invalid => return fault(format!("{place}.type"), "is not point, spot or directional"),
-    }
-    let intensity = Vec3::from_array(light.color) * light.intensity;
-    if !intensity.is_finite() || intensity.min_element() < 0.0 {
-        return fault(
-            place,
-            format!("intensity {} times color {:?} is not a positive number", light.intensity, light.color),
-        );
-    }
-    let name = nodes::name(node, "light", index);
-    if intensity == Vec3::ZERO {
-        notes.add(format!("light {name:?} has no intensity"));
-        return Ok(Some(PlacedLight::Dark));
-    }
-    if light.range.is_some() {
-        notes.add("the range of lights is not read: they reach everywhere");
-    }
-    Ok(Some(PlacedLight::Point(
-        placed.world.w_axis.truncate(),
-        Light { name, kind: LightKind::Point, position: Vec3::ZERO, direction: Vec3::NEG_Z, intensity },
-    )))
 }
 
 #[derive(Deserialize)]
@@ -103,7 +51,7 @@ struct Extras {
 }
 
 /// The exact sphere that a node carries (draft extension KHR_implicit_shapes).
-pub(super) fn sphere(root: &json::Root, placed: &Placed, notes: &mut Notes) -> Read<Option<PlacedSphere>> {
+pub(super) fn read(root: &json::Root, placed: &Placed, notes: &mut Notes) -> Read<Option<PlacedSphere>> {
     const NAME: &str = "KHR_implicit_shapes";
     let node = &root.nodes[placed.node];
     let Some(extension) = node.extensions.as_ref().and_then(|extensions| extensions.others.get(NAME)) else {
