@@ -13,7 +13,7 @@ use caustica::{
     progress::{Progress, Stage},
     renderer,
     scene::Scene,
-    settings::{LightUnit, Settings},
+    settings::{LightUnit, Search, Settings},
     stats::{Stats, timed},
 };
 
@@ -35,6 +35,9 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     let scene = timed(&mut load_seconds, || Scene::load(&args.scene))?;
     display.check()?;
     display.note(&light_unit_line(&settings));
+    if settings.search == Search::KdTree && !settings.raw_estimate {
+        display.note(RAW_NOTE);
+    }
     for warning in &scene.warnings {
         display.note(&format!("warning: {warning}"));
     }
@@ -64,6 +67,9 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     }
     args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats))
 }
+
+/// Why a kd-tree's picture differs from the default one.
+pub(super) const RAW_NOTE: &str = "the kd-tree is the report's: the estimate is raw, as with --raw-estimate";
 
 /// Finds out before the work that no output would fail or overwrite another file of the same run.
 fn check_files(args: &RenderArgs) -> Result<()> {
