@@ -106,7 +106,7 @@ pub enum Search {
     /// The nearest, by the grid on the device.
     #[default]
     Grid,
-    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU.
+    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU; makes the raw estimate always.
     KdTree,
     /// All within [`Settings::radius`], by the grid.
     Radius,
