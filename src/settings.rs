@@ -104,6 +104,10 @@ pub struct Settings {
     pub neighbors: u32,
     /// Constant C of the cone filter, ≥ 1.
     pub cone_constant: f32,
+    /// Distance within which visible points on one surface share an estimate, as a fraction of its radius, 0 to 2; 0: every camera
+    /// sample has its own.
+    #[serde(default)]
+    pub share_reach: f32,
     /// Bound of the search radius, metres.
     pub max_radius: Option<f32>,
     /// Longest photon path and longest delta chain of a camera path; 0: roulette alone ends paths.
@@ -130,6 +134,7 @@ impl Default for Settings {
             max_paths: None,
             neighbors: 100,
             cone_constant: 2.0,
+            share_reach: 1.0,
             max_radius: None,
             max_bounces: 20,
             spp: 4,
@@ -159,6 +164,9 @@ impl Settings {
         }
         if let Some(r) = self.max_radius.filter(|r| !(*r > 0.0 && r.is_finite())) {
             return fail("max-radius", r.to_string(), "must be above 0");
+        }
+        if !(0.0..=2.0).contains(&self.share_reach) {
+            return fail("share", self.share_reach.to_string(), "must be from 0 to 2");
         }
         if self.global_photons == 0 || self.caustic_photons == 0 {
             return fail("photons", "0".to_string(), "must be at least 1");

@@ -50,7 +50,7 @@ fn twins() -> Vec<Twin> {
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
         PhotonBatch { seed, first_path, first_path_high, paths, light_count, first_light, max_bounces, rules, staging_capacity, lost_scale, pad0, pad1 }
         Store { staged, first_place, first_photon, photons, map_bit, pad0, pad1, pad2 }
-        CameraTile { position, seed, right, width, up, height, forward, spp, first_pixel, pixels, first_sample, samples, max_bounces, branches, pad0, pad1 }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, pad }
         FirstHit { normal, depth, albedo, alpha }
         TilePixel { radiance, alpha, normal, depth, albedo, pad }
         DirectLight { light, points, pad0, pad1 }
@@ -58,8 +58,9 @@ fn twins() -> Vec<Twin> {
         PhotonPlace { position, wi }
         PhotonFlux { flux, index }
         MapInfo { count, levels, split, pad }
-        GatherInfo { count, first, neighbors, cone_constant, max_radius_squared, per_path, stride, pad }
+        GatherInfo { count, first, neighbors, cone_constant, max_radius_squared, per_path, stride, turn }
         Gathered { radius_squared, count, fingerprint }
+        ShareRound { cells, cell_pixels, samples, candidates, branches, reach_squared, points, turn }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
         KeyStep { count, window_first, window_count, fine }

@@ -48,6 +48,11 @@ pub fn radius(text: &str) -> Result<f32, String> {
     number(text).filter(|r| *r > 0.0).ok_or_else(|| "a length in metres, more than 0".to_string())
 }
 
+/// A fraction of the radius of an estimate.
+pub fn share_reach(text: &str) -> Result<f32, String> {
+    number(text).filter(|f| (0.0..=2.0).contains(f)).ok_or_else(|| "a number from 0 to 2".to_string())
+}
+
 /// A relative difference.
 pub fn tolerance(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|t| *t >= 0.0 && t.is_finite());

@@ -1,7 +1,7 @@
 //! The camera pass: the picture's samples, tile by tile: camera rays to their visible points, direct light, and the
 //! sum over each pixel's samples. Memory depends on the size of a tile alone.
 
-use super::SceneBuffers;
+use super::{SceneBuffers, SharedPoints};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
@@ -18,15 +18,17 @@ const BRANCHES: u32 = 4;
 const PIXEL_SAMPLES: u32 = 256;
 /// Bounces handed to the device at once.
 const BOUNCES_PER_SUBMISSION: u32 = 32;
-/// Width and height of the blocks in which pixels are counted; see `shaders/lib/camera_tile.wesl`.
-const BLOCK: u32 = 8;
+/// Pixels of a tile at least.
+const MIN_TILE_PIXELS: u32 = 64;
 
 /// A part of the picture's samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Tile {
-    /// Pixels, counted along blocks: some of them lie outside the picture.
+    /// Pixels, a power of 2, in Morton order; some of them may lie outside the picture.
     pub pixels: u32,
-    pub first_pixel: u32,
+    /// Pixel of the upper left corner.
+    pub first_column: u32,
+    pub first_row: u32,
     pub first_sample: u32,
     /// Samples of each pixel.
     pub samples: u32,
@@ -99,20 +101,17 @@ impl CameraTracer {
     /// The tiles that make up the picture, in order.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
-        let (width, height) = (self.view.width, self.view.height);
-        let all_pixels = width.div_ceil(BLOCK) * height.div_ceil(BLOCK) * BLOCK * BLOCK;
         let samples = self.view.spp.min(PIXEL_SAMPLES);
-        let tile_samples = TILE_POINTS as u32 / self.view.branches;
-        let pixels = ((tile_samples / samples) / (BLOCK * BLOCK)).max(1) * BLOCK * BLOCK;
+        let pixels = (TILE_POINTS as u32 / (self.view.branches * samples)).max(MIN_TILE_PIXELS);
+        let bits = pixels.ilog2();
+        let (width, height) = (1 << bits.div_ceil(2), 1 << (bits / 2));
         let mut tiles = Vec::new();
-        for first_pixel in (0..all_pixels).step_by(pixels as usize) {
-            for first_sample in (0..self.view.spp).step_by(samples as usize) {
-                tiles.push(Tile {
-                    pixels: pixels.min(all_pixels - first_pixel),
-                    first_pixel,
-                    first_sample,
-                    samples: samples.min(self.view.spp - first_sample),
-                });
+        for first_row in (0..self.view.height).step_by(height) {
+            for first_column in (0..self.view.width).step_by(width) {
+                for first_sample in (0..self.view.spp).step_by(samples as usize) {
+                    let samples = samples.min(self.view.spp - first_sample);
+                    tiles.push(Tile { pixels: 1 << bits, first_column, first_row, first_sample, samples });
+                }
             }
         }
         tiles
@@ -124,15 +123,24 @@ impl CameraTracer {
         self.view.branches * tile.pixels * tile.samples
     }
 
+    /// What a tile's estimates are shared among.
+    #[must_use]
+    pub fn shared_points(&self, tile: &Tile) -> SharedPoints<'_> {
+        SharedPoints {
+            points: &self.points,
+            pixels: tile.pixels,
+            samples: tile.samples,
+            branches: self.view.branches,
+            radiance: &self.radiance,
+            gathered: &self.gathered,
+        }
+    }
+
     /// Column and row of the `i`-th pixel of a tile; `None` outside the picture.
     #[must_use]
     pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
-        let pixel = tile.first_pixel + i;
-        let block = pixel / (BLOCK * BLOCK);
-        let blocks_x = self.view.width.div_ceil(BLOCK);
-        let even_bits = |p: u32| (p & 1) | ((p >> 1) & 2) | ((p >> 2) & 4);
-        let x = block % blocks_x * BLOCK + even_bits(pixel);
-        let y = block / blocks_x * BLOCK + even_bits(pixel >> 1);
+        let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
+        let (x, y) = (tile.first_column + even_bits(i), tile.first_row + even_bits(i >> 1));
         (x < self.view.width && y < self.view.height).then_some((x, y))
     }
 
@@ -227,7 +235,8 @@ impl CameraTracer {
 
     fn tile_view(&self, tile: &Tile) -> CameraTile {
         CameraTile {
-            first_pixel: tile.first_pixel,
+            first_column: tile.first_column,
+            first_row: tile.first_row,
             pixels: tile.pixels,
             first_sample: tile.first_sample,
             samples: tile.samples,

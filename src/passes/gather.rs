@@ -108,6 +108,25 @@ impl Gather {
         points: &Buffer,
         count: u32,
         settings: &GatherSettings,
+        results: (&Buffer, &Buffer),
+        progress: &dyn Progress,
+    ) -> Result<GatherStats> {
+        self.run_turn(gpu, map, points, (count, u32::MAX), settings, results, progress)
+    }
+
+    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of a turn; see
+    /// [`crate::layout::VisiblePoint::valid`].
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn run_turn(
+        &mut self,
+        gpu: &Gpu,
+        map: &PhotonMap,
+        points: &Buffer,
+        (count, turn): (u32, u32),
+        settings: &GatherSettings,
         (radiance, gathered): (&Buffer, &Buffer),
         progress: &dyn Progress,
     ) -> Result<GatherStats> {
@@ -124,6 +143,7 @@ impl Gather {
                 cone_constant: settings.cone_constant,
                 max_radius_squared: settings.max_radius.map_or(-1.0, |r| r * r),
                 per_path: (1.0 / map.emitted().max(1) as f64) as f32,
+                turn,
                 ..GatherInfo::default()
             };
             stats.dispatches += self.run_batch(gpu, map, &info, [points, radiance, gathered], progress)?;

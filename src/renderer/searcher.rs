@@ -4,7 +4,7 @@ use super::{CameraPass, PhotonMaps};
 use crate::{
     error::Result,
     gpu::Gpu,
-    passes::{Gather, GatherOptions, PhotonMap, Tile},
+    passes::{EstimateSharing, Gather, GatherOptions, PhotonMap, Tile},
     progress::Progress,
     reference::KdMap,
     settings::{Search, Settings},
@@ -12,14 +12,14 @@ use crate::{
 
 /// A search over the maps, ready to gather.
 pub(super) enum Searcher<'a> {
-    Grid(Box<Gather>),
+    Grid(Box<Gather>, EstimateSharing),
     KdTree(Vec<KdMap>, &'a Settings),
 }
 
 impl<'a> Searcher<'a> {
     pub fn new(gpu: &Gpu, maps: &PhotonMaps, settings: &'a Settings) -> Result<Self> {
         Ok(match settings.search {
-            Search::Grid => Self::Grid(Box::new(Gather::new(gpu, GatherOptions::default()))),
+            Search::Grid => Self::Grid(Box::new(Gather::new(gpu, GatherOptions::default())), EstimateSharing::new(gpu, settings.share_reach)),
             Search::KdTree => {
                 let trees = maps.maps.iter().map(|map| kd_map(gpu, map)).collect::<Result<_>>()?;
                 Self::KdTree(trees, settings)
@@ -30,11 +30,10 @@ impl<'a> Searcher<'a> {
     /// Adds the light of all maps' photons to the radiance of the tile's visible points.
     pub fn gather(&mut self, pass: &CameraPass, maps: &PhotonMaps, tile: &Tile, progress: &dyn Progress) -> Result<()> {
         match self {
-            Self::Grid(gather) => {
-                let (points, count) = (&pass.tracer.points, pass.tracer.point_count(tile));
-                let results = (&pass.tracer.radiance, &pass.tracer.gathered);
-                for map in &maps.maps {
-                    gather.run(pass.gpu, map, points, count, &pass.estimate, results, progress)?;
+            Self::Grid(gather, sharing) => {
+                let shared = pass.tracer.shared_points(tile);
+                for (map, turn) in maps.maps.iter().zip(1..) {
+                    sharing.run(pass.gpu, (gather, &pass.estimate), (map, turn), &shared, progress)?;
                 }
             }
             Self::KdTree(trees, settings) => {
