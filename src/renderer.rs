@@ -15,11 +15,11 @@ use crate::{
     error::{Error, Result},
     gpu::Gpu,
     image::Frame,
-    passes::{MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
+    passes::{Gather, GatherOptions, LightGroup, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::Settings,
-    stats::{DeviceStats, MapStats, Stats, timed},
+    stats::{DeviceStats, LightStats, MapStats, Stats, timed},
 };
 
 /// Height of a picture whose size was not asked for.
@@ -80,7 +80,7 @@ impl PhotonMaps {
 }
 
 impl<'a> Session<'a> {
-    /// Puts the scene on the device. `light_sampling` and `light_unit` of the settings hold for the whole session; the
+    /// Puts the scene on the device. What the settings say of lights (`light_sampling`, `light_photons`, `light_unit`) holds for the whole session; the
     /// others are only checked, so that a wrong one fails before the work. The peak of device memory counts from here.
     ///
     /// # Errors
@@ -98,6 +98,7 @@ impl<'a> Session<'a> {
         progress.report(Stage::Bvh, 0, 1);
         let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
         let buffers = SceneBuffers::new(gpu, scene, &bvh, settings)?;
+        stats.warnings.extend(buffers.lights.warnings.iter().cloned());
         Ok(Self { gpu, scene, buffers, stats })
     }
 
@@ -120,6 +121,7 @@ impl<'a> Session<'a> {
         stats.photons.global = map_stats(&traced.global);
         stats.photons.caustic = map_stats(&traced.caustic);
         stats.photons.lost_to_bounce_limit = traced.lost;
+        stats.photons.lights = light_stats(&self.buffers, &traced.of_lights);
         count_faults(&mut stats, traced.media_overflows, traced.unfinished);
         stats.warnings.extend(traced.warnings);
         progress.report(Stage::Grid, 0, 1);
@@ -141,7 +143,7 @@ impl<'a> Session<'a> {
     pub fn picture(&self, maps: &PhotonMaps, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
         let mut stats = maps.stats.clone();
         let pass = CameraPass::new(self, settings)?;
-        let mut searcher = timed(&mut stats.seconds.grid, || Searcher::new(self.gpu, maps, settings))?;
+        let mut searcher = timed(&mut stats.seconds.grid, || Searcher::new(self, maps, settings))?;
         let mut film = pass.film();
         let tiles = pass.tracer.tiles();
         for (done, tile) in tiles.iter().enumerate() {
@@ -154,6 +156,14 @@ impl<'a> Session<'a> {
         progress.report(Stage::Camera, tiles.len() as u64, tiles.len() as u64);
         self.close(&mut stats);
         Ok(Render { frame: film.finish(settings.spp), stats })
+    }
+
+    /// The gather of the estimate that the settings ask for.
+    pub(crate) fn gather(&self, settings: &Settings) -> Gather<'_> {
+        if settings.raw_estimate {
+            return Gather::new(self.gpu, GatherOptions::default());
+        }
+        Gather::over(self.gpu, &self.buffers, GatherOptions::flat())
     }
 
     /// What can be said of a picture only when it is finished.
@@ -183,6 +193,17 @@ pub(crate) fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32,
 
 fn map_stats(map: &RawMap) -> MapStats {
     MapStats { emitted: map.emitted, stored: map.stored }
+}
+
+fn light_stats(buffers: &SceneBuffers, photons: &[u32]) -> Vec<LightStats> {
+    let groups = buffers.lights.table.groups.iter().zip(photons);
+    let stats = |(group, photons): (&LightGroup, &u32)| LightStats {
+        name: group.name.clone(),
+        kind: group.kind.to_owned(),
+        power: group.power.to_array(),
+        photons: u64::from(*photons),
+    };
+    groups.map(stats).collect()
 }
 
 fn count_faults(stats: &mut Stats, media_overflows: u64, unfinished: u64) {

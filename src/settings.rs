@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
+use crate::{
+    density::{Density, DensityKernel},
+    error::{Error, Result},
+};
 
 /// Which light reaches the picture, and by which way (the report's five modes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,7 +20,7 @@ pub enum Mode {
     DirectRays,
     /// 3: light straight from the lights or through delta surfaces only, by photons.
     DirectPhotons,
-    /// 4: what mode 0 takes from photons.
+    /// 4: what mode 0 takes from photons. The only one that does not show what shines.
     IndirectPhotons,
 }
 
@@ -36,6 +39,12 @@ impl Mode {
     #[must_use]
     pub fn direct_by_rays(self) -> bool {
         matches!(self, Mode::Hybrid | Mode::DirectRays)
+    }
+
+    /// The picture shows what shines, straight, in mirrors and through glass.
+    #[must_use]
+    pub fn sees_lights(self) -> bool {
+        self != Mode::IndirectPhotons
     }
 
     /// Photons are traced at all.
@@ -64,8 +73,19 @@ pub enum LightSampling {
     /// In proportion to power: all photons start with like flux.
     #[default]
     Power,
-    /// In turn, whatever the power.
+    /// In turn, whatever the power. What shines by one material is one light.
     Uniform,
+}
+
+/// Where photon paths are sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Emission {
+    /// Towards the scene, for the global map; and apart from that towards mirrors and glass, for the caustic map.
+    #[default]
+    Aimed,
+    /// Wherever the lights shine, for both maps at once.
+    Unaimed,
 }
 
 /// How the file's light intensities are read.
@@ -79,15 +99,17 @@ pub enum LightUnit {
     Photometric,
 }
 
-/// How the photons nearest to a point are found. Both ways give the same picture but for rounding.
+/// Which photons an estimate sums, and how they are found. Grid and kd-tree give the same picture but for rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Search {
-    /// The grid, on the device.
+    /// The nearest, by the grid on the device.
     #[default]
     Grid,
-    /// The kd-tree of [`crate::reference`], on the CPU.
+    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU.
     KdTree,
+    /// All within [`Settings::radius`], by the grid.
+    Radius,
 }
 
 /// Settings of one render.
@@ -123,6 +145,27 @@ pub struct Settings {
     pub light_unit: LightUnit,
     #[serde(default)]
     pub search: Search,
+    /// Lights by name, and the factor on their share of the photons, each > 0.
+    #[serde(default)]
+    pub light_photons: Vec<(String, f64)>,
+    #[serde(default)]
+    pub emission: Emission,
+    /// Samples of the direct light of emissive surfaces and the environment per visible point, 1 to 4096.
+    #[serde(default = "default_light_samples")]
+    pub light_samples: u32,
+    /// Radius of the estimate with [`Search::Radius`], metres; `None` with the others.
+    #[serde(default)]
+    pub radius: Option<f32>,
+    /// Shape of the kernel that weighs the photons.
+    #[serde(default)]
+    pub kernel: DensityKernel,
+    /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the estimate of the report.
+    #[serde(default)]
+    pub raw_estimate: bool,
+}
+
+fn default_light_samples() -> u32 {
+    Settings::default().light_samples
 }
 
 impl Default for Settings {
@@ -144,11 +187,23 @@ impl Default for Settings {
             light_sampling: LightSampling::Power,
             light_unit: LightUnit::Radiometric,
             search: Search::Grid,
+            light_photons: Vec::new(),
+            emission: Emission::Aimed,
+            light_samples: 4,
+            radius: None,
+            kernel: DensityKernel::Cone,
+            raw_estimate: false,
         }
     }
 }
 
 impl Settings {
+    /// The kernel with its constant.
+    #[must_use]
+    pub fn density(&self) -> Density {
+        Density { kernel: self.kernel, cone_constant: self.cone_constant }
+    }
+
     /// Checks every value against its range.
     ///
     /// # Errors
@@ -168,11 +223,25 @@ impl Settings {
         if !(0.0..=2.0).contains(&self.share_reach) {
             return fail("share", self.share_reach.to_string(), "must be from 0 to 2");
         }
+        match (self.search, self.radius) {
+            (Search::Radius, None) => return fail("search", "radius".to_string(), "needs a radius"),
+            (Search::Radius, Some(r)) if !(r > 0.0 && r.is_finite()) => {
+                return fail("radius", r.to_string(), "must be above 0");
+            }
+            (Search::Radius, Some(_)) | (_, None) => {}
+            (_, Some(r)) => return fail("radius", r.to_string(), "goes with the search by radius only"),
+        }
         if self.global_photons == 0 || self.caustic_photons == 0 {
             return fail("photons", "0".to_string(), "must be at least 1");
         }
         if self.spp == 0 {
             return fail("spp", "0".to_string(), "must be at least 1");
+        }
+        if !(1..=4096).contains(&self.light_samples) {
+            return fail("light-samples", self.light_samples.to_string(), "must be from 1 to 4096");
+        }
+        if let Some((light, weight)) = self.light_photons.iter().find(|(_, w)| !(*w > 0.0 && w.is_finite())) {
+            return fail("light-photons", format!("{light}={weight}"), "the weight must be above 0");
         }
         if self.max_paths == Some(0) {
             return fail("max-paths", "0".to_string(), "must be at least 1");

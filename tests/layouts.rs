@@ -40,25 +40,28 @@ macro_rules! twins {
 fn twins() -> Vec<Twin> {
     twins! {
         BvhNode { left_low, left_high, right_low, right_high }
-        Primitive { v0, material, e1, id, e2, pad }
+        Primitive { v0, material, e1, id, e2, emitter }
         Normals { n0, n1, n2, flat_shaded }
-        Material { color, kind, ior, pad0, pad1, pad2 }
-        Light { position, cdf, intensity, probability }
+        Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }
+        Light { position, kind, e1, group, e2, solid_angle, emission, area }
+        LightChoice { cdf, probability }
+        Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
         Path { origin, flags, direction, bounces, beta, media_count, media }
-        Photon { position, wi, flux, key }
+        Photon { position, wi, flux, normal }
         VisiblePoint { position, valid, weight, offset, ng, pad0, ns, pad1 }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
-        PhotonBatch { seed, first_path, first_path_high, paths, light_count, first_light, max_bounces, rules, staging_capacity, lost_scale, pad0, pad1 }
-        Store { staged, first_place, first_photon, photons, map_bit, pad0, pad1, pad2 }
+        PhotonBatch { seed, first_path, first_path_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
+        Store { staged, first_photon, photons, map_bit }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, pad }
         FirstHit { normal, depth, albedo, alpha }
         TilePixel { radiance, alpha, normal, depth, albedo, pad }
         DirectLight { light, points, pad0, pad1 }
+        EmitterSample { points, sample, samples, light_count }
         Cell { lo, wi_lo, hi, wi_hi }
         PhotonPlace { position, wi }
-        PhotonFlux { flux, index }
+        PhotonFlux { flux, normal }
         MapInfo { count, levels, split, pad }
-        GatherInfo { count, first, neighbors, cone_constant, max_radius_squared, per_path, stride, turn }
+        GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, turn, pad0, pad1 }
         Gathered { radius_squared, count, fingerprint }
         ShareRound { cells, cell_pixels, samples, candidates, branches, reach_squared, points, turn }
         SortStep { count, shift, stride, pad }
@@ -83,11 +86,22 @@ fn constants() -> Vec<(&'static str, u64)> {
         MIRROR,
         GLASS,
         PANE,
-        NO_TURN,
+        POINT_LIGHT,
+        SPOT_LIGHT,
+        DIRECTIONAL_LIGHT,
+        TRIANGLE_LIGHT,
+        SPHERE_LIGHT,
+        ENVIRONMENT_LIGHT,
+        STREAM_PHOTON,
+        STREAM_CAUSTIC,
         STORE_GLOBAL,
         STORE_DIRECT,
         STORE_CAUSTIC,
         FOLLOW_DIFFUSE,
+        AIM,
+        CAUSTICS_APART,
+        GROUP_SHIFT,
+        MAX_TARGETS,
         CAUSTIC_BIT,
         CELL_PHOTONS,
         CELL_FAN,
@@ -96,14 +110,18 @@ fn constants() -> Vec<(&'static str, u64)> {
         SCAN_SPAN,
         BOUND_LANES,
         SEARCH_STATE_BYTES,
+        DISC_BYTES,
         GATHER_STATE_BYTES
     ]
     .to_vec()
 }
 
 /// Structs that only the device fills and reads, and the bytes that the host allots them.
-const OPAQUE: [(&str, usize); 2] =
-    [("SearchState", layout::SEARCH_STATE_BYTES), ("GatherState", layout::GATHER_STATE_BYTES)];
+const OPAQUE: [(&str, usize); 3] = [
+    ("SearchState", layout::SEARCH_STATE_BYTES),
+    ("GatherState", layout::GATHER_STATE_BYTES),
+    ("Disc", layout::DISC_BYTES),
+];
 
 fn opaque_bytes(name: Option<&str>) -> Option<u32> {
     OPAQUE.iter().find(|(n, _)| Some(*n) == name).map(|(_, bytes)| *bytes as u32)
@@ -255,14 +273,14 @@ fn bound_names(wgsl: &str) -> Vec<String> {
 const GOOD: &str = "
     const WORKGROUP_SIZE: u32 = 64u;
     const SPHERE_BIT = 1u << 31u;
-    struct Photon { position: vec3f, wi: u32, flux: vec3f, key: u32 }
+    struct Photon { position: vec3f, wi: u32, flux: vec3f, normal: u32 }
     struct Path {
         origin: vec3f, flags: u32, direction: vec3f, bounces: u32, beta: vec3f, media_count: u32, media: array<u32, 4>,
     }
     @group(1) @binding(0) var<storage, read> photons: array<Photon>;
     @group(2) @binding(0) var<storage, read_write> paths: array<Path>;
     @compute @workgroup_size(WORKGROUP_SIZE)
-    fn probe() { paths[0].flags = photons[0].key | SPHERE_BIT; }
+    fn probe() { paths[0].flags = photons[0].normal | SPHERE_BIT; }
 ";
 
 #[test]
@@ -278,7 +296,7 @@ fn each_kind_of_disagreement_is_reported() {
         ("flux: vec3f", "flow: vec3f", "Photon is"),
         ("flux: vec3f", "flux: vec4f", "Photon takes"),
         ("media: array<u32, 4>", "media: array<u32, 8>", "Path takes"),
-        (", key: u32 }", ", key: u32, more: u32 }", "Photon takes"),
+        (", normal: u32 }", ", normal: u32, more: u32 }", "Photon takes"),
         ("SPHERE_BIT = 1u << 31u", "SPHERE_BIT = 1u << 30u", "SPHERE_BIT is"),
         ("= 64u", "= 32u", "WORKGROUP_SIZE is"),
         ("@workgroup_size(WORKGROUP_SIZE)", "@workgroup_size(8, 8)", "workgroups of"),

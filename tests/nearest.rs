@@ -3,6 +3,7 @@
 mod photons;
 
 use caustica::{
+    density::{Density, DensityKernel},
     gpu::{Buffer, Gpu},
     layout::{Gathered, Photon, PhotonFlux, PhotonPlace, VisiblePoint},
     passes::{
@@ -11,7 +12,7 @@ use caustica::{
         radix_sort::RadixSort,
     },
     progress::Silent,
-    reference::{ConeFilter, Found, brute_force, estimate, usable},
+    reference::{Found, brute_force, estimate, usable},
 };
 use glam::Vec3;
 use photons::{Random, caustic_box, coincident, point, uniform_box};
@@ -20,8 +21,8 @@ use photons::{Random, caustic_box, coincident, point, uniform_box};
 struct Bench {
     gpu: Gpu,
     kernels: MapKernels,
-    one_sided: Gather,
-    two_sided: Gather,
+    one_sided: Gather<'static>,
+    two_sided: Gather<'static>,
 }
 
 /// What a gather returned.
@@ -33,6 +34,7 @@ struct Answer {
 }
 
 const EMITTED: u64 = 1000;
+const CONE: Density = Density { kernel: DensityKernel::Cone, cone_constant: 2.0 };
 
 impl Bench {
     fn open() -> Self {
@@ -68,7 +70,7 @@ fn run(gpu: &Gpu, gather: &mut Gather, map: &PhotonMap, points: &[VisiblePoint],
 }
 
 fn settings(k: u32) -> GatherSettings {
-    GatherSettings { neighbors: k, cone_constant: 2.0, max_radius: None }
+    GatherSettings { neighbors: k, radius: None, max_radius: None, density: CONE }
 }
 
 /// Number of valid points whose answer differs from brute force over `photons`: in the count, in the radius (beyond
@@ -86,8 +88,7 @@ fn differences(
         let found = brute_force(&positions, point.position.into(), settings.neighbors, settings.max_radius, accepted);
         let flat = VisiblePoint { ns: point.ng, ..*point };
         let expected = if side_test { *point } else { flat };
-        let radiance =
-            estimate((places, fluxes), &found, &expected, ConeFilter(settings.cone_constant), EMITTED, side_test);
+        let radiance = estimate((places, fluxes), &found, &expected, settings.density, EMITTED, side_test);
         !agrees(&answer.gathered[i], &answer.radiance[i], &found, radiance)
     };
     points.iter().enumerate().filter(|(_, p)| p.valid != 0).filter(|p| wrong(*p)).count()
@@ -358,7 +359,7 @@ fn the_estimate_is_unbiased_with_the_next_photon() {
         let mut found = brute_force(&positions, p.position.into(), 10, None, |_| true);
         let last = *found.photons.last().unwrap() as usize;
         found.radius_squared = positions[last].distance_squared(p.position.into());
-        estimate((&places, &fluxes), &found, p, ConeFilter(2.0), EMITTED, true)[0]
+        estimate((&places, &fluxes), &found, p, CONE, EMITTED, true)[0]
     };
     let mean = points.iter().step_by(10).map(with_kth).sum::<f64>() / points.len() as f64 * 10.0 / even;
     let expected = 1.0 + 0.5 / 9.0 / (2.0 / 3.0);

@@ -11,7 +11,7 @@ use clap::{
 use super::{
     options::{RenderOptions, SearchArg},
     study_args::StudyArgs,
-    values::{output, tolerance},
+    values::{output, radius, tolerance},
 };
 
 /// Caustica renders glTF scenes by photon mapping on the GPU, without a screen.
@@ -63,9 +63,14 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub options: RenderOptions,
 
-    /// Where the nearest photons are looked for
-    #[arg(long, value_name = "HOW", value_enum, default_value = "grid", help_heading = "Run")]
+    /// Which photons are summed and where they are looked for
+    #[arg(long, value_name = "HOW", value_enum, default_value = "grid", help_heading = "Estimate")]
     pub search: SearchArg,
+
+    /// Radius of the estimate in metres, with --search radius
+    #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
+    #[arg(required_if_eq("search", "radius"))]
+    pub radius: Option<f32>,
 
     /// Write what happened as JSON: device, seconds by stage, photons, rays, peak device memory, warnings
     #[arg(long, value_name = "FILE", help_heading = "Run")]
@@ -105,13 +110,16 @@ pub struct CompareArgs {
 impl RenderArgs {
     /// The library's settings that these arguments ask for.
     pub fn settings(&self) -> Settings {
-        Settings { search: self.search.into(), ..self.options.settings() }
+        Settings { search: self.search.into(), radius: self.radius, ..self.options.settings() }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use caustica::settings::{LightSampling, LightUnit, Mode, Search};
+    use caustica::{
+        density::DensityKernel,
+        settings::{Emission, LightSampling, LightUnit, Mode, Search},
+    };
 
     use super::*;
 
@@ -152,12 +160,14 @@ mod tests {
     #[test]
     fn every_option_reaches_the_settings() {
         let s = settings(
-            "--max-paths 3M -k 50 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
-             --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree",
+            "--max-paths 3M -k 50 --kernel gaussian --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
+             --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
+             --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
         let expected = Settings {
             max_paths: Some(3_000_000),
             neighbors: 50,
+            kernel: DensityKernel::Gaussian,
             cone_constant: 1.5,
             max_radius: Some(0.25),
             max_bounces: 0,
@@ -168,8 +178,13 @@ mod tests {
             light_sampling: LightSampling::Uniform,
             light_unit: LightUnit::Photometric,
             search: Search::KdTree,
+            light_photons: vec![("lamp".into(), 2.0), ("sky".into(), 0.5)],
+            light_samples: 9,
+            emission: Emission::Unaimed,
             ..Settings::default()
         };
         assert_eq!(s, expected);
+        let s = settings("--search radius --radius 0.1");
+        assert_eq!((s.search, s.radius), (Search::Radius, Some(0.1)));
     }
 }

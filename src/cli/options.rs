@@ -1,12 +1,14 @@
 //! Options that all commands have that render.
 
 use caustica::{
+    density::DensityKernel,
     image::Tonemap,
-    settings::{LightSampling, LightUnit, Mode, Search, Settings},
+    settings::{Emission, LightSampling, LightUnit, Mode, Search, Settings},
 };
 use clap::ValueEnum;
 
-use super::values::{cone_constant, count, exposure, photons, radius, share_reach, size};
+use super::environment::EnvironmentOptions;
+use super::values::{cone_constant, count, exposure, light_weight, photons, radius, share_reach, size};
 
 /// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
@@ -43,9 +45,26 @@ pub struct SharedOptions {
     #[arg(long, value_name = "HOW", value_enum, default_value = "power", help_heading = "Light")]
     pub light_sampling: LightSamplingArg,
 
+    /// Multiplies the share of a light's photons, by the name of the light, emissive material or environment; may be given
+    /// several times
+    #[arg(long, value_name = "NAME=WEIGHT", value_parser = light_weight, help_heading = "Light")]
+    pub light_photons: Vec<(String, f64)>,
+
+    /// Samples of the direct light of emissive surfaces and the environment per visible point
+    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Light")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub light_samples: u32,
+
+    /// Where photon paths are sent
+    #[arg(long, value_name = "HOW", value_enum, default_value = "aimed", help_heading = "Photons")]
+    pub emission: EmissionArg,
+
     /// How the file's light intensities are read
     #[arg(long, value_name = "UNIT", value_enum, default_value = "radiometric", help_heading = "Light")]
     pub light_unit: LightUnitArg,
+
+    #[command(flatten)]
+    pub environment: EnvironmentOptions,
 
     /// Photon paths emitted at most [default: 100 times the capacity]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
@@ -57,9 +76,17 @@ pub struct SharedOptions {
     #[arg(value_parser = clap::value_parser!(u32).range(0..=65535))]
     pub max_bounces: u32,
 
-    /// Constant of the cone filter, at least 1
+    /// Kernel that weighs the photons by their distance; each integrates to 1 over its disc
+    #[arg(long, value_name = "KERNEL", value_enum, default_value = "cone", help_heading = "Estimate")]
+    pub kernel: KernelArg,
+
+    /// Constant of the cone kernel, at least 1
     #[arg(long, value_name = "C", default_value_t = 2.0, value_parser = cone_constant, help_heading = "Estimate")]
     pub cone_constant: f32,
+
+    /// Count photons of neighbouring surfaces and take the disc for whole: bright corners, dark edges, as in the report
+    #[arg(long, help_heading = "Estimate")]
+    pub raw_estimate: bool,
 
     /// Bound of the search radius in metres [default: none]
     #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
@@ -129,6 +156,8 @@ impl SharedOptions {
         let defaults = Settings::default();
         Settings {
             max_paths: self.max_paths,
+            kernel: self.kernel.into(),
+            raw_estimate: self.raw_estimate,
             cone_constant: self.cone_constant,
             max_radius: self.max_radius,
             share_reach: self.share,
@@ -139,6 +168,9 @@ impl SharedOptions {
             seed: self.seed,
             light_sampling: self.light_sampling.into(),
             light_unit: self.light_unit.into(),
+            light_photons: self.light_photons.clone(),
+            light_samples: self.light_samples,
+            emission: self.emission.into(),
             ..defaults
         }
     }
@@ -183,6 +215,13 @@ value_enum!(LightSamplingArg => LightSampling {
     Uniform,
 });
 
+value_enum!(EmissionArg => Emission {
+    /// Towards the scene for the global map, and apart from that towards mirrors and glass for the caustic map
+    Aimed,
+    /// Wherever the lights shine, for both maps at once
+    Unaimed,
+});
+
 value_enum!(LightUnitArg => LightUnit {
     /// Candela read as W/sr in each channel
     Radiometric,
@@ -190,12 +229,27 @@ value_enum!(LightUnitArg => LightUnit {
     Photometric,
 });
 
+value_enum!(KernelArg => DensityKernel {
+    /// 1 - q/C, q the distance over the radius
+    Cone,
+    /// 1
+    Constant,
+    /// 1 - q^2
+    Epanechnikov,
+    /// Jensen's Gaussian, which falls to 0.27 at the rim
+    Gaussian,
+    /// (1 - q^2)^2
+    Silverman,
+});
+
 value_enum!(SearchArg => Search {
-    /// In the grid on the device
+    /// The k nearest, in the grid on the device
     Grid,
-    /// In a kd-tree on the CPU: the same picture but for rounding
+    /// The k nearest, in a kd-tree on the CPU: the same as the grid's but for rounding
     #[value(name = "kdtree")]
     KdTree,
+    /// All photons within --radius, in the grid
+    Radius,
 });
 
 value_enum!(TonemapArg => Tonemap {

@@ -40,7 +40,8 @@ pub fn run(args: &StudyArgs) -> Result<()> {
         log_library();
     }
     let display = Display::new(options.quiet, options.verbose);
-    let plan = plan(args)?;
+    let mut plan = plan(args)?;
+    options.environment.light(plan.subjects.iter_mut().map(|subject| &mut subject.scene))?;
     plan.check()?;
     for warning in plan.subjects.iter().flat_map(|s| &s.scene.warnings).collect::<BTreeSet<_>>() {
         display.note(&format!("warning: {warning}"));

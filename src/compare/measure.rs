@@ -157,7 +157,7 @@ mod tests {
     /// Photons at these distances along x, all of them from above, and the origin to see them from.
     fn line(distances: &[f32]) -> (KdMap, VisiblePoint) {
         let place = |&x: &f32| PhotonPlace { position: [x, 0.0, 0.0], wi: octahedral(glam::Vec3::Y) };
-        let flux = PhotonFlux { flux: [1.0; 3], index: 0 };
+        let flux = PhotonFlux { flux: [1.0; 3], normal: 0 };
         let up = [0.0, 1.0, 0.0];
         let point = VisiblePoint { valid: 1, ng: up, ns: up, weight: [1.0; 3], ..VisiblePoint::default() };
         (KdMap::new(distances.iter().map(place).collect(), vec![flux; distances.len()], 1), point)

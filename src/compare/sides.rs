@@ -6,7 +6,7 @@ use crate::{
     layout::{Gathered, Photon, VisiblePoint},
     passes::{Gather, GatherOptions, MapKernels, PhotonMap, PhotonStore, Tile},
     progress::Progress,
-    reference::{Estimate, KdMap},
+    reference::{Estimate, KdMap, mix},
     renderer::CameraPass,
     settings::Settings,
     stats::timed,
@@ -18,7 +18,7 @@ const WARM_UP: u32 = 64;
 /// Gathers on the grid.
 pub(super) struct GridGather<'a> {
     pub maps: &'a [PhotonMap],
-    gather: Gather,
+    gather: Gather<'static>,
     /// Radiance by one map alone.
     radiance: Option<Buffer>,
     warm: bool,
@@ -89,18 +89,20 @@ impl<'a> GridGather<'a> {
     }
 }
 
-/// Builds the maps once more, of photons as they come from the tracer: drivers compile a kernel when it first runs, so the
+/// Builds the maps once more, of photons in as little order as they come from the tracer: drivers compile a kernel when it first runs, so the
 /// first time says little.
 fn build_seconds(gpu: &Gpu, maps: &[PhotonMap]) -> Result<f64> {
     let kernels = MapKernels::new(gpu);
     let mut seconds = 0.0;
     for map in maps {
         let (places, fluxes) = map.read(gpu)?;
-        let mut photons = vec![Photon::default(); places.len()];
-        for (place, flux) in places.iter().zip(&fluxes) {
-            let photon = Photon { position: place.position, wi: place.wi, flux: flux.flux, key: 0 };
-            photons[flux.index as usize] = photon;
-        }
+        let photon = |i: u32| {
+            let (place, flux) = (&places[i as usize], &fluxes[i as usize]);
+            Photon { position: place.position, wi: place.wi, flux: flux.flux, normal: flux.normal }
+        };
+        let mut order: Vec<u32> = (0..places.len() as u32).collect();
+        order.sort_unstable_by_key(|&i| mix(i));
+        let photons: Vec<Photon> = order.into_iter().map(photon).collect();
         let few = &photons[..photons.len().min(WARM_UP as usize)];
         PhotonMap::build(gpu, &kernels, PhotonStore::with(gpu, few)?, few.len() as u32, map.emitted())?;
         let store = PhotonStore::with(gpu, &photons)?;

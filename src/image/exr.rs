@@ -29,9 +29,25 @@ pub struct Origin<'a> {
     pub scene: &'a str,
     /// Hash of the scene's bytes.
     pub scene_hash: &'a str,
+    /// The light from all around, if there is any.
+    pub environment: Option<EnvironmentOrigin<'a>>,
     pub settings: &'a Settings,
     /// Of these the device and the photon counts are kept: equal runs give equal files.
     pub stats: &'a Stats,
+}
+
+/// The light from all around, as a file's attributes tell of it.
+#[derive(Clone, Copy, Debug)]
+pub struct EnvironmentOrigin<'a> {
+    /// File name without folders, or what stands for one.
+    pub name: &'a str,
+    /// Hash of the file's bytes.
+    pub hash: &'a str,
+    /// Of a uniform one: W/(m² sr) in each channel.
+    pub radiance: Option<[f32; 3]>,
+    pub strength: f32,
+    /// Radians.
+    pub rotation: f32,
 }
 
 /// CIE xy of ITU-R BT.709 primaries and D65.
@@ -87,12 +103,23 @@ fn attributes(origin: &Origin) -> LayerAttributes {
         ("causticEmitted", maps.caustic.emitted.to_string()),
         ("causticStored", maps.caustic.stored.to_string()),
     ];
+    let environment = origin.environment.iter().flat_map(|environment| {
+        let degrees = (f64::from(environment.rotation).to_degrees() * 1e4).round() / 1e4;
+        let uniform = environment.radiance.map(|[r, g, b]| ("environmentRadiance", format!("{r},{g},{b}")));
+        let file = [
+            ("environment", environment.name.to_string()),
+            ("environmentHash", environment.hash.to_string()),
+            ("environmentStrength", environment.strength.to_string()),
+            ("environmentRotation", degrees.to_string()),
+        ];
+        file.into_iter().chain(uniform)
+    });
     let attribute = |(name, value): (&str, String)| {
         (Text::from(format!("caustica:{name}").as_str()), AttributeValue::Text(text(&value)))
     };
     LayerAttributes {
         software_name: Some(text(&format!("Caustica {version}"))),
-        other: texts.into_iter().map(attribute).collect(),
+        other: texts.into_iter().chain(environment).map(attribute).collect(),
         ..LayerAttributes::default()
     }
 }
@@ -208,7 +235,7 @@ mod tests {
     }
 
     fn write(path: &Path, frame: &Frame, settings: &Settings) {
-        let origin = Origin { scene: "räume.gltf", scene_hash: "ab12", settings, stats: &stats() };
+        let origin = Origin { scene: "räume.gltf", scene_hash: "ab12", environment: None, settings, stats: &stats() };
         write_exr(path, frame, &origin).unwrap();
     }
 
@@ -236,6 +263,32 @@ mod tests {
             assert_eq!(found[name], value, "{name}");
         }
         assert_eq!(found.len(), 11);
+    }
+
+    #[test]
+    fn tells_how_the_scene_was_lit_from_all_around() {
+        let folder = tempfile::tempdir().unwrap();
+        let found = |environment: Option<EnvironmentOrigin>| {
+            let path = folder.path().join("a.exr");
+            let settings = Settings::default();
+            let origin = Origin { scene: "", scene_hash: "", environment, settings: &settings, stats: &stats() };
+            write_exr(&path, &frame(), &origin).unwrap();
+            let mut all = read_exr_attributes(&path).unwrap();
+            all.retain(|name, _| name.starts_with("environment"));
+            all.into_iter().map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>()
+        };
+        let map = EnvironmentOrigin {
+            name: "sky.hdr",
+            hash: "cd",
+            radiance: None,
+            strength: 0.5,
+            rotation: 30_f32.to_radians(),
+        };
+        let of_map = ["environment sky.hdr", "environmentHash cd", "environmentRotation 30", "environmentStrength 0.5"];
+        assert_eq!(found(Some(map)), of_map);
+        let uniform = EnvironmentOrigin { radiance: Some([1.0, 0.25, 0.0]), ..map };
+        assert_eq!(found(Some(uniform))[2], "environmentRadiance 1,0.25,0");
+        assert_eq!(found(None), [""; 0]);
     }
 
     #[test]

@@ -6,12 +6,14 @@ mod exr;
 mod file;
 pub mod flip;
 mod png;
+mod radiance;
 mod tonemap;
 
 pub use canvas::{Canvas, Rgb8};
-pub use exr::{Origin, read_exr, read_exr_attributes, write_exr};
+pub use exr::{EnvironmentOrigin, Origin, read_exr, read_exr_attributes, write_exr};
 pub use file::{check_output, close_files, write_file};
 pub use png::{encode_png, write_png};
+pub(crate) use radiance::{decode_radiance, read_radiance_bytes};
 pub use tonemap::{Tonemap, srgb_encode};
 
 /// A finished frame, scene-linear, row 0 at the top. All vectors have `width * height` elements.

@@ -1,12 +1,12 @@
 //! The camera pass: the picture's samples, tile by tile: camera rays to their visible points, direct light, and the
 //! sum over each pixel's samples. Memory depends on the size of a tile alone.
 
-use super::{SceneBuffers, SharedPoints};
+use super::{SceneBuffers, SharedPoints, direct_light::DirectLighting};
 use crate::{
-    error::Result,
+    error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CameraTile, Counters, DirectLight, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
-    scene::Camera,
+    layout::{CameraTile, Counters, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
+    scene::{Camera, Projection},
     settings::Settings,
 };
 
@@ -40,7 +40,7 @@ pub struct CameraTracer {
     start: Kernel,
     advance: Kernel,
     trace: Kernel,
-    direct: Kernel,
+    direct: DirectLighting,
     resolve: Kernel,
     paths: Buffer,
     queues: [Buffer; 2],
@@ -55,7 +55,6 @@ pub struct CameraTracer {
     first_hits: Buffer,
     pixels: Buffer,
     view: CameraTile,
-    lights: u32,
 }
 
 /// What one step did, for the statistics.
@@ -68,7 +67,7 @@ pub struct StepCount {
 
 impl CameraTracer {
     /// # Errors
-    /// Limits of the adapter.
+    /// Limits of the adapter; an orthographic camera.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -81,8 +80,12 @@ impl CameraTracer {
         Ok(Self {
             start: Kernel::new(gpu, "start_camera", &[]),
             advance: Kernel::new(gpu, "advance_queue", &[]),
-            trace: scene.kernel(gpu, "trace_camera"),
-            direct: scene.kernel(gpu, "light_directly"),
+            trace: scene.kernel_with(
+                gpu,
+                "trace_camera",
+                &[("SEES_LIGHTS", f64::from(u8::from(settings.mode.sees_lights())))],
+            ),
+            direct: DirectLighting::new(gpu, scene, settings.light_samples),
             resolve: Kernel::new(gpu, "resolve", &[]),
             paths: gpu.storage::<Path>("camera paths", TILE_POINTS)?,
             queues: [queue()?, queue()?],
@@ -93,8 +96,7 @@ impl CameraTracer {
             gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
-            view: CameraTile { branches, ..view(camera, size, settings) },
-            lights: scene.light_table.len() as u32,
+            view: CameraTile { branches, ..view(camera, size, settings)? },
         })
     }
 
@@ -191,22 +193,12 @@ impl CameraTracer {
     /// # Errors
     /// Faults of the driver.
     pub fn light_directly(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
-        let points = self.point_count(tile);
+        let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
+        let buffers =
+            [("tile", &uniform), ("points", &self.points), ("radiance", &self.radiance), ("counters", &self.counters)];
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
-        for light in 0..self.lights {
-            let uniform = gpu.uniform("direct light", &DirectLight { light, points, ..Default::default() });
-            let bindings = self.direct.bind(
-                gpu,
-                &scene.with(&[
-                    ("direct", &uniform),
-                    ("points", &self.points),
-                    ("radiance", &self.radiance),
-                    ("counters", &self.counters),
-                ]),
-            );
-            self.direct.dispatch(&mut encoder, &bindings, u64::from(points));
-        }
+        self.direct.add(gpu, scene, &mut encoder, self.point_count(tile), &buffers);
         gpu.submit(encoder);
         let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
         Ok(StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) })
@@ -256,11 +248,15 @@ impl From<Counters> for StepCount {
 }
 
 /// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows from the aspect.
-fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> CameraTile {
-    let half_height = (camera.yfov / 2.0).tan();
+fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Result<CameraTile> {
+    let Projection::Perspective { .. } = camera.projection else {
+        let problem = "is orthographic, which is not rendered yet; choose a perspective one".to_owned();
+        return Err(Error::Setting { name: "camera", value: format!("{:?}", camera.name), problem });
+    };
+    let half_height = camera.projection.half_height_at(1.0);
     let half_width = half_height * width as f32 / height as f32;
     let bounces = if settings.max_bounces == 0 { super::BOUNCE_CEILING } else { settings.max_bounces };
-    CameraTile {
+    Ok(CameraTile {
         position: camera.position.to_array(),
         seed: settings.seed,
         right: (camera.right * half_width).to_array(),
@@ -271,5 +267,5 @@ fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Ca
         spp: settings.spp,
         max_bounces: bounces.min(super::BOUNCE_CEILING),
         ..Default::default()
-    }
+    })
 }

@@ -1,12 +1,14 @@
-//! Radiance from the k nearest photons. Kernels: `key_points`, `aim_search`,
-//! `count_photons`, `gather`, `finish_gather`.
+//! Radiance from the photons around a point. Kernels: `key_points`, `aim_search`,
+//! `count_photons`, `survey_surface`, `gather`, `finish_gather`.
 
-use super::{photon_map::PhotonMap, radix_sort::RadixSort};
+use super::{SceneBuffers, photon_map::PhotonMap, radix_sort::RadixSort};
 use crate::{
+    density::Density,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
+    layout::{DISC_BYTES, GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
     progress::Progress,
+    settings::{Search, Settings},
 };
 
 /// Points that are searched together; more go in several batches.
@@ -26,11 +28,29 @@ const STRIDES: [(u32, u32); 3] = [(64, 4), (8, 3), (1, 2)];
 pub struct GatherSettings {
     /// k, photons of an estimate, 1 to 1000.
     pub neighbors: u32,
-    /// C of the cone filter, ≥ 1.
-    pub cone_constant: f32,
+    /// Radius of the estimate, metres: all photons within it count, whatever `neighbors` and `max_radius` are.
+    pub radius: Option<f32>,
     /// Largest radius, metres.
     pub max_radius: Option<f32>,
+    /// The kernel.
+    pub density: Density,
 }
+
+impl From<&Settings> for GatherSettings {
+    fn from(settings: &Settings) -> Self {
+        Self {
+            neighbors: settings.neighbors,
+            radius: settings.radius.filter(|_| settings.search == Search::Radius),
+            max_radius: settings.max_radius,
+            density: settings.density(),
+        }
+    }
+}
+
+/// Rays that measure the area of a disc of which some is missing.
+const SURVEY_SAMPLES: usize = 32;
+/// Nodes and primitives that one of them visits at most; together they stay within what software Vulkan can loop.
+const SURVEY_TRACE_BUDGET: f64 = 700.0;
 
 /// How the kernels are compiled; for tests and benchmarks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,11 +61,27 @@ pub struct GatherOptions {
     pub step_budget: u32,
     /// Makes [`Gathered::fingerprint`]: the wrapping sum of a hash of the places in the sorted map of the photons summed.
     pub fingerprint: bool,
+    /// Photons that do not lie on the point's surface, as far as it is flat and no wall stands on it, are not summed.
+    pub rejects: bool,
+    /// The estimate divides by the area of that surface that is there.
+    pub corrects: bool,
+}
+
+impl GatherOptions {
+    /// Both halves of the estimate on flat surfaces; each alone is wrong at edges and corners.
+    #[must_use]
+    pub fn flat() -> Self {
+        Self { rejects: true, corrects: true, ..Self::default() }
+    }
+
+    fn surveys(self) -> bool {
+        self.rejects || self.corrects
+    }
 }
 
 impl Default for GatherOptions {
     fn default() -> Self {
-        Self { side_test: true, step_budget: 25_000, fingerprint: false }
+        Self { side_test: true, step_budget: 25_000, fingerprint: false, rejects: false, corrects: false }
     }
 }
 
@@ -58,19 +94,34 @@ pub struct GatherStats {
 
 /// The compiled kernels and the memory of one batch.
 #[derive(Debug)]
-pub struct Gather {
+pub struct Gather<'s> {
     options: GatherOptions,
+    /// Where the surfaces are, if they matter.
+    scene: Option<&'s SceneBuffers>,
     key: Kernel,
     radix: RadixSort,
-    /// Search and sum for maps of one window and of two, compiled when first needed.
-    search: [Option<Search>; 2],
+    /// Search and sum, each variant compiled when first needed.
+    compiled: Vec<(Variant, Compiled)>,
     scratch: Option<Scratch>,
 }
 
+/// What the kernels are compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Variant {
+    /// Windows of the map.
+    windows: u32,
+    /// Coefficients of the kernel's polynomial, and its power of the distance.
+    moments: u32,
+    power: u32,
+    /// The search does not know how many photons are summed.
+    counts: bool,
+}
+
 #[derive(Debug)]
-struct Search {
+struct Compiled {
     aim: Kernel,
     count: Kernel,
+    survey: Option<Kernel>,
     sum: Kernel,
     finish: Kernel,
 }
@@ -81,18 +132,27 @@ struct Scratch {
     entries: [Buffer; 2],
     states: Buffer,
     sums: Buffer,
+    discs: Buffer,
     open: Buffer,
     valid: Buffer,
 }
 
-impl Gather {
-    /// Compiles the kernels.
+impl<'s> Gather<'s> {
+    /// A gather that knows nothing of surfaces: `rejects` and `corrects` are passed over.
     #[must_use]
     pub fn new(gpu: &Gpu, options: GatherOptions) -> Self {
+        Self::with_scene(gpu, None, GatherOptions { rejects: false, corrects: false, ..options })
+    }
+
+    /// A gather among the surfaces of the scene.
+    #[must_use]
+    pub fn over(gpu: &Gpu, scene: &'s SceneBuffers, options: GatherOptions) -> Self {
+        Self::with_scene(gpu, Some(scene), options)
+    }
+
+    fn with_scene(gpu: &Gpu, scene: Option<&'s SceneBuffers>, options: GatherOptions) -> Self {
         let key = Kernel::new(gpu, "key_points", &[]);
-        let mut gather = Self { options, key, radix: RadixSort::new(gpu), search: [None, None], scratch: None };
-        gather.compile(gpu, 1);
-        gather
+        Self { options, scene, key, radix: RadixSort::new(gpu), compiled: Vec::new(), scratch: None }
     }
 
     /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to `radiance` (`array<vec4f>`), and writes the
@@ -130,23 +190,45 @@ impl Gather {
         (radiance, gathered): (&Buffer, &Buffer),
         progress: &dyn Progress,
     ) -> Result<GatherStats> {
-        self.compile(gpu, map.windows());
+        let polynomial = settings.density.polynomial();
+        let compiled = self.compile(
+            gpu,
+            Variant {
+                windows: map.windows(),
+                moments: polynomial.moments,
+                power: polynomial.power,
+                counts: settings.radius.is_some(),
+            },
+        );
         if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
-            self.scratch = Some(Scratch::new(gpu, count.min(BATCH))?);
+            self.scratch = Some(Scratch::new(gpu, count.min(BATCH), self.options.surveys())?);
         }
+        let [first_four @ .., fifth] = polynomial.coefficients.map(|c| c as f32);
+        let quantile = |i| polynomial.quantile((i as f64 + 0.5) / SURVEY_SAMPLES as f64) as f32;
+        let radii = gpu.storage_with("survey radii", &(0..SURVEY_SAMPLES).map(quantile).collect::<Vec<_>>())?;
         let mut stats = GatherStats::default();
         for first in (0..count).step_by(BATCH as usize) {
             let info = GatherInfo {
                 count: BATCH.min(count - first),
                 first,
                 neighbors: settings.neighbors,
-                cone_constant: settings.cone_constant,
-                max_radius_squared: settings.max_radius.map_or(-1.0, |r| r * r),
+                takes_all: u32::from(settings.radius.is_some()),
+                max_radius_squared: settings.radius.or(settings.max_radius).map_or(-1.0, |r| r * r),
                 per_path: (1.0 / map.emitted().max(1) as f64) as f32,
                 turn,
+                kernel_mean: polynomial.mean() as f32,
+                kernel: first_four,
+                kernel_fifth: fifth,
                 ..GatherInfo::default()
             };
-            stats.dispatches += self.run_batch(gpu, map, &info, [points, radiance, gathered], progress)?;
+            stats.dispatches += self.run_batch(
+                gpu,
+                map,
+                &self.compiled[compiled].1,
+                &info,
+                [points, radiance, gathered, &radii],
+                progress,
+            )?;
         }
         Ok(stats)
     }
@@ -156,8 +238,9 @@ impl Gather {
         &self,
         gpu: &Gpu,
         map: &PhotonMap,
+        Compiled { aim, count, survey, sum, finish }: &Compiled,
         info: &GatherInfo,
-        [points, radiance, gathered]: [&Buffer; 3],
+        [points, radiance, gathered, radii]: [&Buffer; 4],
         progress: &dyn Progress,
     ) -> Result<u32> {
         let scratch = self.scratch.as_ref().expect("run has made it");
@@ -165,8 +248,6 @@ impl Gather {
         if valid == 0 {
             return Ok(0);
         }
-        let Search { aim, count, sum, finish } =
-            self.search[map.windows() as usize - 1].as_ref().expect("run has compiled it");
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
             ("points", points),
@@ -174,6 +255,8 @@ impl Gather {
             ("states", &scratch.states),
             ("open_count", &scratch.open),
             ("sums_left", &scratch.sums),
+            ("discs", &scratch.discs),
+            ("radii", radii),
             ("radiance", radiance),
             ("gathered", gathered),
         ]);
@@ -184,6 +267,8 @@ impl Gather {
             infos.each_ref().map(|info| (aim.bind(gpu, &with_info(info)), count.bind(gpu, &with_info(info))));
         let (sum_bindings, finish_bindings) =
             (sum.bind(gpu, &with_info(&infos[0])), finish.bind(gpu, &with_info(&infos[0])));
+        let survey = survey.as_ref().zip(self.scene);
+        let survey = survey.map(|(kernel, scene)| (kernel, kernel.bind(gpu, &scene.with(&with_info(&infos[0])))));
         let packets = u64::from(valid.div_ceil(PACKET));
         let mut dispatches = 0;
         loop {
@@ -192,6 +277,7 @@ impl Gather {
             if dispatches == 0 {
                 encoder.clear_buffer(&scratch.states, 0, None);
                 encoder.clear_buffer(&scratch.sums, 0, None);
+                encoder.clear_buffer(&scratch.discs, 0, None);
             }
             encoder.clear_buffer(&scratch.open, 0, None);
             for ((aim_bindings, count_bindings), (stride, rounds)) in search_bindings.iter().zip(STRIDES) {
@@ -201,6 +287,9 @@ impl Gather {
                     count.dispatch(&mut encoder, count_bindings, packets);
                 }
                 aim.dispatch(&mut encoder, aim_bindings, packets * u64::from(PACKET));
+            }
+            if let Some((survey, bindings)) = &survey {
+                survey.dispatch(&mut encoder, bindings, valid.into());
             }
             sum.dispatch(&mut encoder, &sum_bindings, packets);
             finish.dispatch(&mut encoder, &finish_bindings, valid.into());
@@ -213,14 +302,14 @@ impl Gather {
     }
 
     /// Sorts the points of a batch, the valid ones first; returns their order and the number of valid ones.
-    fn order<'s>(
+    fn order<'b>(
         &self,
         gpu: &Gpu,
         map: &PhotonMap,
         info: &GatherInfo,
         points: &Buffer,
-        scratch: &'s Scratch,
-    ) -> Result<(&'s Buffer, u32)> {
+        scratch: &'b Scratch,
+    ) -> Result<(&'b Buffer, u32)> {
         let uniform = gpu.uniform("gather info", info);
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
@@ -237,28 +326,39 @@ impl Gather {
         Ok((&scratch.entries[sorted], gpu.read::<u32>(&scratch.valid, 0, 1)?[0]))
     }
 
-    /// Compiles search and sum for maps of that many windows, once.
-    fn compile(&mut self, gpu: &Gpu, windows: u32) {
-        let common = [
-            ("WINDOWS", f64::from(windows)),
+    /// Place of the kernels of a variant, which are compiled once.
+    fn compile(&mut self, gpu: &Gpu, variant: Variant) -> usize {
+        if let Some(place) = self.compiled.iter().position(|(v, _)| *v == variant) {
+            return place;
+        }
+        let overrides = [
+            ("WINDOWS", f64::from(variant.windows)),
+            ("MOMENTS", f64::from(variant.moments)),
+            ("POWER", f64::from(variant.power)),
+            ("COUNTS", f64::from(u8::from(variant.counts))),
             ("SIDE_TEST", f64::from(u8::from(self.options.side_test))),
             ("STEP_BUDGET", f64::from(self.options.step_budget)),
             ("FINGERPRINT", f64::from(u8::from(self.options.fingerprint))),
+            ("REJECTS", f64::from(u8::from(self.options.rejects))),
+            ("CORRECTS", f64::from(u8::from(self.options.corrects))),
         ];
-        self.search[windows as usize - 1].get_or_insert_with(|| {
-            let kernel = |stem| Kernel::new(gpu, stem, &common);
-            Search {
-                aim: kernel("aim_search"),
-                count: kernel("count_photons"),
-                sum: kernel("gather"),
-                finish: kernel("finish_gather"),
-            }
-        });
+        let kernel = |stem| Kernel::new(gpu, stem, &overrides);
+        let with_budget = [overrides.as_slice(), &[("TRACE_BUDGET", SURVEY_TRACE_BUDGET)]].concat();
+        let survey = |scene: &SceneBuffers| scene.kernel_with(gpu, "survey_surface", &with_budget);
+        let compiled = Compiled {
+            aim: kernel("aim_search"),
+            count: kernel("count_photons"),
+            survey: self.scene.filter(|_| self.options.surveys()).map(survey),
+            sum: kernel("gather"),
+            finish: kernel("finish_gather"),
+        };
+        self.compiled.push((variant, compiled));
+        self.compiled.len() - 1
     }
 }
 
 impl Scratch {
-    fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
+    fn new(gpu: &Gpu, capacity: u32, surveys: bool) -> Result<Self> {
         let packets = u64::from(capacity.div_ceil(PACKET));
         Ok(Self {
             capacity,
@@ -268,6 +368,7 @@ impl Scratch {
             ],
             states: gpu.storage::<[u8; SEARCH_STATE_BYTES]>("search states", packets * u64::from(PACKET))?,
             sums: gpu.storage::<[u8; GATHER_STATE_BYTES]>("unfinished sums", packets)?,
+            discs: gpu.storage::<[u8; DISC_BYTES]>("discs", if surveys { u64::from(capacity) + 3 } else { 1 })?,
             open: gpu.storage::<u32>("open packets", 1)?,
             valid: gpu.storage::<u32>("valid points", 1)?,
         })

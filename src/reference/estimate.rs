@@ -1,30 +1,15 @@
-//! Radiance estimate with the cone filter over any search result.
+//! Radiance estimate over any search result.
 
 use glam::Vec3;
 
 use super::Found;
-use crate::layout::{PhotonFlux, PhotonPlace, VisiblePoint, from_octahedral};
+use crate::{
+    density::Density,
+    layout::{PhotonFlux, PhotonPlace, VisiblePoint, from_octahedral},
+};
 
 /// Bound of cos(ns, wi) / cos(ng, wi): what the interpolated normal may add to a grazing photon.
 pub const MAX_NORMAL_WEIGHT: f32 = 8.0;
-
-/// Cone filter of constant C ≥ 1 (Jensen 2001, "Realistic Image Synthesis Using Photon Mapping", section 7.2.2).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ConeFilter(pub f32);
-
-impl ConeFilter {
-    /// Weight of a photon at distance `d` of a disc of radius `r`.
-    #[must_use]
-    pub fn weight(self, d: f64, r: f64) -> f64 {
-        1.0 - d / (f64::from(self.0) * r)
-    }
-
-    /// Mean weight over the disc.
-    #[must_use]
-    pub fn mean(self) -> f64 {
-        1.0 - 2.0 / (3.0 * f64::from(self.0))
-    }
-}
 
 /// The photon came from the viewer's side of the surface.
 #[must_use]
@@ -32,14 +17,14 @@ pub fn usable(photon: &PhotonPlace, point: &VisiblePoint) -> bool {
     from_octahedral(photon.wi).dot(Vec3::from(point.ng)) > 0.0
 }
 
-/// Radiance that leaves `point` towards the viewer: L = beta f_r / (mean π r²) Σ weight w_n Φ / paths, where
+/// Radiance that leaves `point` towards the viewer: L = beta f_r / (mean π r²) Σ K(d/r) w_n Φ / paths, where
 /// the interpolated normal's w_n is 1 without the side test.
 #[must_use]
 pub fn estimate(
     (places, fluxes): (&[PhotonPlace], &[PhotonFlux]),
     found: &Found,
     point: &VisiblePoint,
-    filter: ConeFilter,
+    density: Density,
     emitted: u64,
     side_test: bool,
 ) -> [f64; 3] {
@@ -54,11 +39,11 @@ pub fn estimate(
         let ratio = wi.dot(point.ns.into()) / wi.dot(point.ng.into());
         let d = (Vec3::from(point.position).as_dvec3() - Vec3::from(place.position).as_dvec3()).length();
         let normal_weight = if side_test { ratio.clamp(0.0, MAX_NORMAL_WEIGHT) } else { 1.0 };
-        let weight = filter.weight(d, r2.sqrt()) * f64::from(normal_weight);
+        let weight = density.weight(d / r2.sqrt()) * f64::from(normal_weight);
         for c in 0..3 {
             sum[c] += weight * f64::from(flux[c]);
         }
     }
-    let area = filter.mean() * std::f64::consts::PI * r2 * emitted as f64;
+    let area = density.mean() * std::f64::consts::PI * r2 * emitted as f64;
     std::array::from_fn(|c| f64::from(point.weight[c]) * sum[c] / area)
 }

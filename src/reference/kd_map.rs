@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{ConeFilter, Found, KdTree, estimate, usable};
+use super::{Found, KdTree, estimate, usable};
 use crate::{
     error::Result,
     layout::{PhotonFlux, PhotonPlace, VisiblePoint},
@@ -85,7 +85,7 @@ impl KdMap {
         self.tree.search(point.position.into(), count, limit, |i| usable(&self.places[i], point) && there(i))
     }
 
-    /// The estimate at a point with `neighbors`, `cone_constant` and `max_radius` of the settings.
+    /// The estimate at a point with `neighbors`, `kernel`, `cone_constant` and `max_radius` of the settings.
     #[must_use]
     pub fn estimate(&self, point: &VisiblePoint, settings: &Settings) -> Estimate {
         let k = settings.neighbors;
@@ -96,13 +96,12 @@ impl KdMap {
         let found = Found::of(&near[..inside], k, settings.max_radius);
         let count = found.photons.len();
         let last_is_tied = count > 0 && are_tied(near[count - 1].0, found.radius_squared);
-        let filter = ConeFilter(settings.cone_constant);
         Estimate {
             radius_squared: found.radius_squared,
             count: count as u32,
             fingerprint: fingerprint(&found.photons),
             tied: last_is_tied || near.len() > inside,
-            radiance: estimate((&self.places, &self.fluxes), &found, point, filter, self.emitted, true),
+            radiance: estimate((&self.places, &self.fluxes), &found, point, settings.density(), self.emitted, true),
         }
     }
 

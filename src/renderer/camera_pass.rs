@@ -35,11 +35,7 @@ impl<'a> CameraPass<'a> {
             gpu: session.gpu,
             buffers: &session.buffers,
             tracer: CameraTracer::new(session.gpu, &session.buffers, camera, size, settings)?,
-            estimate: GatherSettings {
-                neighbors: settings.neighbors,
-                cone_constant: settings.cone_constant,
-                max_radius: settings.max_radius,
-            },
+            estimate: GatherSettings::from(settings),
             size,
             direct: settings.mode.direct_by_rays(),
         })

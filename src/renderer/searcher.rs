@@ -1,10 +1,10 @@
 //! Who looks for the nearest photons: the grid on the device, or the kd-tree on the CPU in its place.
 
-use super::{CameraPass, PhotonMaps};
+use super::{CameraPass, PhotonMaps, Session};
 use crate::{
     error::Result,
     gpu::Gpu,
-    passes::{EstimateSharing, Gather, GatherOptions, PhotonMap, Tile},
+    passes::{EstimateSharing, Gather, PhotonMap, Tile},
     progress::Progress,
     reference::KdMap,
     settings::{Search, Settings},
@@ -12,16 +12,18 @@ use crate::{
 
 /// A search over the maps, ready to gather.
 pub(super) enum Searcher<'a> {
-    Grid(Box<Gather>, EstimateSharing),
+    Grid(Box<Gather<'a>>, EstimateSharing),
     KdTree(Vec<KdMap>, &'a Settings),
 }
 
 impl<'a> Searcher<'a> {
-    pub fn new(gpu: &Gpu, maps: &PhotonMaps, settings: &'a Settings) -> Result<Self> {
+    pub fn new(session: &'a Session, maps: &PhotonMaps, settings: &'a Settings) -> Result<Self> {
         Ok(match settings.search {
-            Search::Grid => Self::Grid(Box::new(Gather::new(gpu, GatherOptions::default())), EstimateSharing::new(gpu, settings.share_reach)),
+            Search::Grid | Search::Radius => {
+                Self::Grid(Box::new(session.gather(settings)), EstimateSharing::new(session.gpu, settings.share_reach))
+            }
             Search::KdTree => {
-                let trees = maps.maps.iter().map(|map| kd_map(gpu, map)).collect::<Result<_>>()?;
+                let trees = maps.maps.iter().map(|map| kd_map(session.gpu, map)).collect::<Result<_>>()?;
                 Self::KdTree(trees, settings)
             }
         })

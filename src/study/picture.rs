@@ -6,7 +6,6 @@ use crate::{
     gpu::Gpu,
     image::Frame,
     layout::Gathered,
-    passes::{Gather, GatherOptions},
     progress::{Progress, Stage},
     renderer::{CameraPass, PhotonMaps, Session},
     settings::Settings,
@@ -23,7 +22,7 @@ pub(super) fn picture(
 ) -> Result<(Frame, Measured)> {
     let mut stats = maps.stats().clone();
     let pass = CameraPass::new(session, settings)?;
-    let mut gather = Gather::new(gpu, GatherOptions::default());
+    let mut gather = session.gather(settings);
     let mut film = pass.film();
     let tiles = pass.tracer.tiles();
     // Maps without a photon are not there; the global one comes first.

@@ -37,7 +37,7 @@ impl Random {
 
 fn photon(random: &mut Random, position: Vec3) -> Photon {
     let flux = random.vector() + 0.1;
-    Photon { position: position.into(), wi: octahedral(random.direction()), flux: flux.into(), key: 0 }
+    Photon { position: position.into(), wi: octahedral(random.direction()), flux: flux.into(), normal: 0 }
 }
 
 /// A point of the walls of the unit box.
