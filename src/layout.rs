@@ -282,6 +282,10 @@ pub struct Store {
     pub map_bit: u32,
 }
 
+/// Where the numbers for sampling come from; see `shaders/lib/sampler.wesl`.
+pub const SAMPLER_RANDOM: u32 = 0;
+pub const SAMPLER_SOBOL: u32 = 1;
+
 /// A camera and the part of its samples that one tile holds; see `shaders/lib/camera_tile.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -309,6 +313,14 @@ pub struct CameraTile {
     pub branches: u32,
     /// Pixels of the tile, in Morton order.
     pub pixels: u32,
+    /// 1: rays are parallel and `right`, `up` are in metres; 0: they start from `position`.
+    pub parallel: u32,
+    /// Radius of the lens, metres; 0 for a pinhole.
+    pub lens_radius: f32,
+    /// Distance of the sharp plane along the camera's axis, metres.
+    pub focus: f32,
+    /// Entries of the pixel filter's table, less 1.
+    pub filter_steps: u32,
     pub pad: u32,
 }
 

@@ -52,7 +52,7 @@ fn twins() -> Vec<Twin> {
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
         PhotonBatch { seed, first_path, first_path_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
         Store { staged, first_photon, photons, map_bit }
-        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, pad }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, pad }
         FirstHit { normal, depth, albedo, alpha }
         TilePixel { radiance, alpha, normal, depth, albedo, pad }
         DirectLight { light, points, pad0, pad1 }
@@ -103,6 +103,8 @@ fn constants() -> Vec<(&'static str, u64)> {
         GROUP_SHIFT,
         MAX_TARGETS,
         CAUSTIC_BIT,
+        SAMPLER_RANDOM,
+        SAMPLER_SOBOL,
         CELL_PHOTONS,
         CELL_FAN,
         RADIX_CHUNK,

@@ -3,12 +3,13 @@
 use caustica::{
     density::DensityKernel,
     image::Tonemap,
-    settings::{Emission, LightSampling, LightUnit, Mode, Search, Settings},
+    pixel_filter::PixelFilter,
+    settings::{Crop, Emission, LightSampling, LightUnit, Mode, Sampler, Search, Settings},
 };
 use clap::ValueEnum;
 
 use super::environment::EnvironmentOptions;
-use super::values::{cone_constant, count, exposure, light_weight, photons, radius, share_reach, size};
+use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, share_reach, size};
 
 /// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
@@ -108,6 +109,22 @@ pub struct SharedOptions {
     #[arg(long, value_name = "NAME|INDEX", help_heading = "Picture")]
     pub camera: Option<String>,
 
+    /// Part of the picture to render: column and row of its upper left pixel, width, height
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crop, help_heading = "Picture")]
+    pub crop: Option<Crop>,
+
+    /// How the light around a pixel's centre is weighed
+    #[arg(long, value_name = "FILTER", value_enum, default_value = "box", help_heading = "Picture")]
+    pub pixel_filter: PixelFilterArg,
+
+    /// Diameter of the lens in metres; needs --focus [default: 0, all is sharp]
+    #[arg(long, value_name = "D", value_parser = aperture, requires = "focus", help_heading = "Picture")]
+    pub aperture: Option<f32>,
+
+    /// Distance of the sharp plane along the camera's axis, in metres
+    #[arg(long, value_name = "DIST", value_parser = radius, requires = "aperture", help_heading = "Picture")]
+    pub focus: Option<f32>,
+
     /// Brightens the PNG by this many stops
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, help_heading = "Picture")]
     #[arg(allow_negative_numbers = true)]
@@ -116,6 +133,10 @@ pub struct SharedOptions {
     /// Tone curve of the PNG
     #[arg(long, value_name = "CURVE", value_enum, default_value = "neutral", help_heading = "Picture")]
     pub tonemap: TonemapArg,
+
+    /// Numbers for sampling of photons, pixels, lens and lights
+    #[arg(long, value_name = "HOW", value_enum, default_value = "sobol", help_heading = "Run")]
+    pub sampler: SamplerArg,
 
     /// One number that decides all randomness
     #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Run")]
@@ -166,6 +187,11 @@ impl SharedOptions {
             size: self.size,
             camera: self.camera.clone(),
             seed: self.seed,
+            crop: self.crop,
+            pixel_filter: self.pixel_filter.into(),
+            aperture: self.aperture.unwrap_or(defaults.aperture),
+            focus: self.focus,
+            sampler: self.sampler.into(),
             light_sampling: self.light_sampling.into(),
             light_unit: self.light_unit.into(),
             light_photons: self.light_photons.clone(),
@@ -250,6 +276,22 @@ value_enum!(SearchArg => Search {
     KdTree,
     /// All photons within --radius, in the grid
     Radius,
+});
+
+value_enum!(SamplerArg => Sampler {
+    /// Owen-scrambled Sobol sequences: spread evenly
+    Sobol,
+    /// Independent numbers
+    Random,
+});
+
+value_enum!(PixelFilterArg => PixelFilter {
+    /// The pixel's square
+    Box,
+    /// exp(-x² / 2σ²), σ = 0.5 pixels, cut at 1.5
+    Gaussian,
+    /// Blackman and Harris' window, 3 pixels wide
+    BlackmanHarris,
 });
 
 value_enum!(TonemapArg => Tonemap {

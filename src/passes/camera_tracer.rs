@@ -7,7 +7,7 @@ use crate::{
     gpu::{Buffer, Gpu, Kernel},
     layout::{CameraTile, Counters, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
     scene::{Camera, Projection},
-    settings::Settings,
+    settings::{Crop, Settings},
 };
 
 /// Visible points that a tile has room for.
@@ -54,7 +54,9 @@ pub struct CameraTracer {
     pub gathered: Buffer,
     first_hits: Buffer,
     pixels: Buffer,
+    filter_table: Buffer,
     view: CameraTile,
+    window: Crop,
 }
 
 /// What one step did, for the statistics.
@@ -67,7 +69,7 @@ pub struct StepCount {
 
 impl CameraTracer {
     /// # Errors
-    /// Limits of the adapter; an orthographic camera.
+    /// Limits of the adapter; a lens before an orthographic camera.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -76,9 +78,10 @@ impl CameraTracer {
         settings: &Settings,
     ) -> Result<Self> {
         let branches = if scene.has_dielectrics { BRANCHES } else { 1 };
+        let offsets = settings.pixel_filter_offsets();
         let queue = || gpu.storage::<u32>("camera queue", TILE_POINTS);
         Ok(Self {
-            start: Kernel::new(gpu, "start_camera", &[]),
+            start: scene.kernel(gpu, "start_camera"),
             advance: Kernel::new(gpu, "advance_queue", &[]),
             trace: scene.kernel_with(
                 gpu,
@@ -96,20 +99,30 @@ impl CameraTracer {
             gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
-            view: CameraTile { branches, ..view(camera, size, settings)? },
+            filter_table: gpu.storage_with("pixel filter", &offsets)?,
+            view: CameraTile {
+                branches,
+                filter_steps: offsets.len() as u32 - 1,
+                ..view(camera, size, settings)?
+            },
+            window: settings.window(size),
         })
     }
 
-    /// The tiles that make up the picture, in order.
+    /// The tiles of the whole picture that the asked part of it touches, in order: a tile is the same whatever the part, down to
+    /// the last bit.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
         let pixels = (TILE_POINTS as u32 / (self.view.branches * samples)).max(MIN_TILE_PIXELS);
         let bits = pixels.ilog2();
-        let (width, height) = (1 << bits.div_ceil(2), 1 << (bits / 2));
+        let (width, height) = (1_u32 << bits.div_ceil(2), 1_u32 << (bits / 2));
         let mut tiles = Vec::new();
-        for first_row in (0..self.view.height).step_by(height) {
-            for first_column in (0..self.view.width).step_by(width) {
+        for first_row in (0..self.view.height).step_by(height as usize) {
+            for first_column in (0..self.view.width).step_by(width as usize) {
+                if !self.window.touches((first_column, first_row), (width, height)) {
+                    continue;
+                }
                 for first_sample in (0..self.view.spp).step_by(samples as usize) {
                     let samples = samples.min(self.view.spp - first_sample);
                     tiles.push(Tile { pixels: 1 << bits, first_column, first_row, first_sample, samples });
@@ -138,12 +151,14 @@ impl CameraTracer {
         }
     }
 
-    /// Column and row of the `i`-th pixel of a tile; `None` outside the picture.
+    /// Column and row of the `i`-th pixel of a tile in the asked part of the picture; `None` outside.
     #[must_use]
     pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
         let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
         let (x, y) = (tile.first_column + even_bits(i), tile.first_row + even_bits(i >> 1));
-        (x < self.view.width && y < self.view.height).then_some((x, y))
+        let window = &self.window;
+        let (x, y) = (x.checked_sub(window.column)?, y.checked_sub(window.row)?);
+        (x < window.width && y < window.height).then_some((x, y))
     }
 
     /// Traces the tile's camera paths to their visible points; sets all radiance to 0.
@@ -163,6 +178,7 @@ impl CameraTracer {
                 ("points", &self.points),
                 ("first_hits", &self.first_hits),
                 ("radiance", &self.radiance),
+                ("filter_table", &self.filter_table),
             ])
         };
         let advance = self.advance.bind(gpu, &named(0));
@@ -249,10 +265,11 @@ impl From<Counters> for StepCount {
 
 /// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows from the aspect.
 fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Result<CameraTile> {
-    let Projection::Perspective { .. } = camera.projection else {
-        let problem = "is orthographic, which is not rendered yet; choose a perspective one".to_owned();
-        return Err(Error::Setting { name: "camera", value: format!("{:?}", camera.name), problem });
-    };
+    let parallel = matches!(camera.projection, Projection::Orthographic { .. });
+    if parallel && settings.aperture > 0.0 {
+        let problem = "needs a perspective camera; this one is orthographic".to_owned();
+        return Err(Error::Setting { name: "aperture", value: settings.aperture.to_string(), problem });
+    }
     let half_height = camera.projection.half_height_at(1.0);
     let half_width = half_height * width as f32 / height as f32;
     let bounces = if settings.max_bounces == 0 { super::BOUNCE_CEILING } else { settings.max_bounces };
@@ -266,6 +283,9 @@ fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Re
         forward: camera.forward.to_array(),
         spp: settings.spp,
         max_bounces: bounces.min(super::BOUNCE_CEILING),
+        parallel: u32::from(parallel),
+        lens_radius: 0.5 * settings.aperture,
+        focus: settings.focus.unwrap_or(1.0),
         ..Default::default()
     })
 }

@@ -26,4 +26,4 @@ pub use photon_map::{MapKernels, PhotonMap, PhotonStore};
 pub use photon_tracer::{PhotonTracer, TracedPhotons};
 pub use raw_map::RawMap;
 pub use scene_buffers::SceneBuffers;
-pub use share_estimates::{EstimateSharing, SharedPoints};
+pub use share_estimates::{Asked, EstimateSharing, SharedPoints};

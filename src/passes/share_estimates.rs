@@ -1,12 +1,10 @@
 //! Light at the visible points of a tile by fewer queries than points: where an estimate is a mean over a disc much wider than
 //! points are apart, they share it. Kernels: `choose_queries`, `share_estimates`.
 
-use super::{Gather, GatherSettings, PhotonMap};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
     layout::{Gathered, ShareRound, VisiblePoint},
-    progress::Progress,
 };
 
 /// Pixels of a cell in each round. A coarser cell than 8 x 8 saves little: its points are few already.
@@ -25,6 +23,21 @@ pub struct SharedPoints<'a> {
     pub radiance: &'a Buffer,
     pub gathered: &'a Buffer,
 }
+
+/// Points at which estimates are asked for.
+#[derive(Debug)]
+pub struct Asked<'a> {
+    /// [`VisiblePoint`]s, of which those take part that wait for the turn.
+    pub points: &'a Buffer,
+    pub count: u32,
+    pub turn: u32,
+    /// What the estimates are added to, `vec4f`, and what is said of them, [`Gathered`].
+    pub radiance: &'a Buffer,
+    pub gathered: &'a Buffer,
+}
+
+/// Makes the estimates over one map.
+pub type Estimates<'a> = dyn FnMut(&Asked) -> Result<()> + 'a;
 
 /// The kernels, and room for queries.
 #[derive(Debug)]
@@ -52,20 +65,13 @@ impl EstimateSharing {
         Self { choose: kernel("choose_queries"), share: kernel("share_estimates"), reach, scratch: None }
     }
 
-    /// Adds the light of the map's photons to the radiance of the tile's points: by queries in large cells of pixels, then in
+    /// Adds the light of a map's photons to the radiance of the tile's points: by queries in large cells of pixels, then in
     /// smaller ones for the points that are left, and at last by a query for each point. Maps are gathered in turns from 1.
     ///
     /// # Errors
-    /// As [`Gather::run`].
-    pub fn run(
-        &mut self,
-        gpu: &Gpu,
-        (gather, settings): (&mut Gather, &GatherSettings),
-        (map, turn): (&PhotonMap, u32),
-        tile: &SharedPoints,
-        progress: &dyn Progress,
-    ) -> Result<()> {
-        let points = tile.pixels * tile.samples * tile.branches;
+    /// Those of `estimates`.
+    pub fn run(&mut self, gpu: &Gpu, turn: u32, tile: &SharedPoints, estimates: &mut Estimates) -> Result<()> {
+        let count = tile.pixels * tile.samples * tile.branches;
         for cell_pixels in ROUNDS {
             // A cell of one sample is the point itself.
             if self.reach == 0.0 || cell_pixels * tile.samples == 1 {
@@ -78,23 +84,20 @@ impl EstimateSharing {
                 candidates: if cell_pixels > 1 { 1 } else { tile.samples },
                 branches: tile.branches,
                 reach_squared: self.reach * self.reach,
-                points,
+                points: count,
                 turn,
             };
-            self.run_round(gpu, (gather, settings), map, (&round, tile), progress)?;
+            self.run_round(gpu, &round, tile, estimates)?;
         }
-        let results = (tile.radiance, tile.gathered);
-        gather.run_turn(gpu, map, tile.points, (points, turn), settings, results, progress)?;
-        Ok(())
+        estimates(&Asked { points: tile.points, count, turn, radiance: tile.radiance, gathered: tile.gathered })
     }
 
     fn run_round(
         &mut self,
         gpu: &Gpu,
-        (gather, settings): (&mut Gather, &GatherSettings),
-        map: &PhotonMap,
-        (round, tile): (&ShareRound, &SharedPoints),
-        progress: &dyn Progress,
+        round: &ShareRound,
+        tile: &SharedPoints,
+        estimates: &mut Estimates,
     ) -> Result<()> {
         let queries = round.cells * round.branches;
         if self.scratch.as_ref().is_none_or(|s| s.capacity < queries) {
@@ -113,8 +116,8 @@ impl EstimateSharing {
         let mut encoder = gpu.encoder();
         self.choose.dispatch(&mut encoder, &self.choose.bind(gpu, &buffers), queries.into());
         gpu.submit(encoder);
-        let results = (&scratch.irradiance, &scratch.gathered);
-        gather.run(gpu, map, &scratch.queries, queries, settings, results, progress)?;
+        let (radiance, gathered) = (&scratch.irradiance, &scratch.gathered);
+        estimates(&Asked { points: &scratch.queries, count: queries, turn: 1, radiance, gathered })?;
         let mut encoder = gpu.encoder();
         self.share.dispatch(&mut encoder, &self.share.bind(gpu, &buffers), round.points.into());
         gpu.submit(encoder);
