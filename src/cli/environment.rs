@@ -18,12 +18,12 @@ pub struct EnvironmentOptions {
 
     /// Factor on the light of --env, at least 0
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = strength, help_heading = "Light")]
-    #[arg(requires = "env")]
+    #[arg(requires = "env", conflicts_with = "background")]
     pub env_strength: f32,
 
     /// Turns --env about the vertical, degrees counterclockwise as seen from above
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = rotation, help_heading = "Light")]
-    #[arg(requires = "env", allow_negative_numbers = true)]
+    #[arg(requires = "env", conflicts_with = "background", allow_negative_numbers = true)]
     pub env_rotation: f32,
 
     /// The same light from all around: radiance in W/(m² sr)

@@ -1,4 +1,4 @@
-//! Every kind of light, against what is known in closed form.
+//! Against what is known in closed form.
 //!
 //! | test | closed form | negative control |
 //! |---|---|---|
@@ -10,26 +10,15 @@
 //! | furnace | closed objects of albedo 1 in radiance L look L | albedo 0.9 |
 //! | bright pixel | E = the sum over the map; the camera sees it where it is | the map turned by 20° |
 
-mod common;
-
 use std::f64::consts::PI;
 
 use caustica::{
-    bvh::Bvh,
-    passes::{PhotonTracer, SceneBuffers},
-    progress::Silent,
     scene::{Environment, Light, LightKind, Scene, Surface},
     settings::{Mode, Settings},
 };
-use common::*;
 use glam::{Vec3, vec3};
 
-/// A floor of albedo 1/2 at height 0, `half` from its centre to its edges.
-fn floor(half: f32) -> Scene {
-    let mut scene = scene(&[diffuse(0.5)]);
-    add_quad(&mut scene, vec3(-half, 0.0, half), vec3(2.0 * half, 0.0, 0.0), vec3(0.0, 0.0, -2.0 * half), 0);
-    scene
-}
+use crate::{common::*, direct_flux, floor, spot};
 
 /// Irradiance of the surface of albedo 1/2 that a camera sees at `target`, by direct light. The target must lie on no edge.
 fn irradiance_at(scene: &Scene, eye: Vec3, target: Vec3, light_samples: u32) -> f64 {
@@ -37,21 +26,6 @@ fn irradiance_at(scene: &Scene, eye: Vec3, target: Vec3, light_samples: u32) -> 
     scene.cameras = vec![camera(eye, target, 0.02)];
     let settings = Settings { light_samples, ..settings(Mode::DirectRays, 1, 16) };
     mean(&render_scene(&scene, &settings)) * PI / 0.5
-}
-
-fn spot(position: Vec3, direction: Vec3, intensity: f32, inner: f32, outer: f32) -> Light {
-    let kind = LightKind::Spot { inner, outer };
-    Light { kind, direction: direction.normalize(), ..point_light(position, intensity) }
-}
-
-/// Sum of the flux of the photons that come straight from the lights, W in the first channel.
-fn direct_flux(scene: &Scene, photons: u32) -> f64 {
-    let (gpu, settings) = (gpu(), settings(Mode::DirectPhotons, photons, 1));
-    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &settings).expect("the scene fits");
-    let tracer = PhotonTracer::new(gpu, &buffers);
-    let traced = tracer.trace(gpu, &buffers, &settings, scene.has_delta(), &Silent).expect("photons trace");
-    let photons = traced.global.read(gpu).expect("photons read back");
-    photons.iter().map(|p| f64::from(p.flux[0])).sum::<f64>() / traced.global.emitted as f64
 }
 
 #[test]
@@ -193,7 +167,7 @@ fn balls_vanish_in_a_furnace() {
         scene.spheres.push(sphere(vec3(0.6, 0.0, 0.0), 0.6, 0));
         scene.environment = Some(Environment::uniform(Vec3::ONE));
         scene.cameras.push(camera(vec3(0.0, 0.0, 6.0), Vec3::ZERO, 25.0));
-        let settings = Settings { max_bounces: 60, neighbors: 60, spp: 4, ..settings(mode, 100_000, 32) };
+        let settings = Settings { max_bounces: 60, neighbors: 50, ..settings(mode, 60_000, 32) };
         let render = render_scene(&scene, &settings);
         assert!(render.frame.alpha.iter().any(|a| *a == 0.0), "the furnace itself has no coverage");
         render
