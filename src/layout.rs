@@ -181,7 +181,8 @@ pub struct Photon {
 pub struct VisiblePoint {
     /// Metres.
     pub position: [f32; 3],
-    /// 1 if there is a point here, 0 if the camera path ended without one.
+    /// 0 if the camera path ended without a point; else the turn from which on light is missing, 1 at first: the maps are
+    /// gathered in turns from 1.
     pub valid: u32,
     /// Weight of the camera path times the BRDF, albedo/π: multiplies irradiance.
     pub weight: [f32; 3],
@@ -281,6 +282,10 @@ pub struct Store {
     pub map_bit: u32,
 }
 
+/// Where the numbers for sampling come from; see `shaders/lib/sampler.wesl`.
+pub const SAMPLER_RANDOM: u32 = 0;
+pub const SAMPLER_SOBOL: u32 = 1;
+
 /// A camera and the part of its samples that one tile holds; see `shaders/lib/camera_tile.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -297,17 +302,26 @@ pub struct CameraTile {
     pub forward: [f32; 3],
     /// Samples per pixel of the whole picture.
     pub spp: u32,
-    /// First pixel of the tile, counted along 8 x 8 blocks.
-    pub first_pixel: u32,
-    pub pixels: u32,
+    /// Pixel of the tile's upper left corner.
+    pub first_column: u32,
+    pub first_row: u32,
     /// First sample of each pixel, and samples of each pixel, in this tile.
     pub first_sample: u32,
     pub samples: u32,
     pub max_bounces: u32,
     /// Places for paths of a sample: both ways are followed at its first log2(branches) dielectric interfaces.
     pub branches: u32,
-    pub pad0: u32,
-    pub pad1: u32,
+    /// Pixels of the tile, in Morton order.
+    pub pixels: u32,
+    /// 1: rays are parallel and `right`, `up` are in metres; 0: they start from `position`.
+    pub parallel: u32,
+    /// Radius of the lens, metres; 0 for a pinhole.
+    pub lens_radius: f32,
+    /// Distance of the sharp plane along the camera's axis, metres.
+    pub focus: f32,
+    /// Entries of the pixel filter's table, less 1.
+    pub filter_steps: u32,
+    pub pad: u32,
 }
 
 /// What the first ray of a camera sample hit.
@@ -430,9 +444,10 @@ pub struct GatherInfo {
     /// Coefficients of the kernel's polynomial, see [`crate::density`]: the first four, and the fifth.
     pub kernel: [f32; 4],
     pub kernel_fifth: f32,
+    /// Points take part whose [`VisiblePoint::valid`] is not 0 and at most this.
+    pub turn: u32,
     pub pad0: u32,
     pub pad1: u32,
-    pub pad2: u32,
 }
 
 /// What a query found.
@@ -445,6 +460,27 @@ pub struct Gathered {
     pub count: u32,
     /// Tells the set of photons from others, see `GatherOptions::fingerprint`.
     pub fingerprint: u32,
+}
+
+/// One round in which points of a tile share estimates; see `shaders/lib/share.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ShareRound {
+    /// Cells of the tile.
+    pub cells: u32,
+    /// Pixels of a cell, a power of 4, that follow each other in the tile: a square.
+    pub cell_pixels: u32,
+    /// Samples of each pixel in the tile.
+    pub samples: u32,
+    /// The samples of a pixel of which a query is chosen.
+    pub candidates: u32,
+    pub branches: u32,
+    /// Square of the distance within which a point takes a query's estimate, over that of the estimate's radius.
+    pub reach_squared: f32,
+    /// Visible points of the tile.
+    pub points: u32,
+    /// As in [`GatherInfo`].
+    pub turn: u32,
 }
 
 /// Consecutive entries that one invocation of the radix sort walks.

@@ -44,6 +44,7 @@ mod html;
 pub mod image;
 pub mod layout;
 pub mod passes;
+pub mod pixel_filter;
 pub mod progress;
 pub mod reference;
 pub mod renderer;

@@ -18,7 +18,7 @@ use crate::{
     passes::{Gather, GatherOptions, LightGroup, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
-    settings::Settings,
+    settings::{Crop, Settings},
     stats::{DeviceStats, LightStats, MapStats, Stats, timed},
 };
 
@@ -175,7 +175,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// The asked size, or the default height at the camera's aspect.
+/// The asked size of the whole picture, or the default height at the camera's aspect.
 pub(crate) fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32, u32)> {
     let (width, height) = settings.size.unwrap_or_else(|| {
         let width = (DEFAULT_HEIGHT as f32 * camera.aspect.unwrap_or(1.0)).round();
@@ -187,6 +187,16 @@ pub(crate) fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32,
             value: format!("{width}x{height}"),
             problem: format!("must have from 1 to {MAX_PIXELS} pixels"),
         });
+    }
+    if let Some(Crop { column, row, width: w, height: h }) = settings.crop {
+        let inside = |first: u32, size: u32, whole: u32| size > 0 && first < whole && size <= whole - first;
+        if !inside(column, w, width) || !inside(row, h, height) {
+            return Err(Error::Setting {
+                name: "crop",
+                value: format!("{column},{row},{w},{h}"),
+                problem: format!("must have pixels, all of them in the picture of {width}x{height}"),
+            });
+        }
     }
     Ok((width, height))
 }

@@ -52,7 +52,7 @@ fn twins() -> Vec<Twin> {
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
         PhotonBatch { seed, first_path, first_path_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
         Store { staged, first_photon, photons, map_bit }
-        CameraTile { position, seed, right, width, up, height, forward, spp, first_pixel, pixels, first_sample, samples, max_bounces, branches, pad0, pad1 }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, pad }
         FirstHit { normal, depth, albedo, alpha }
         TilePixel { radiance, alpha, normal, depth, albedo, pad }
         DirectLight { light, points, pad0, pad1 }
@@ -61,8 +61,9 @@ fn twins() -> Vec<Twin> {
         PhotonPlace { position, wi }
         PhotonFlux { flux, normal }
         MapInfo { count, levels, split, pad }
-        GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, pad0, pad1, pad2 }
+        GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, turn, pad0, pad1 }
         Gathered { radius_squared, count, fingerprint }
+        ShareRound { cells, cell_pixels, samples, candidates, branches, reach_squared, points, turn }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
         KeyStep { count, window_first, window_count, fine }
@@ -102,6 +103,8 @@ fn constants() -> Vec<(&'static str, u64)> {
         GROUP_SHIFT,
         MAX_TARGETS,
         CAUSTIC_BIT,
+        SAMPLER_RANDOM,
+        SAMPLER_SOBOL,
         CELL_PHOTONS,
         CELL_FAN,
         RADIX_CHUNK,

@@ -3,12 +3,13 @@
 use caustica::{
     density::DensityKernel,
     image::Tonemap,
-    settings::{Emission, LightSampling, LightUnit, Mode, Search, Settings},
+    pixel_filter::PixelFilter,
+    settings::{Crop, Emission, LightSampling, LightUnit, Mode, Sampler, Search, Settings},
 };
 use clap::ValueEnum;
 
 use super::environment::EnvironmentOptions;
-use super::values::{cone_constant, count, exposure, light_weight, photons, radius, size};
+use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, share_reach, size};
 
 /// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
@@ -92,6 +93,10 @@ pub struct SharedOptions {
     #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
     pub max_radius: Option<f32>,
 
+    /// Points on one surface share an estimate within this fraction of its radius, 0 to 2; 0 makes one for every sample
+    #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = share_reach, help_heading = "Estimate")]
+    pub share: f32,
+
     /// Jittered camera samples per pixel, averaged over the pixel's square; 1 is the pixel's centre [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
     pub spp: Option<u32>,
@@ -104,6 +109,22 @@ pub struct SharedOptions {
     #[arg(long, value_name = "NAME|INDEX", help_heading = "Picture")]
     pub camera: Option<String>,
 
+    /// Part of the picture to render: column and row of its upper left pixel, width, height
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crop, help_heading = "Picture")]
+    pub crop: Option<Crop>,
+
+    /// How the light around a pixel's centre is weighed
+    #[arg(long, value_name = "FILTER", value_enum, default_value = "box", help_heading = "Picture")]
+    pub pixel_filter: PixelFilterArg,
+
+    /// Diameter of the lens in metres; needs --focus [default: 0, all is sharp]
+    #[arg(long, value_name = "D", value_parser = aperture, requires = "focus", help_heading = "Picture")]
+    pub aperture: Option<f32>,
+
+    /// Distance of the sharp plane along the camera's axis, in metres
+    #[arg(long, value_name = "DIST", value_parser = radius, requires = "aperture", help_heading = "Picture")]
+    pub focus: Option<f32>,
+
     /// Brightens the PNG by this many stops
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, help_heading = "Picture")]
     #[arg(allow_negative_numbers = true)]
@@ -112,6 +133,10 @@ pub struct SharedOptions {
     /// Tone curve of the PNG
     #[arg(long, value_name = "CURVE", value_enum, default_value = "neutral", help_heading = "Picture")]
     pub tonemap: TonemapArg,
+
+    /// Numbers for sampling of photons, pixels, lens and lights
+    #[arg(long, value_name = "HOW", value_enum, default_value = "sobol", help_heading = "Run")]
+    pub sampler: SamplerArg,
 
     /// One number that decides all randomness
     #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Run")]
@@ -156,11 +181,17 @@ impl SharedOptions {
             raw_estimate: self.raw_estimate,
             cone_constant: self.cone_constant,
             max_radius: self.max_radius,
+            share_reach: self.share,
             max_bounces: self.max_bounces,
             spp: self.spp.unwrap_or(defaults.spp),
             size: self.size,
             camera: self.camera.clone(),
             seed: self.seed,
+            crop: self.crop,
+            pixel_filter: self.pixel_filter.into(),
+            aperture: self.aperture.unwrap_or(defaults.aperture),
+            focus: self.focus,
+            sampler: self.sampler.into(),
             light_sampling: self.light_sampling.into(),
             light_unit: self.light_unit.into(),
             light_photons: self.light_photons.clone(),
@@ -245,6 +276,22 @@ value_enum!(SearchArg => Search {
     KdTree,
     /// All photons within --radius, in the grid
     Radius,
+});
+
+value_enum!(SamplerArg => Sampler {
+    /// Owen-scrambled Sobol sequences: spread evenly
+    Sobol,
+    /// Independent numbers
+    Random,
+});
+
+value_enum!(PixelFilterArg => PixelFilter {
+    /// The pixel's square
+    Box,
+    /// exp(-x² / 2σ²), σ = 0.5 pixels, cut at 1.5
+    Gaussian,
+    /// Blackman and Harris' window, 3 pixels wide
+    BlackmanHarris,
 });
 
 value_enum!(TonemapArg => Tonemap {

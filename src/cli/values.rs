@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use caustica::settings::Crop;
+
 /// A whole number of at least 1 with an optional suffix: `250`, `200k`, `1.5M`.
 pub fn count(text: &str) -> Result<u64, String> {
     let wrong = || "a number of at least 1, as 250, 200k or 1.5M".to_string();
@@ -46,6 +48,25 @@ pub fn cone_constant(text: &str) -> Result<f32, String> {
 /// A radius in metres.
 pub fn radius(text: &str) -> Result<f32, String> {
     number(text).filter(|r| *r > 0.0).ok_or_else(|| "a length in metres, more than 0".to_string())
+}
+
+/// `X,Y,W,H` in pixels.
+pub fn crop(text: &str) -> Result<Crop, String> {
+    let numbers: Option<Vec<u32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[column, row, width, height]) if width > 0 && height > 0 => Ok(Crop { column, row, width, height }),
+        _ => Err("column, row, width and height in pixels, as 100,50,64,64".to_string()),
+    }
+}
+
+/// Diameter of a lens.
+pub fn aperture(text: &str) -> Result<f32, String> {
+    number(text).filter(|d| *d >= 0.0).ok_or_else(|| "a length in metres, at least 0".to_string())
+}
+
+/// A fraction of the radius of an estimate.
+pub fn share_reach(text: &str) -> Result<f32, String> {
+    number(text).filter(|f| (0.0..=2.0).contains(f)).ok_or_else(|| "a number from 0 to 2".to_string())
 }
 
 /// A relative difference.

@@ -8,14 +8,14 @@ use std::{collections::BTreeMap, io::Cursor, path::Path};
 
 use exr::{
     math::Vec2,
-    meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text},
+    meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text},
     prelude::{
         AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels,
         ReadLayers, WritableImage,
     },
 };
 
-use super::{Frame, write_file};
+use super::{Frame, PlaceInWhole, write_file};
 use crate::{
     error::{Error, Result},
     settings::Settings,
@@ -78,6 +78,11 @@ fn encode(frame: &Frame, origin: &Origin) -> exr::error::Result<Vec<u8>> {
     let mut image = Image::from_encoded_channels(size, encoding, AnyChannels::sort(channels.into_iter().collect()));
     image.attributes.chromaticities = Some(REC709);
     image.layer_data.attributes = attributes(origin);
+    if let Some(PlaceInWhole { whole, column, row }) = frame.place {
+        // The display window is the whole picture, the data window the part that is there.
+        image.attributes.display_window = IntegerBounds::from_dimensions((whole.0 as usize, whole.1 as usize));
+        image.layer_data.attributes.layer_position = Vec2(column as i32, row as i32);
+    }
     let mut file = Cursor::new(Vec::new());
     image.write().to_buffered(&mut file)?;
     let mut bytes = file.into_inner();
@@ -165,12 +170,24 @@ pub fn read_exr(path: &Path) -> Result<Frame> {
     Ok(Frame {
         width: layer.size.width() as u32,
         height: layer.size.height() as u32,
+        place: place_of(&image),
         radiance: zip([need("R")?, need("G")?, need("B")?]),
         alpha: or("A", 1.0),
         depth: or("Z", 0.0),
         normal: zip(["N.X", "N.Y", "N.Z"].map(|name| or(name, 0.0))),
         albedo: zip(["albedo.R", "albedo.G", "albedo.B"].map(|name| or(name, 0.0))),
     })
+}
+
+/// Where the data window lies in the display window, if it is a part of that.
+fn place_of(image: &Image<exr::image::Layer<AnyChannels<FlatSamples>>>) -> Option<PlaceInWhole> {
+    let (whole, layer) = (image.attributes.display_window, &image.layer_data);
+    let from = layer.attributes.layer_position - whole.position;
+    let offset = |at: i32, size: usize, whole: usize| u32::try_from(at).ok().filter(|&at| at as usize + size <= whole);
+    let column = offset(from.x(), layer.size.width(), whole.size.width())?;
+    let row = offset(from.y(), layer.size.height(), whole.size.height())?;
+    let size = (whole.size.width() as u32, whole.size.height() as u32);
+    (layer.size != whole.size).then_some(PlaceInWhole { whole: size, column, row })
 }
 
 /// Reads the texts that [`write_exr`] left, by name without the prefix `caustica:`.
@@ -217,6 +234,7 @@ mod tests {
         Frame {
             width: 3,
             height: 2,
+            place: None,
             radiance: pixels(1),
             alpha: samples(2),
             depth: samples(3),

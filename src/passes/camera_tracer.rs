@@ -1,13 +1,13 @@
 //! The camera pass: the picture's samples, tile by tile: camera rays to their visible points, direct light, and the
 //! sum over each pixel's samples. Memory depends on the size of a tile alone.
 
-use super::{SceneBuffers, direct_light::DirectLighting};
+use super::{SceneBuffers, SharedPoints, direct_light::DirectLighting};
 use crate::{
     error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
     layout::{CameraTile, Counters, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
     scene::{Camera, Projection},
-    settings::Settings,
+    settings::{Crop, Settings},
 };
 
 /// Visible points that a tile has room for.
@@ -18,15 +18,17 @@ const BRANCHES: u32 = 4;
 const PIXEL_SAMPLES: u32 = 256;
 /// Bounces handed to the device at once.
 const BOUNCES_PER_SUBMISSION: u32 = 32;
-/// Width and height of the blocks in which pixels are counted; see `shaders/lib/camera_tile.wesl`.
-const BLOCK: u32 = 8;
+/// Pixels of a tile at least.
+const MIN_TILE_PIXELS: u32 = 64;
 
 /// A part of the picture's samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Tile {
-    /// Pixels, counted along blocks: some of them lie outside the picture.
+    /// Pixels, a power of 2, in Morton order; some of them may lie outside the picture.
     pub pixels: u32,
-    pub first_pixel: u32,
+    /// Pixel of the upper left corner.
+    pub first_column: u32,
+    pub first_row: u32,
     pub first_sample: u32,
     /// Samples of each pixel.
     pub samples: u32,
@@ -52,7 +54,9 @@ pub struct CameraTracer {
     pub gathered: Buffer,
     first_hits: Buffer,
     pixels: Buffer,
+    filter_table: Buffer,
     view: CameraTile,
+    window: Crop,
 }
 
 /// What one step did, for the statistics.
@@ -65,7 +69,7 @@ pub struct StepCount {
 
 impl CameraTracer {
     /// # Errors
-    /// Limits of the adapter; an orthographic camera.
+    /// Limits of the adapter; a lens before an orthographic camera.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -74,9 +78,10 @@ impl CameraTracer {
         settings: &Settings,
     ) -> Result<Self> {
         let branches = if scene.has_dielectrics { BRANCHES } else { 1 };
+        let offsets = settings.pixel_filter_offsets();
         let queue = || gpu.storage::<u32>("camera queue", TILE_POINTS);
         Ok(Self {
-            start: Kernel::new(gpu, "start_camera", &[]),
+            start: scene.kernel(gpu, "start_camera"),
             advance: Kernel::new(gpu, "advance_queue", &[]),
             trace: scene.kernel_with(
                 gpu,
@@ -94,27 +99,34 @@ impl CameraTracer {
             gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
-            view: CameraTile { branches, ..view(camera, size, settings)? },
+            filter_table: gpu.storage_with("pixel filter", &offsets)?,
+            view: CameraTile {
+                branches,
+                filter_steps: offsets.len() as u32 - 1,
+                ..view(camera, size, settings)?
+            },
+            window: settings.window(size),
         })
     }
 
-    /// The tiles that make up the picture, in order.
+    /// The tiles of the whole picture that the asked part of it touches, in order: a tile is the same whatever the part, down to
+    /// the last bit.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
-        let (width, height) = (self.view.width, self.view.height);
-        let all_pixels = width.div_ceil(BLOCK) * height.div_ceil(BLOCK) * BLOCK * BLOCK;
         let samples = self.view.spp.min(PIXEL_SAMPLES);
-        let tile_samples = TILE_POINTS as u32 / self.view.branches;
-        let pixels = ((tile_samples / samples) / (BLOCK * BLOCK)).max(1) * BLOCK * BLOCK;
+        let pixels = (TILE_POINTS as u32 / (self.view.branches * samples)).max(MIN_TILE_PIXELS);
+        let bits = pixels.ilog2();
+        let (width, height) = (1_u32 << bits.div_ceil(2), 1_u32 << (bits / 2));
         let mut tiles = Vec::new();
-        for first_pixel in (0..all_pixels).step_by(pixels as usize) {
-            for first_sample in (0..self.view.spp).step_by(samples as usize) {
-                tiles.push(Tile {
-                    pixels: pixels.min(all_pixels - first_pixel),
-                    first_pixel,
-                    first_sample,
-                    samples: samples.min(self.view.spp - first_sample),
-                });
+        for first_row in (0..self.view.height).step_by(height as usize) {
+            for first_column in (0..self.view.width).step_by(width as usize) {
+                if !self.window.touches((first_column, first_row), (width, height)) {
+                    continue;
+                }
+                for first_sample in (0..self.view.spp).step_by(samples as usize) {
+                    let samples = samples.min(self.view.spp - first_sample);
+                    tiles.push(Tile { pixels: 1 << bits, first_column, first_row, first_sample, samples });
+                }
             }
         }
         tiles
@@ -126,16 +138,27 @@ impl CameraTracer {
         self.view.branches * tile.pixels * tile.samples
     }
 
-    /// Column and row of the `i`-th pixel of a tile; `None` outside the picture.
+    /// What a tile's estimates are shared among.
+    #[must_use]
+    pub fn shared_points(&self, tile: &Tile) -> SharedPoints<'_> {
+        SharedPoints {
+            points: &self.points,
+            pixels: tile.pixels,
+            samples: tile.samples,
+            branches: self.view.branches,
+            radiance: &self.radiance,
+            gathered: &self.gathered,
+        }
+    }
+
+    /// Column and row of the `i`-th pixel of a tile in the asked part of the picture; `None` outside.
     #[must_use]
     pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
-        let pixel = tile.first_pixel + i;
-        let block = pixel / (BLOCK * BLOCK);
-        let blocks_x = self.view.width.div_ceil(BLOCK);
-        let even_bits = |p: u32| (p & 1) | ((p >> 1) & 2) | ((p >> 2) & 4);
-        let x = block % blocks_x * BLOCK + even_bits(pixel);
-        let y = block / blocks_x * BLOCK + even_bits(pixel >> 1);
-        (x < self.view.width && y < self.view.height).then_some((x, y))
+        let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
+        let (x, y) = (tile.first_column + even_bits(i), tile.first_row + even_bits(i >> 1));
+        let window = &self.window;
+        let (x, y) = (x.checked_sub(window.column)?, y.checked_sub(window.row)?);
+        (x < window.width && y < window.height).then_some((x, y))
     }
 
     /// Traces the tile's camera paths to their visible points; sets all radiance to 0.
@@ -155,6 +178,7 @@ impl CameraTracer {
                 ("points", &self.points),
                 ("first_hits", &self.first_hits),
                 ("radiance", &self.radiance),
+                ("filter_table", &self.filter_table),
             ])
         };
         let advance = self.advance.bind(gpu, &named(0));
@@ -219,7 +243,8 @@ impl CameraTracer {
 
     fn tile_view(&self, tile: &Tile) -> CameraTile {
         CameraTile {
-            first_pixel: tile.first_pixel,
+            first_column: tile.first_column,
+            first_row: tile.first_row,
             pixels: tile.pixels,
             first_sample: tile.first_sample,
             samples: tile.samples,
@@ -240,10 +265,11 @@ impl From<Counters> for StepCount {
 
 /// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows from the aspect.
 fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Result<CameraTile> {
-    let Projection::Perspective { .. } = camera.projection else {
-        let problem = "is orthographic, which is not rendered yet; choose a perspective one".to_owned();
-        return Err(Error::Setting { name: "camera", value: format!("{:?}", camera.name), problem });
-    };
+    let parallel = matches!(camera.projection, Projection::Orthographic { .. });
+    if parallel && settings.aperture > 0.0 {
+        let problem = "needs a perspective camera; this one is orthographic".to_owned();
+        return Err(Error::Setting { name: "aperture", value: settings.aperture.to_string(), problem });
+    }
     let half_height = camera.projection.half_height_at(1.0);
     let half_width = half_height * width as f32 / height as f32;
     let bounces = if settings.max_bounces == 0 { super::BOUNCE_CEILING } else { settings.max_bounces };
@@ -257,6 +283,9 @@ fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Re
         forward: camera.forward.to_array(),
         spp: settings.spp,
         max_bounces: bounces.min(super::BOUNCE_CEILING),
+        parallel: u32::from(parallel),
+        lens_radius: 0.5 * settings.aperture,
+        focus: settings.focus.unwrap_or(1.0),
         ..Default::default()
     })
 }

@@ -14,6 +14,7 @@ pub mod photon_tracer;
 pub mod radix_sort;
 pub mod raw_map;
 pub mod scene_buffers;
+pub mod share_estimates;
 pub mod sort_photons;
 pub mod targets;
 
@@ -25,3 +26,4 @@ pub use photon_map::{MapKernels, PhotonMap, PhotonStore};
 pub use photon_tracer::{PhotonTracer, TracedPhotons};
 pub use raw_map::RawMap;
 pub use scene_buffers::SceneBuffers;
+pub use share_estimates::{Asked, EstimateSharing, SharedPoints};

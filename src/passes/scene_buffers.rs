@@ -14,7 +14,7 @@ use crate::{
     gpu::{Buffer, Gpu, Kernel},
     layout::{self, BvhNode, Primitive},
     scene::{Material, Scene, Surface},
-    settings::{LightUnit, Settings},
+    settings::{LightUnit, Sampler, Settings},
 };
 
 /// The scene's buffers.
@@ -25,6 +25,7 @@ pub struct SceneBuffers {
     normals: Buffer,
     materials: Buffer,
     has_spheres: bool,
+    sampler: Sampler,
     /// Some surface both reflects and transmits.
     pub has_dielectrics: bool,
     pub lights: LightBuffers,
@@ -54,6 +55,7 @@ impl SceneBuffers {
             materials: gpu.storage_with("materials", &materials)?,
             has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
             has_spheres: !scene.spheres.is_empty(),
+            sampler: settings.sampler,
             lights,
         })
     }
@@ -68,6 +70,7 @@ impl SceneBuffers {
     #[must_use]
     pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
+            ("SAMPLER", f64::from(self.sampler())),
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
             ("SPLIT", f64::from(u8::from(self.nodes.window + self.primitives.window > 0))),
@@ -76,6 +79,13 @@ impl SceneBuffers {
         ];
         overrides.extend_from_slice(others);
         Kernel::new(gpu, stem, &overrides)
+    }
+
+    fn sampler(&self) -> u32 {
+        match self.sampler {
+            Sampler::Sobol => layout::SAMPLER_SOBOL,
+            Sampler::Random => layout::SAMPLER_RANDOM,
+        }
     }
 
     /// The scene's variables, followed by others.
