@@ -100,11 +100,7 @@ impl CameraTracer {
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
-            view: CameraTile {
-                branches,
-                filter_steps: offsets.len() as u32 - 1,
-                ..view(camera, size, settings)?
-            },
+            view: CameraTile { branches, filter_steps: offsets.len() as u32 - 1, ..view(camera, size, settings)? },
             window: settings.window(size),
         })
     }

@@ -55,13 +55,7 @@ impl<'a> Searcher<'a> {
 }
 
 /// What [`Gather::run_turn`] does, by a tree.
-fn kd_estimates(
-    gpu: &Gpu,
-    tree: &KdMap,
-    settings: &Settings,
-    asked: &Asked,
-    progress: &dyn Progress,
-) -> Result<()> {
+fn kd_estimates(gpu: &Gpu, tree: &KdMap, settings: &Settings, asked: &Asked, progress: &dyn Progress) -> Result<()> {
     let mut points: Vec<VisiblePoint> = gpu.read(asked.points, 0, asked.count.into())?;
     points.iter_mut().filter(|p| p.valid > asked.turn).for_each(|p| p.valid = 0);
     let mut radiance: Vec<[f32; 4]> = gpu.read(asked.radiance, 0, asked.count.into())?;
