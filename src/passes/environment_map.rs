@@ -1,7 +1,7 @@
 //! The environment as the device reads it: pixels, and tables by which directions are drawn.
 //!
-//! A pixel is chosen in proportion to the luminance around it and its solid angle; within it directions are uniform. The
-//! luminance is blurred by a 3 x 3 tent first, so that the density is above 0 wherever the interpolated radiance is.
+//! A pixel is chosen in proportion to its solid angle and the mean of the interpolated luminance over it, so that the density is
+//! above 0 wherever the interpolated radiance is; within it directions are uniform.
 
 use std::f64::consts::{PI, TAU};
 
@@ -34,7 +34,7 @@ impl EnvironmentMap {
             (pixels, size) = halved(&pixels, size);
         }
         let (columns, rows) = size;
-        let weights = blurred_luminance(&pixels, size);
+        let weights = mean_luminance(&pixels, size);
         let (mut table, mut row_weights, mut integral) = (Vec::with_capacity(pixels.len()), Vec::new(), [0.0; 3]);
         for (row, (colors, weights)) in pixels.chunks(columns).zip(weights.chunks(columns)).enumerate() {
             let solid_angle = row_solid_angle(row, rows) / columns as f64;
@@ -72,22 +72,23 @@ fn halved(pixels: &[[f32; 3]], (columns, rows): (usize, usize)) -> (Vec<[f32; 3]
     ((0..half.0 * half.1).map(mean).collect(), half)
 }
 
-/// Mean of the channels under the weights 1 2 1 along columns and rows; columns go round, rows end at the poles.
-fn blurred_luminance(pixels: &[[f32; 3]], (columns, rows): (usize, usize)) -> Vec<f64> {
+/// Mean over each pixel of the bilinear interpolation of the mean of the channels: weights 1 6 1 along columns and rows; columns go
+/// round, rows end at the poles.
+fn mean_luminance(pixels: &[[f32; 3]], (columns, rows): (usize, usize)) -> Vec<f64> {
     let luminance = |i: usize| pixels[i].iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
-    let tent = |before: f64, here: f64, after: f64| 0.25 * before + 0.5 * here + 0.25 * after;
+    let mean = |before: f64, here: f64, after: f64| 0.125 * before + 0.75 * here + 0.125 * after;
     let along: Vec<f64> = (0..pixels.len())
         .map(|i| {
             let (x, first) = (i % columns, i - i % columns);
             let (before, after) = (first + (x + columns - 1) % columns, first + (x + 1) % columns);
-            tent(luminance(before), luminance(i), luminance(after))
+            mean(luminance(before), luminance(i), luminance(after))
         })
         .collect();
     (0..pixels.len())
         .map(|i| {
             let above = if i < columns { i } else { i - columns };
             let below = if i + columns < columns * rows { i + columns } else { i };
-            tent(along[above], along[i], along[below])
+            mean(along[above], along[i], along[below])
         })
         .collect()
 }
