@@ -15,6 +15,10 @@ fn rejection_and_correction_are_right_together_and_wrong_alone() {
     let gpu = Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("tests need an adapter");
     for place in places(400) {
         let [raw, rejects, corrects, both] = estimates(&gpu, &place, 3).map(|found| bias(&place, &found));
-        println!("{}: {raw:.4} {rejects:.4} {corrects:.4} {both:.4}", place.name);
+        let found =
+            format!("{}: raw {raw:.3}, rejection {rejects:.3}, correction {corrects:.3}, both {both:.3}", place.name);
+        assert!(both.abs() < 0.06, "{found}");
+        assert!(raw.abs() > 0.15, "control: {found}");
+        assert!(rejects.abs().max(corrects.abs()) > 0.15, "control: {found}");
     }
 }
