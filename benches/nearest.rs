@@ -1,5 +1,5 @@
 //! Exact k nearest photons: this renderer's grid on the device against kiddo's immutable tree with rayon on the same
-//! machine. `cargo bench --bench nearest`. Photons: 70 % on the walls of a box, 30 % in a caustic a thousand times
+//! machine. `cargo bench --bench nearest [-- PHOTONS ...]`, 100000 and 1000000 unless given. Photons: 70 % on the walls of a box, 30 % in a caustic a thousand times
 //! denser; queries: points seen on the same surfaces, in Morton order for both. Neither side's building is counted;
 //! ours includes the sum over the photons found.
 
@@ -36,7 +36,8 @@ fn main() {
     let mut gather = Gather::new(&gpu, GatherOptions { side_test: false, ..GatherOptions::default() });
     let points = queries();
     let device_points = gpu.storage_with("points", &points).expect("points fit");
-    for count in [100_000, 1_000_000] {
+    let asked: Vec<usize> = std::env::args().filter_map(|word| word.parse().ok()).collect();
+    for count in if asked.is_empty() { vec![100_000, 1_000_000] } else { asked } {
         let photons = caustic_box(&mut Random(1), count, SHARE, WIDTH);
         let positions: Vec<[f32; 3]> = photons.iter().map(|p| p.position).collect();
         let tree: ImmutableKdTree<f32, 3> = ImmutableKdTree::new_from_slice(&positions).expect("a tree");

@@ -59,6 +59,7 @@ fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[(Vec3, Vec3)]) -> f64 {
         gpu.storage_with("counters", &[Counters { current: RAYS as u32, ..Default::default() }]).expect("fits");
     let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
     let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
+    let radiance = gpu.storage::<[f32; 4]>("radiance", count).expect("fits");
     let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..Default::default() });
     let bindings = kernel.bind(
         gpu,
@@ -70,6 +71,7 @@ fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[(Vec3, Vec3)]) -> f64 {
             ("counters", &counters),
             ("points", &points),
             ("first_hits", &first_hits),
+            ("radiance", &radiance),
         ]),
     );
     best_of(|| {

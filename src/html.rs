@@ -1,7 +1,14 @@
-//! Pages that need no other file: a template's `{{name}}` filled in, and the style that all pages share.
+//! Pages that need no other file: a template's `{{name}}` filled in, and the head that all pages share.
 
-/// Colours in light and dark, and type; for the place `{{style}}` of a template.
-const STYLE: &str = include_str!("html.css");
+/// What all pages begin with, up to their title; for the place `{{head}}` of a template. Nothing may be asked of the network.
+const HEAD: &str = concat!(
+    "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n",
+    "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n",
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; ",
+    "style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n<link rel=\"icon\" href=\"data:,\">\n<style>\n",
+    include_str!("html.css"),
+    "</style>\n",
+);
 
 /// The template with each `{{name}}` replaced, once: what is filled in stays as it is.
 ///
@@ -13,7 +20,7 @@ pub fn filled(template: &str, values: &[(&str, &str)]) -> String {
     let mut page = parts.next().unwrap_or_default().to_string();
     for part in parts {
         let (name, rest) = part.split_once("}}").unwrap_or((part, ""));
-        let value = values.iter().chain(&[("style", STYLE)]).find(|(n, _)| *n == name);
+        let value = values.iter().chain(&[("head", HEAD)]).find(|(n, _)| *n == name);
         page.push_str(value.unwrap_or_else(|| panic!("the page has no {name}")).1);
         page.push_str(rest);
     }
@@ -34,7 +41,7 @@ mod tests {
     fn names_are_filled_in_once() {
         let page = filled("<title>{{a}}</title>{{b}}{{a}}", &[("a", "{{b}}"), ("b", "2")]);
         assert_eq!(page, "<title>{{b}}</title>2{{b}}");
-        assert!(filled("{{style}}", &[]).contains("prefers-color-scheme: dark"));
+        assert!(filled("{{head}}", &[]).contains("prefers-color-scheme: dark"));
     }
 
     #[test]

@@ -41,7 +41,8 @@ pub struct Primitive {
     /// Index of the primitive in the scene before the BVH reordered it.
     pub id: u32,
     pub e2: [f32; 3],
-    pub pad: u32,
+    /// Index of the primitive as a [`Light`], plus one; 0 if it does not shine.
+    pub emitter: u32,
 }
 
 /// Interpolated normals of a triangle's corners, octahedral (see [`octahedral`]); unused for spheres.
@@ -63,7 +64,7 @@ pub const GLASS: u32 = 2;
 /// Thin pane: light goes straight through.
 pub const PANE: u32 = 3;
 
-/// How a surface scatters.
+/// How a surface scatters and shines.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Material {
@@ -71,25 +72,75 @@ pub struct Material {
     pub color: [f32; 3],
     /// One of [`DIFFUSE`], [`MIRROR`], [`GLASS`], [`PANE`].
     pub kind: u32,
+    /// Radiance that its front side sends out, W/(m² sr).
+    pub emission: [f32; 3],
     /// Index of refraction, of glass and panes.
     pub ior: f32,
+    /// 1 if its back sends out as much.
+    pub double_sided: u32,
     pub pad0: u32,
     pub pad1: u32,
     pub pad2: u32,
 }
 
-/// A point light.
+/// Kinds of [`Light`]: those without extent,
+pub const POINT_LIGHT: u32 = 0;
+pub const SPOT_LIGHT: u32 = 1;
+pub const DIRECTIONAL_LIGHT: u32 = 2;
+/// surfaces,
+pub const TRIANGLE_LIGHT: u32 = 3;
+pub const SPHERE_LIGHT: u32 = 4;
+/// and what comes from all around.
+pub const ENVIRONMENT_LIGHT: u32 = 5;
+
+/// Anything that shines: a light without extent, an emissive triangle or sphere, or the environment. Its power is
+/// `emission · area · solid_angle`, but for directional lights and the environment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Light {
-    /// Metres.
+    /// Point, spot: place, metres. Triangle: its first corner. Sphere: its centre.
     pub position: [f32; 3],
-    /// Probability that all lights up to and including this one are chosen; 1 for the last.
+    /// One of [`POINT_LIGHT`] … [`ENVIRONMENT_LIGHT`].
+    pub kind: u32,
+    /// Spot, directional: unit direction in which it shines. Triangle: edge to the second corner. Sphere: (radius, 0, 0).
+    pub e1: [f32; 3],
+    /// What a user calls one light: all that shines by one material is a group.
+    pub group: u32,
+    /// Spot: 1 − cos of the outer angle, and width in cosines of the falloff. Triangle: edge to the third corner.
+    pub e2: [f32; 3],
+    /// Integral over all directions of the share of `emission` that goes there, sr: point 4π, spot as its falloff says,
+    /// surfaces π for the front alone and 2π for both sides.
+    pub solid_angle: f32,
+    /// Point, spot: radiant intensity (on the axis), W/sr. Directional: irradiance of a surface that faces it, W/m².
+    /// Triangle, sphere: radiance, W/(m² sr). Environment: 1, a factor on its pixels.
+    pub emission: [f32; 3],
+    /// Area of a surface, m²; 1 without one.
+    pub area: f32,
+}
+
+/// One entry of a table by which lights are chosen.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LightChoice {
+    /// Probability that this light or one before it is chosen; 1 for the last that can be.
     pub cdf: f32,
-    /// Radiant intensity, W/sr.
-    pub intensity: [f32; 3],
-    /// Probability that a path starts at this light.
+    /// Probability of this light: the difference to its predecessor.
     pub probability: f32,
+}
+
+/// What lies around the scene.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Surroundings {
+    /// Sphere around all geometry, metres.
+    pub center: [f32; 3],
+    pub radius: f32,
+    /// Pixels of the environment map; 0 and 0 without one.
+    pub columns: u32,
+    pub rows: u32,
+    /// Cosine and sine of its rotation about +Y.
+    pub rotation_cos: f32,
+    pub rotation_sin: f32,
 }
 
 /// A path on its way: a photon, or a camera ray. Rewritten in place by each bounce.
@@ -130,7 +181,8 @@ pub struct Photon {
 pub struct VisiblePoint {
     /// Metres.
     pub position: [f32; 3],
-    /// 1 if there is a point here, 0 if the camera path ended without one.
+    /// 0 if the camera path ended without a point; else the turn from which on light is missing, 1 at first: the maps are
+    /// gathered in turns from 1.
     pub valid: u32,
     /// Weight of the camera path times the BRDF, albedo/π: multiplies irradiance.
     pub weight: [f32; 3],
@@ -174,19 +226,29 @@ pub struct PhotonBatch {
     pub first_path: u32,
     pub first_path_high: u32,
     pub paths: u32,
+    /// Entries of the table of lights.
     pub light_count: u32,
-    /// Light of the first path where paths are dealt in turn, or [`NO_TURN`].
-    pub first_light: u32,
+    /// The range of random numbers that choose lights is cut into this many parts, dealt to the paths in turn; and the
+    /// part of the first path.
+    pub turns: u32,
+    pub first_turn: u32,
     pub max_bounces: u32,
-    /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`].
+    /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`], [`AIM`], [`CAUSTICS_APART`].
     pub rules: u32,
     pub staging_capacity: u32,
     pub lost_scale: f32,
+    /// Stream of random numbers.
+    pub stream: u32,
+    /// Targets at which paths are aimed: the first, and how many.
+    pub first_target: u32,
+    pub target_count: u32,
     pub pad0: u32,
     pub pad1: u32,
 }
 
-pub const NO_TURN: u32 = u32::MAX;
+/// Streams of random numbers: of general photon paths, and of those aimed at mirrors and glass.
+pub const STREAM_PHOTON: u32 = 0;
+pub const STREAM_CAUSTIC: u32 = 2;
 /// The global map still takes photons.
 pub const STORE_GLOBAL: u32 = 1;
 /// The global map takes photons that come straight from a light.
@@ -195,6 +257,16 @@ pub const STORE_DIRECT: u32 = 2;
 pub const STORE_CAUSTIC: u32 = 4;
 /// Paths go on after a diffuse surface.
 pub const FOLLOW_DIFFUSE: u32 = 8;
+/// Lights outside of the targets send paths towards them only.
+pub const AIM: u32 = 16;
+/// Caustic photons are those that come from a light through delta surfaces only; what a diffuse surface scattered
+/// before belongs to the global map.
+pub const CAUSTICS_APART: u32 = 32;
+
+/// Photon paths have their group of lights in the bits of [`Path::flags`] from this one on.
+pub const GROUP_SHIFT: u32 = 2;
+/// Targets that caustic paths are aimed at, at most.
+pub const MAX_TARGETS: u32 = 32;
 
 /// Set in the key of a staged photon that belongs to the caustic map.
 pub const CAUSTIC_BIT: u32 = 0x8000_0000;
@@ -204,15 +276,15 @@ pub const CAUSTIC_BIT: u32 = 0x8000_0000;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Store {
     pub staged: u32,
-    pub first_place: u32,
     pub first_photon: u32,
     pub photons: u32,
     /// [`CAUSTIC_BIT`] for the caustic map, else 0.
     pub map_bit: u32,
-    pub pad0: u32,
-    pub pad1: u32,
-    pub pad2: u32,
 }
+
+/// Where the numbers for sampling come from; see `shaders/lib/sampler.wesl`.
+pub const SAMPLER_RANDOM: u32 = 0;
+pub const SAMPLER_SOBOL: u32 = 1;
 
 /// A camera and the part of its samples that one tile holds; see `shaders/lib/camera_tile.wesl`.
 #[repr(C)]
@@ -230,17 +302,26 @@ pub struct CameraTile {
     pub forward: [f32; 3],
     /// Samples per pixel of the whole picture.
     pub spp: u32,
-    /// First pixel of the tile, counted along 8 x 8 blocks.
-    pub first_pixel: u32,
-    pub pixels: u32,
+    /// Pixel of the tile's upper left corner.
+    pub first_column: u32,
+    pub first_row: u32,
     /// First sample of each pixel, and samples of each pixel, in this tile.
     pub first_sample: u32,
     pub samples: u32,
     pub max_bounces: u32,
     /// Places for paths of a sample: both ways are followed at its first log2(branches) dielectric interfaces.
     pub branches: u32,
-    pub pad0: u32,
-    pub pad1: u32,
+    /// Pixels of the tile, in Morton order.
+    pub pixels: u32,
+    /// 1: rays are parallel and `right`, `up` are in metres; 0: they start from `position`.
+    pub parallel: u32,
+    /// Radius of the lens, metres; 0 for a pinhole.
+    pub lens_radius: f32,
+    /// Distance of the sharp plane along the camera's axis, metres.
+    pub focus: f32,
+    /// Entries of the pixel filter's table, less 1.
+    pub filter_steps: u32,
+    pub pad: u32,
 }
 
 /// What the first ray of a camera sample hit.
@@ -268,7 +349,7 @@ pub struct TilePixel {
     pub pad: u32,
 }
 
-/// Which light `light_directly` takes.
+/// Which light `light_directly` takes; one without extent.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DirectLight {
@@ -276,6 +357,18 @@ pub struct DirectLight {
     pub points: u32,
     pub pad0: u32,
     pub pad1: u32,
+}
+
+/// Which of the samples `sample_emitters` takes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct EmitterSample {
+    pub points: u32,
+    /// The sample, and how many a point has.
+    pub sample: u32,
+    pub samples: u32,
+    /// Entries of the table of lights.
+    pub light_count: u32,
 }
 
 /// Photons of a finest cell of the photon grid; cells of a coarser one.
@@ -351,9 +444,10 @@ pub struct GatherInfo {
     /// Coefficients of the kernel's polynomial, see [`crate::density`]: the first four, and the fifth.
     pub kernel: [f32; 4],
     pub kernel_fifth: f32,
+    /// Points take part whose [`VisiblePoint::valid`] is not 0 and at most this.
+    pub turn: u32,
     pub pad0: u32,
     pub pad1: u32,
-    pub pad2: u32,
 }
 
 /// What a query found.
@@ -366,6 +460,27 @@ pub struct Gathered {
     pub count: u32,
     /// Tells the set of photons from others, see `GatherOptions::fingerprint`.
     pub fingerprint: u32,
+}
+
+/// One round in which points of a tile share estimates; see `shaders/lib/share.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ShareRound {
+    /// Cells of the tile.
+    pub cells: u32,
+    /// Pixels of a cell, a power of 4, that follow each other in the tile: a square.
+    pub cell_pixels: u32,
+    /// Samples of each pixel in the tile.
+    pub samples: u32,
+    /// The samples of a pixel of which a query is chosen.
+    pub candidates: u32,
+    pub branches: u32,
+    /// Square of the distance within which a point takes a query's estimate, over that of the estimate's radius.
+    pub reach_squared: f32,
+    /// Visible points of the tile.
+    pub points: u32,
+    /// As in [`GatherInfo`].
+    pub turn: u32,
 }
 
 /// Consecutive entries that one invocation of the radix sort walks.

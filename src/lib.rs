@@ -1,7 +1,7 @@
 //! Caustica renders glTF scenes by photon mapping on the GPU, without a screen.
 //!
-//! A [`scene::Scene`] is what a file holds: triangles and exact spheres, materials, point lights, cameras. A
-//! [`gpu::Gpu`] is an open device, real or software. [`renderer::render`] traces photons from the lights into two maps, a
+//! A [`scene::Scene`] is what a file holds: triangles and exact spheres, materials, lights, cameras; and the
+//! [`scene::Environment`] around it. A [`gpu::Gpu`] is an open device, real or software. [`renderer::render`] traces photons from the lights into two maps, a
 //! global one and one for caustics, then follows camera rays through mirrors and glass to the first diffuse surface
 //! and estimates the light there from the nearest photons and from shadow rays. [`settings::Settings`] say how many
 //! photons and samples, which [`settings::Mode`] of illumination, and the seed that decides all randomness. Out comes
@@ -15,7 +15,7 @@
 //!
 //! use caustica::{
 //!     gpu::Gpu,
-//!     image::{Origin, write_exr},
+//!     image::write_exr,
 //!     progress::Silent,
 //!     renderer,
 //!     scene::Scene,
@@ -26,13 +26,7 @@
 //!     let scene = Scene::load(Path::new("scene.glb"))?;
 //!     let settings = Settings { global_photons: 1_000_000, ..Settings::default() };
 //!     let render = renderer::render(&Gpu::open(None)?, &scene, &settings, &Silent)?;
-//!     let origin = Origin {
-//!         scene: &scene.file_name,
-//!         scene_hash: &scene.hash,
-//!         settings: &settings,
-//!         stats: &render.stats,
-//!     };
-//!     write_exr(Path::new("out.exr"), &render.frame, &origin)
+//!     write_exr(Path::new("out.exr"), &render.frame, &scene.origin(&settings, &render.stats))
 //! }
 //! ```
 //!
@@ -50,6 +44,7 @@ mod html;
 pub mod image;
 pub mod layout;
 pub mod passes;
+pub mod pixel_filter;
 pub mod progress;
 pub mod reference;
 pub mod renderer;

@@ -15,11 +15,11 @@ use crate::{
     error::{Error, Result},
     gpu::Gpu,
     image::Frame,
-    passes::{Gather, GatherOptions, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
+    passes::{Gather, GatherOptions, LightGroup, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
-    settings::Settings,
-    stats::{DeviceStats, MapStats, Stats, timed},
+    settings::{Crop, Settings},
+    stats::{DeviceStats, LightStats, MapStats, Stats, timed},
 };
 
 /// Height of a picture whose size was not asked for.
@@ -80,7 +80,7 @@ impl PhotonMaps {
 }
 
 impl<'a> Session<'a> {
-    /// Puts the scene on the device. `light_sampling` and `light_unit` of the settings hold for the whole session; the
+    /// Puts the scene on the device. What the settings say of lights (`light_sampling`, `light_photons`, `light_unit`) holds for the whole session; the
     /// others are only checked, so that a wrong one fails before the work. The peak of device memory counts from here.
     ///
     /// # Errors
@@ -98,6 +98,7 @@ impl<'a> Session<'a> {
         progress.report(Stage::Bvh, 0, 1);
         let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
         let buffers = SceneBuffers::new(gpu, scene, &bvh, settings)?;
+        stats.warnings.extend(buffers.lights.warnings.iter().cloned());
         Ok(Self { gpu, scene, buffers, stats })
     }
 
@@ -120,6 +121,7 @@ impl<'a> Session<'a> {
         stats.photons.global = map_stats(&traced.global);
         stats.photons.caustic = map_stats(&traced.caustic);
         stats.photons.lost_to_bounce_limit = traced.lost;
+        stats.photons.lights = light_stats(&self.buffers, &traced.of_lights);
         count_faults(&mut stats, traced.media_overflows, traced.unfinished);
         stats.warnings.extend(traced.warnings);
         progress.report(Stage::Grid, 0, 1);
@@ -173,7 +175,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// The asked size, or the default height at the camera's aspect.
+/// The asked size of the whole picture, or the default height at the camera's aspect.
 pub(crate) fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32, u32)> {
     let (width, height) = settings.size.unwrap_or_else(|| {
         let width = (DEFAULT_HEIGHT as f32 * camera.aspect.unwrap_or(1.0)).round();
@@ -186,11 +188,32 @@ pub(crate) fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32,
             problem: format!("must have from 1 to {MAX_PIXELS} pixels"),
         });
     }
+    if let Some(Crop { column, row, width: w, height: h }) = settings.crop {
+        let inside = |first: u32, size: u32, whole: u32| size > 0 && first < whole && size <= whole - first;
+        if !inside(column, w, width) || !inside(row, h, height) {
+            return Err(Error::Setting {
+                name: "crop",
+                value: format!("{column},{row},{w},{h}"),
+                problem: format!("must have pixels, all of them in the picture of {width}x{height}"),
+            });
+        }
+    }
     Ok((width, height))
 }
 
 fn map_stats(map: &RawMap) -> MapStats {
     MapStats { emitted: map.emitted, stored: map.stored }
+}
+
+fn light_stats(buffers: &SceneBuffers, photons: &[u32]) -> Vec<LightStats> {
+    let groups = buffers.lights.table.groups.iter().zip(photons);
+    let stats = |(group, photons): (&LightGroup, &u32)| LightStats {
+        name: group.name.clone(),
+        kind: group.kind.to_owned(),
+        power: group.power.to_array(),
+        photons: u64::from(*photons),
+    };
+    groups.map(stats).collect()
 }
 
 fn count_faults(stats: &mut Stats, media_overflows: u64, unfinished: u64) {

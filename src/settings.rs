@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     density::{Density, DensityKernel},
     error::{Error, Result},
+    pixel_filter::PixelFilter,
 };
 
 /// Which light reaches the picture, and by which way (the report's five modes).
@@ -20,7 +21,7 @@ pub enum Mode {
     DirectRays,
     /// 3: light straight from the lights or through delta surfaces only, by photons.
     DirectPhotons,
-    /// 4: what mode 0 takes from photons.
+    /// 4: what mode 0 takes from photons. The only one that does not show what shines.
     IndirectPhotons,
 }
 
@@ -39,6 +40,12 @@ impl Mode {
     #[must_use]
     pub fn direct_by_rays(self) -> bool {
         matches!(self, Mode::Hybrid | Mode::DirectRays)
+    }
+
+    /// The picture shows what shines, straight, in mirrors and through glass.
+    #[must_use]
+    pub fn sees_lights(self) -> bool {
+        self != Mode::IndirectPhotons
     }
 
     /// Photons are traced at all.
@@ -67,8 +74,19 @@ pub enum LightSampling {
     /// In proportion to power: all photons start with like flux.
     #[default]
     Power,
-    /// In turn, whatever the power.
+    /// In turn, whatever the power. What shines by one material is one light.
     Uniform,
+}
+
+/// Where photon paths are sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Emission {
+    /// Towards the scene, for the global map; and apart from that towards mirrors and glass, for the caustic map.
+    #[default]
+    Aimed,
+    /// Wherever the lights shine, for both maps at once.
+    Unaimed,
 }
 
 /// How the file's light intensities are read.
@@ -95,6 +113,26 @@ pub enum Search {
     Radius,
 }
 
+/// Where the numbers for sampling come from: those of photons, camera samples and direct light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampler {
+    /// Owen-scrambled Sobol sequences: spread evenly, every prefix of them.
+    #[default]
+    Sobol,
+    /// Independent numbers.
+    Random,
+}
+
+/// Part of a picture, in pixels of the whole from its upper left corner; at least one pixel each way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Crop {
+    pub column: u32,
+    pub row: u32,
+    pub width: u32,
+    pub height: u32,
+}
+
 /// Settings of one render.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -109,6 +147,10 @@ pub struct Settings {
     pub neighbors: u32,
     /// Constant C of the cone filter, ≥ 1.
     pub cone_constant: f32,
+    /// Distance within which visible points on one surface share an estimate, as a fraction of its radius, 0 to 2; 0: every camera
+    /// sample has its own.
+    #[serde(default)]
+    pub share_reach: f32,
     /// Bound of the search radius, metres.
     pub max_radius: Option<f32>,
     /// Longest photon path and longest delta chain of a camera path; 0: roulette alone ends paths.
@@ -124,6 +166,14 @@ pub struct Settings {
     pub light_unit: LightUnit,
     #[serde(default)]
     pub search: Search,
+    /// Lights by name, and the factor on their share of the photons, each > 0.
+    #[serde(default)]
+    pub light_photons: Vec<(String, f64)>,
+    #[serde(default)]
+    pub emission: Emission,
+    /// Samples of the direct light of emissive surfaces and the environment per visible point, 1 to 4096.
+    #[serde(default = "default_light_samples")]
+    pub light_samples: u32,
     /// Radius of the estimate with [`Search::Radius`], metres; `None` with the others.
     #[serde(default)]
     pub radius: Option<f32>,
@@ -133,6 +183,23 @@ pub struct Settings {
     /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the estimate of the report.
     #[serde(default)]
     pub raw_estimate: bool,
+    #[serde(default)]
+    pub sampler: Sampler,
+    #[serde(default)]
+    pub pixel_filter: PixelFilter,
+    /// Diameter of the lens, metres, ≥ 0; 0: a pinhole, all is sharp.
+    #[serde(default)]
+    pub aperture: f32,
+    /// Distance of the sharp plane along the camera's axis, metres, > 0; with an aperture only.
+    #[serde(default)]
+    pub focus: Option<f32>,
+    /// The part of the picture that is rendered; `None`: all.
+    #[serde(default)]
+    pub crop: Option<Crop>,
+}
+
+fn default_light_samples() -> u32 {
+    Settings::default().light_samples
 }
 
 impl Default for Settings {
@@ -144,6 +211,7 @@ impl Default for Settings {
             max_paths: None,
             neighbors: 100,
             cone_constant: 2.0,
+            share_reach: 1.0,
             max_radius: None,
             max_bounces: 20,
             spp: 4,
@@ -153,14 +221,43 @@ impl Default for Settings {
             light_sampling: LightSampling::Power,
             light_unit: LightUnit::Radiometric,
             search: Search::Grid,
+            light_photons: Vec::new(),
+            emission: Emission::Aimed,
+            light_samples: 4,
             radius: None,
             kernel: DensityKernel::Cone,
             raw_estimate: false,
+            sampler: Sampler::Sobol,
+            pixel_filter: PixelFilter::Box,
+            aperture: 0.0,
+            focus: None,
+            crop: None,
         }
     }
 }
 
+impl Crop {
+    /// Whether a rectangle of the whole picture has pixels of this part.
+    #[must_use]
+    pub fn touches(&self, (column, row): (u32, u32), (width, height): (u32, u32)) -> bool {
+        let overlap = |a: u32, a_size: u32, b: u32, b_size: u32| a < b + b_size && b < a + a_size;
+        overlap(self.column, self.width, column, width) && overlap(self.row, self.height, row, height)
+    }
+}
+
 impl Settings {
+    /// The part of a picture of that size that is rendered.
+    #[must_use]
+    pub fn window(&self, (width, height): (u32, u32)) -> Crop {
+        self.crop.unwrap_or(Crop { column: 0, row: 0, width, height })
+    }
+
+    /// The table of the pixel filter; a single sample by the box filter is the pixel's centre.
+    #[must_use]
+    pub fn pixel_filter_offsets(&self) -> Vec<f32> {
+        if self.spp == 1 && self.pixel_filter == PixelFilter::Box { vec![0.0; 2] } else { self.pixel_filter.offsets() }
+    }
+
     /// The kernel with its constant.
     #[must_use]
     pub fn density(&self) -> Density {
@@ -183,6 +280,9 @@ impl Settings {
         if let Some(r) = self.max_radius.filter(|r| !(*r > 0.0 && r.is_finite())) {
             return fail("max-radius", r.to_string(), "must be above 0");
         }
+        if !(0.0..=2.0).contains(&self.share_reach) {
+            return fail("share", self.share_reach.to_string(), "must be from 0 to 2");
+        }
         match (self.search, self.radius) {
             (Search::Radius, None) => return fail("search", "radius".to_string(), "needs a radius"),
             (Search::Radius, Some(r)) if !(r > 0.0 && r.is_finite()) => {
@@ -196,6 +296,20 @@ impl Settings {
         }
         if self.spp == 0 {
             return fail("spp", "0".to_string(), "must be at least 1");
+        }
+        if !(1..=4096).contains(&self.light_samples) {
+            return fail("light-samples", self.light_samples.to_string(), "must be from 1 to 4096");
+        }
+        if let Some((light, weight)) = self.light_photons.iter().find(|(_, w)| !(*w > 0.0 && w.is_finite())) {
+            return fail("light-photons", format!("{light}={weight}"), "the weight must be above 0");
+        }
+        if !(self.aperture >= 0.0 && self.aperture.is_finite()) {
+            return fail("aperture", self.aperture.to_string(), "must be at least 0");
+        }
+        match self.focus {
+            None if self.aperture > 0.0 => return fail("aperture", self.aperture.to_string(), "needs a focus"),
+            Some(f) if !(f > 0.0 && f.is_finite()) => return fail("focus", f.to_string(), "must be above 0"),
+            _ => {}
         }
         if self.max_paths == Some(0) {
             return fail("max-paths", "0".to_string(), "must be at least 1");

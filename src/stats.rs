@@ -26,13 +26,28 @@ pub struct MapStats {
     pub stored: u64,
 }
 
+/// One light: what shines by one material counts as one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LightStats {
+    /// Of the light, of the material, or of the environment.
+    pub name: String,
+    /// `point`, `spot`, `directional`, `surface` or `environment`.
+    pub kind: String,
+    /// W in each channel; of directional lights and environments what the sphere around the scene catches.
+    pub power: [f64; 3],
+    /// Photons of it in both maps.
+    pub photons: u64,
+}
+
 /// Both maps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PhotonStats {
     pub global: MapStats,
     pub caustic: MapStats,
     /// Flux in W that the bounce limit took, mean of the channels, over all emitted paths.
     pub lost_to_bounce_limit: f64,
+    #[serde(default)]
+    pub lights: Vec<LightStats>,
 }
 
 /// Adapter and driver.

@@ -111,6 +111,13 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_right() {
         ("render scene.gltf -o a.exr --seed x", "invalid digit"),
         ("render scene.gltf -o a.exr --light-sampling all", "uniform"),
         ("render scene.gltf -o a.exr --light-unit lumen", "photometric"),
+        ("render scene.gltf -o a.exr --env a.hdr --background 1,1,1", "cannot be used with"),
+        ("render scene.gltf -o a.exr --background 1,1", "three numbers"),
+        ("render scene.gltf -o a.exr --background=-1,0,0", "three numbers"),
+        ("render scene.gltf -o a.exr --env-strength 2", "--env <FILE>"),
+        ("render scene.gltf -o a.exr --background 1,1,1 --env-rotation 2", "cannot be used with"),
+        ("render scene.gltf -o a.exr --env a.hdr --env-strength=-1", "at least 0"),
+        ("render scene.gltf -o a.exr --env a.hdr --env-rotation north", "degrees"),
         ("render scene.gltf -o a.exr --tonemap film", "reinhard"),
         ("render scene.gltf -o a.exr --exposure nan", "stops"),
         ("render scene.gltf -o a.exr -q -v", "cannot be used with"),
@@ -126,6 +133,10 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_right() {
 fn failures_are_exit_code_1_and_one_line_with_the_place() {
     let folder = folder();
     fs::create_dir(folder.path().join("folder.exr")).expect("can be made");
+    fs::create_dir(folder.path().join("sky")).expect("can be made");
+    // Files are known by their content.
+    fs::write(folder.path().join("sky/grid.exr"), b"#?RADIANCE\n\n-Y 1 +X 1\n\x80\x80\x80\x81")
+        .expect("can be written");
     for (words, said) in [
         ("render none.gltf -o a.exr", "none.gltf"),
         ("render text.gltf -o a.exr", "text.gltf"),
@@ -141,15 +152,22 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
         ("render scene.gltf -o a.exr --stats a.exr", "another output"),
         ("render scene.gltf -o a.exr --stats scene.gltf", "scene.gltf: is the scene"),
         ("render scene.gltf -o a.exr --stats nowhere/a.json", "nowhere"),
+        ("render scene.gltf -o a.exr --env none.hdr", "none.hdr: "),
+        ("render scene.gltf -o a.exr --env text.gltf", "text.gltf: is neither OpenEXR nor Radiance HDR"),
+        ("render scene.gltf -o old.exr --env ./old.exr", "old.exr: is the environment as well"),
+        ("compare scene.gltf -o . --env none.hdr", "none.hdr: "),
+        ("compare scene.gltf -o sky --env sky/grid.exr", "grid.exr: is the environment as well"),
+        ("study scene.gltf -o sky --photons 1k -k 1 --env none.hdr", "none.hdr: "),
         ("info none.gltf", "none.gltf"),
         ("info text.gltf", "text.gltf"),
     ] {
-        let quiet = if words.starts_with("render") { "-q" } else { "" };
+        let quiet = if words.starts_with("info") { "" } else { "-q" };
         let message = caustica(folder.path(), &format!("{words} {quiet}")).failed();
         assert!(message.contains(said), "{words}: {message}");
     }
-    let left = ["dark.gltf", "empty.gltf", "folder.exr", "nan.gltf", "old.exr", "scene.gltf", "text.gltf"];
+    let left = ["dark.gltf", "empty.gltf", "folder.exr", "nan.gltf", "old.exr", "scene.gltf", "sky", "text.gltf"];
     assert_eq!(names(folder.path()), left);
+    assert_eq!(names(&folder.path().join("sky")), ["grid.exr"]);
 }
 
 #[test]
@@ -185,6 +203,10 @@ fn help_and_version_go_to_stdout() {
         "CAUSTICA_DEVICE",
         "--light-sampling",
         "--light-unit",
+        "--env",
+        "--env-strength",
+        "--env-rotation",
+        "--background",
         "--exposure",
         "--tonemap",
         "--search",
@@ -266,6 +288,37 @@ fn a_render_writes_all_that_was_asked_for() {
         assert!(stats.pointer(pointer).is_some(), "{pointer} is not in {text}");
     }
     assert!(stats.pointer("/seconds/nothing").is_none());
+}
+
+#[test]
+fn light_from_all_around_is_turned_and_scaled_as_asked() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name);
+    // Two pixels of radiance 1: red where z < 0, green where z > 0.
+    let pixels: [u8; 8] = [128, 0, 0, 129, 0, 128, 0, 129];
+    fs::write(path("sky.hdr"), [&b"#?RADIANCE\n\n-Y 1 +X 2\n"[..], &pixels].concat()).expect("can be written");
+    let corner = |words: &str| {
+        let small = "render dark.gltf --size 8x8 --spp 1 --mode direct-rays -q -o sky.exr";
+        let ended = caustica(folder.path(), &format!("{small} {words}"));
+        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{words}");
+        caustica::image::read_exr(&path("sky.exr")).expect("an EXR").radiance[0]
+    };
+    let attributes = || {
+        let mut all = caustica::image::read_exr_attributes(&path("sky.exr")).expect("an EXR");
+        all.retain(|name, _| name.starts_with("environment"));
+        all
+    };
+    // The file has no camera: the one made for it looks along -Z.
+    assert_eq!(corner("--background 0.5,0.25,0"), [0.5, 0.25, 0.0]);
+    assert_eq!((&*attributes()["environment"], &*attributes()["environmentRadiance"]), ("background", "0.5,0.25,0"));
+    let [r, g, b] = corner("--env sky.hdr --env-strength 2");
+    assert!(r > 1.5 && (r + g - 2.0).abs() < 1e-5 && b == 0.0, "{r} {g} {b}");
+    let found = attributes();
+    assert_eq!((&*found["environment"], &*found["environmentStrength"]), ("sky.hdr", "2"));
+    assert_eq!((&*found["environmentRotation"], found["environmentHash"].len()), ("0", 64));
+    let [turned, behind, _] = corner("--env sky.hdr --env-rotation=-180");
+    assert!(behind > 0.75 && (turned - g / 2.0).abs() < 1e-5, "{turned} {behind}");
+    assert_eq!(attributes()["environmentRotation"], "180");
 }
 
 #[test]

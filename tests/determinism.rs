@@ -12,7 +12,6 @@ use std::{fs, path::Path, process::Command};
 
 use caustica::{
     bvh::Bvh,
-    gpu::Kernel,
     layout::{self, Counters, PhotonBatch},
     passes::SceneBuffers,
     settings::{Mode, Settings},
@@ -68,9 +67,8 @@ fn emitted_directions(count: u32) -> Vec<Vec3> {
     scene.lights.push(point_light(Vec3::ZERO, 1.0));
     let bvh = Bvh::build(&scene);
     let buffers = SceneBuffers::new(gpu, &scene, &bvh, &Settings::default()).expect("the scene fits");
-    let emit = Kernel::new(gpu, "emit_photons", &[]);
-    let batch =
-        PhotonBatch { seed: 3, paths: count, light_count: 1, first_light: layout::NO_TURN, ..Default::default() };
+    let emit = buffers.kernel(gpu, "emit_photons");
+    let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns: 1, target_count: 1, ..Default::default() };
     let uniform = gpu.uniform("batch", &batch);
     let paths = gpu.storage::<layout::Path>("paths", u64::from(count)).expect("fits");
     let queue = gpu.storage::<u32>("queue", u64::from(count)).expect("fits");
@@ -80,6 +78,7 @@ fn emitted_directions(count: u32) -> Vec<Vec3> {
         gpu,
         &buffers.with(&[
             ("batch", &uniform),
+            ("choices", &buffers.lights.photons.buffer),
             ("paths", &paths),
             ("queue_out", &queue),
             ("counts", &counts),

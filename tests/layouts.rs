@@ -40,26 +40,30 @@ macro_rules! twins {
 fn twins() -> Vec<Twin> {
     twins! {
         BvhNode { left_low, left_high, right_low, right_high }
-        Primitive { v0, material, e1, id, e2, pad }
+        Primitive { v0, material, e1, id, e2, emitter }
         Normals { n0, n1, n2, flat_shaded }
-        Material { color, kind, ior, pad0, pad1, pad2 }
-        Light { position, cdf, intensity, probability }
+        Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }
+        Light { position, kind, e1, group, e2, solid_angle, emission, area }
+        LightChoice { cdf, probability }
+        Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
         Path { origin, flags, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
         VisiblePoint { position, valid, weight, offset, ng, pad0, ns, pad1 }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
-        PhotonBatch { seed, first_path, first_path_high, paths, light_count, first_light, max_bounces, rules, staging_capacity, lost_scale, pad0, pad1 }
-        Store { staged, first_place, first_photon, photons, map_bit, pad0, pad1, pad2 }
-        CameraTile { position, seed, right, width, up, height, forward, spp, first_pixel, pixels, first_sample, samples, max_bounces, branches, pad0, pad1 }
+        PhotonBatch { seed, first_path, first_path_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
+        Store { staged, first_photon, photons, map_bit }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, pad }
         FirstHit { normal, depth, albedo, alpha }
         TilePixel { radiance, alpha, normal, depth, albedo, pad }
         DirectLight { light, points, pad0, pad1 }
+        EmitterSample { points, sample, samples, light_count }
         Cell { lo, wi_lo, hi, wi_hi }
         PhotonPlace { position, wi }
         PhotonFlux { flux, normal }
         MapInfo { count, levels, split, pad }
-        GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, pad0, pad1, pad2 }
+        GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, turn, pad0, pad1 }
         Gathered { radius_squared, count, fingerprint }
+        ShareRound { cells, cell_pixels, samples, candidates, branches, reach_squared, points, turn }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
         KeyStep { count, window_first, window_count, fine }
@@ -82,12 +86,25 @@ fn constants() -> Vec<(&'static str, u64)> {
         MIRROR,
         GLASS,
         PANE,
-        NO_TURN,
+        POINT_LIGHT,
+        SPOT_LIGHT,
+        DIRECTIONAL_LIGHT,
+        TRIANGLE_LIGHT,
+        SPHERE_LIGHT,
+        ENVIRONMENT_LIGHT,
+        STREAM_PHOTON,
+        STREAM_CAUSTIC,
         STORE_GLOBAL,
         STORE_DIRECT,
         STORE_CAUSTIC,
         FOLLOW_DIFFUSE,
+        AIM,
+        CAUSTICS_APART,
+        GROUP_SHIFT,
+        MAX_TARGETS,
         CAUSTIC_BIT,
+        SAMPLER_RANDOM,
+        SAMPLER_SOBOL,
         CELL_PHOTONS,
         CELL_FAN,
         RADIX_CHUNK,

@@ -72,7 +72,7 @@ fn unfinished(budget: f64) -> u32 {
     let gpu = gpu();
     let scene = room(60);
     let buffers = SceneBuffers::new(gpu, &scene, &Bvh::build(&scene), &Settings::default()).expect("the scene fits");
-    let kernel = Kernel::new(gpu, "trace_camera", &[("TRACE_BUDGET", budget)]);
+    let kernel = Kernel::new(gpu, "trace_camera", &[("TRACE_BUDGET", budget), ("HAS_ENVIRONMENT", 0.0)]);
     let ray = |i: u32| {
         let angle = i as f32 * 2.4;
         let direction = vec3(angle.cos(), -0.5, angle.sin()).normalize().to_array();
@@ -85,6 +85,7 @@ fn unfinished(budget: f64) -> u32 {
     let counters = gpu.storage_with("counters", &[Counters { current: RAYS, ..Counters::default() }]).expect("fits");
     let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
     let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
+    let radiance = gpu.storage::<[f32; 4]>("radiance", count).expect("fits");
     let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..CameraTile::default() });
     let bindings = kernel.bind(
         gpu,
@@ -96,6 +97,7 @@ fn unfinished(budget: f64) -> u32 {
             ("counters", &counters),
             ("points", &points),
             ("first_hits", &first_hits),
+            ("radiance", &radiance),
         ]),
     );
     let mut encoder = gpu.encoder();

@@ -2,7 +2,8 @@
 
 mod gltf;
 
-use caustica::scene::Scene;
+use caustica::scene::{Environment, Scene};
+use glam::Vec3;
 use gltf::{add_accessor, data_uri, floats, load, load_bytes, loaded, message, triangle};
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -13,6 +14,11 @@ fn refusal(change: impl FnOnce(&mut Value)) -> String {
     assert!(load(&gltf).is_ok(), "the unchanged file loads");
     change(&mut gltf);
     message(load(&gltf))
+}
+
+/// The box of an orthographic camera.
+fn camera_box(xmag: f64, ymag: f64) -> Value {
+    json!({ "xmag": xmag, "ymag": ymag, "znear": 0.1, "zfar": 10 })
 }
 
 #[test]
@@ -34,6 +40,19 @@ fn faults_are_named_with_their_place() {
         |g| g["cameras"][0]["perspective"]["yfov"] = 4.into(),
         "cameras[0].perspective.yfov: 4 is not between 0 and pi",
     );
+    check(
+        |g| g["cameras"][0] = json!({ "type": "orthographic", "orthographic": camera_box(1.0, 0.0) }),
+        "cameras[0].orthographic.ymag: 0 is not a positive number",
+    );
+    check(
+        |g| g["cameras"][0] = json!({ "type": "orthographic", "orthographic": camera_box(-1.0, 1.0) }),
+        "cameras[0].orthographic.xmag: -1 is not a positive number",
+    );
+    check(
+        |g| g["cameras"][0] = json!({ "type": "orthographic", "orthographic": camera_box(1e30, 1e-30) }),
+        "cameras[0].orthographic: xmag / ymag is not a positive number",
+    );
+    check(|g| g["cameras"][0]["type"] = "orthographic".into(), "cameras[0]: orthographic is missing");
     check(|g| g["meshes"][0]["primitives"][0]["material"] = 2.into(), "meshes[0].primitives[0].material: 2 of 1");
     check(|g| g["meshes"][0]["primitives"][0]["mode"] = 9.into(), "meshes[0].primitives[0].mode: is not one of glTF's");
     check(
@@ -74,6 +93,71 @@ fn faults_are_named_with_their_place() {
         |g| g["nodes"][1]["extensions"]["KHR_lights_punctual"]["light"] = 1.into(),
         "nodes[1].extensions.KHR_lights_punctual.light: 1 of 1",
     );
+}
+
+#[test]
+fn faults_of_lights_and_emission_are_named_with_their_place() {
+    let spot = |spot: Value| {
+        refusal(|g| {
+            g["extensions"]["KHR_lights_punctual"]["lights"][0] = json!({ "type": "spot", "spot": spot });
+        })
+    };
+    let at = "extensions.KHR_lights_punctual.lights[0].spot";
+    for (cones, expected) in [
+        (json!({ "outerConeAngle": 0 }), "outerConeAngle: 0 is not above 0 and at most pi/2"),
+        (json!({ "outerConeAngle": 1.6 }), "outerConeAngle: 1.6 is not above 0 and at most pi/2"),
+        (json!({ "outerConeAngle": -0.5 }), "outerConeAngle: -0.5 is not above 0 and at most pi/2"),
+        (json!({ "innerConeAngle": 0.8 }), "innerConeAngle: 0.8 is not between 0 and the outer angle, 0.7853982"),
+        (json!({ "innerConeAngle": -0.1 }), "innerConeAngle: -0.1 is not between 0 and the outer angle, 0.7853982"),
+    ] {
+        assert_eq!(spot(cones), format!("{at}.{expected}"));
+    }
+    let light = |light: Value| refusal(|g| g["extensions"]["KHR_lights_punctual"]["lights"][0] = light);
+    let at = "extensions.KHR_lights_punctual.lights[0]";
+    for (change, expected) in [
+        (json!({ "type": "disc" }), ".type: is not point, spot or directional"),
+        (
+            json!({ "type": "directional", "intensity": -2 }),
+            ": intensity -2 times color [1.0, 1.0, 1.0] is not a positive number",
+        ),
+        (
+            json!({ "type": "spot", "spot": {}, "color": [1, -1, 1] }),
+            ": intensity 1 times color [1.0, -1.0, 1.0] is not a positive number",
+        ),
+        (
+            json!({ "type": "point", "intensity": 1e39 }),
+            ": intensity inf times color [1.0, 1.0, 1.0] is not a positive number",
+        ),
+    ] {
+        assert_eq!(light(change), format!("{at}{expected}"));
+    }
+    for kind in ["spot", "directional"] {
+        let flat = refusal(|g| {
+            g["extensions"]["KHR_lights_punctual"]["lights"][0]["type"] = kind.into();
+            g["nodes"][1]["scale"] = json!([1, 1, 0]);
+        });
+        assert_eq!(flat, "nodes[1]: its transform leaves its light no direction");
+    }
+    let emission = |factor: Value, strength: Value| {
+        refusal(|g| {
+            g["materials"][0]["emissiveFactor"] = factor;
+            g["materials"][0]["extensions"]["KHR_materials_emissive_strength"] =
+                json!({ "emissiveStrength": strength });
+        })
+    };
+    let factor = "materials[0].emissiveFactor: ";
+    assert_eq!(emission(json!([1, -1, 0]), 1.into()), format!("{factor}1 -1 0 is not a colour of positive numbers"));
+    assert_eq!(emission(json!([1e39, 1, 0]), 1.into()), format!("{factor}inf 1 0 is not a colour of positive numbers"));
+    for (strength, text) in [(json!(-1), "-1"), (json!(1e39), "inf")] {
+        let expected = format!(
+            "materials[0].extensions.KHR_materials_emissive_strength.emissiveStrength: {text} is not a positive number \
+             that its factor can be multiplied by"
+        );
+        assert_eq!(emission(json!([1, 1, 1]), strength.clone()), expected);
+        assert_eq!(emission(json!([0, 0, 0]), strength), expected);
+    }
+    let emission = refusal(|g| g["materials"][0]["emissiveFactor"] = json!([1, 1]));
+    assert!(emission.starts_with("JSON: "), "{emission}");
 }
 
 #[test]
@@ -153,15 +237,22 @@ fn scenes_without_light_or_shape_say_what_they_hold() {
         error.split_once("test.gltf: ").expect("the file is named").1.to_owned()
     };
     assert!(loaded(&triangle()).check_renderable().is_ok());
+    let dark = "scene: no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give --env or \
+                --background";
     let mut gltf = triangle();
-    gltf["extensions"]["KHR_lights_punctual"]["lights"] =
-        json!([{ "type": "spot", "spot": {} }, { "type": "directional" }]);
-    gltf["nodes"][0]["extensions"] = json!({ "KHR_lights_punctual": { "light": 1 } });
-    let expected = "scene: no light that is read yet: it holds 1 directional light and 1 spot light; add a point light";
-    assert_eq!(refused(&gltf), expected);
     gltf["scenes"][0]["nodes"] = json!([0, 2]);
-    gltf["nodes"][0].as_object_mut().expect("a node").remove("extensions");
-    assert_eq!(refused(&gltf), "scene: no light: add a point light (KHR_lights_punctual)");
+    assert_eq!(refused(&gltf), dark);
+    let mut scene = loaded(&gltf);
+    scene.environment = Some(Environment::uniform(Vec3::new(0.0, 1e-30, 0.0)));
+    assert!(scene.check_renderable().is_ok());
+    scene.environment = Some(Environment::uniform(Vec3::ZERO));
+    assert!(scene.check_renderable().is_err());
+    // An emissive material that nothing shows gives no light.
+    let lamp = json!({ "emissiveFactor": [0, 0, 0.5] });
+    gltf["materials"].as_array_mut().expect("a list").push(lamp);
+    assert_eq!(refused(&gltf), dark);
+    gltf["meshes"][0]["primitives"][0]["material"] = 1.into();
+    assert!(loaded(&gltf).check_renderable().is_ok());
     gltf["meshes"][0]["primitives"][0]["mode"] = 1.into();
     assert_eq!(
         refused(&gltf),

@@ -2,7 +2,7 @@
 
 mod gltf;
 
-use caustica::scene::Surface;
+use caustica::scene::{LightKind, Projection, Surface};
 use caustica::settings::LightUnit;
 use glam::Vec3;
 use gltf::{lambert, loaded, triangle};
@@ -41,15 +41,9 @@ fn materials_are_read_as_the_nearest_surface() {
     assert_eq!(notes, [r#"material "g": roughness 0.25 is read as 0 until rough materials come"#]);
     glass["pbrMetallicRoughness"]["roughnessFactor"] = 0.01.into();
     assert_eq!(read_as(glass).1, [r#"material "g": roughness 0.01 is small enough to be perfectly smooth"#]);
-    let (surface, notes) = read_as(json!({ "name": "m", "emissiveFactor": [1, 0, 0] }));
+    let (surface, notes) = read_as(json!({ "name": "m" }));
     assert_eq!(surface, Surface::Diffuse { albedo: Vec3::ONE });
-    assert_eq!(
-        notes,
-        [
-            r#"material "m" (metallic 1, roughness 1) is read as diffuse until rough materials come"#,
-            r#"material "m": emission is not read yet"#
-        ]
-    );
+    assert_eq!(notes, [r#"material "m" (metallic 1, roughness 1) is read as diffuse until rough materials come"#]);
     let (_, notes) =
         read_as(json!({ "pbrMetallicRoughness": { "metallicFactor": 0, "baseColorTexture": { "index": 0 } } }));
     assert_eq!(
@@ -77,6 +71,95 @@ fn lights_keep_their_candela_whatever_the_scale() {
 }
 
 #[test]
+fn spots_and_directional_lights_shine_along_minus_z_of_their_node() {
+    let light = |light: Value, change: fn(&mut Value)| {
+        let mut gltf = triangle();
+        gltf["extensions"]["KHR_lights_punctual"]["lights"][0] = light;
+        change(&mut gltf["nodes"][1]);
+        let scene = loaded(&gltf);
+        (scene.lights[0].clone(), scene.warnings)
+    };
+    let near = |a: Vec3, b: Vec3| (a - b).length() < 1e-6;
+    let untouched: fn(&mut Value) = |_| {};
+    // Angles that are not given: 0 and 45 degrees.
+    for plain in [json!({ "type": "spot" }), json!({ "type": "spot", "spot": {} })] {
+        let (spot, notes) = light(plain, untouched);
+        assert_eq!(spot.kind, LightKind::Spot { inner: 0.0, outer: std::f32::consts::FRAC_PI_4 });
+        assert_eq!((spot.direction, spot.position), (Vec3::NEG_Z, Vec3::new(-0.5, -0.5, 2.0)));
+        assert_eq!(notes, [""; 0]);
+    }
+    let cones = json!({ "innerConeAngle": 0.5, "outerConeAngle": std::f64::consts::FRAC_PI_2 });
+    let spot = json!({ "type": "spot", "spot": cones, "color": [1, 0.5, 0], "intensity": 8, "range": 3 });
+    let (half, notes) = light(spot, untouched);
+    assert_eq!(half.kind, LightKind::Spot { inner: 0.5, outer: std::f32::consts::FRAC_PI_2 });
+    assert_eq!(half.intensity, Vec3::new(8.0, 4.0, 0.0));
+    assert_eq!(notes, ["the range of lights is not read: they reach everywhere"]);
+    let sharp = json!({ "type": "spot", "spot": { "innerConeAngle": 0.25, "outerConeAngle": 0.25 } });
+    let (sharp, notes) = light(sharp, untouched);
+    let said = r#"light "lamp": inner and outer cone are equal; the falloff between them is very narrow"#;
+    assert_eq!(notes, [said]);
+    assert!(matches!(sharp.kind, LightKind::Spot { inner, outer: 0.25 } if inner < 0.25 && inner > 0.2499));
+
+    // A quarter turn about +X takes -Z to +Y, whatever the scale; a mirror takes it along.
+    let sun = json!({ "type": "directional", "intensity": 3 });
+    let turn: fn(&mut Value) = |node| node["rotation"] = json!([0.5_f64.sqrt(), 0, 0, 0.5_f64.sqrt()]);
+    let scaled: fn(&mut Value) = |node| {
+        node["rotation"] = json!([0.5_f64.sqrt(), 0, 0, 0.5_f64.sqrt()]);
+        node["scale"] = json!([0.5, 7, 3]);
+    };
+    for change in [turn, scaled] {
+        let (sun, notes) = light(sun.clone(), change);
+        assert_eq!((sun.kind, sun.intensity, notes), (LightKind::Directional, Vec3::splat(3.0), vec![]));
+        assert!(near(sun.direction, Vec3::Y) && (sun.direction.length() - 1.0).abs() < 1e-6, "{}", sun.direction);
+    }
+    assert!(near(light(sun.clone(), |node| node["scale"] = json!([1, 1, -2])).0.direction, Vec3::Z));
+    // A directional light is nowhere: it may lie as far away as it likes.
+    let far: fn(&mut Value) = |node| node["translation"] = json!([0, 1e30, 0]);
+    assert_eq!(light(sun, far).0.position, Vec3::ZERO);
+    // Nothing is said of a light that gives none, and it is none.
+    let mut gltf = triangle();
+    gltf["extensions"]["KHR_lights_punctual"]["lights"][0] = json!({ "type": "spot", "intensity": 0 });
+    let scene = loaded(&gltf);
+    assert_eq!((scene.lights.len(), scene.warnings), (0, vec![r#"light "lamp" has no intensity"#.to_owned()]));
+}
+
+#[test]
+fn emission_is_factor_times_strength() {
+    let emission = |change: Value| {
+        let mut gltf = triangle();
+        for (key, value) in change.as_object().expect("an object") {
+            gltf["materials"][0][key] = value.clone();
+        }
+        let mut scene = loaded(&gltf);
+        (scene.materials.remove(0), scene.warnings)
+    };
+    let strong = json!({
+        "KHR_materials_specular": { "specularFactor": 0 },
+        "KHR_materials_emissive_strength": { "emissiveStrength": 100 },
+    });
+    let (plain, notes) = emission(json!({}));
+    assert_eq!((plain.emission, plain.double_sided, notes), (Vec3::ZERO, false, vec![]));
+    let (lamp, notes) = emission(json!({ "emissiveFactor": [1, 0.5, 0], "doubleSided": true }));
+    assert_eq!((lamp.emission, lamp.double_sided, notes), (Vec3::new(1.0, 0.5, 0.0), true, vec![]));
+    let (lamp, notes) = emission(json!({ "emissiveFactor": [1, 0.5, 0], "extensions": strong }));
+    assert_eq!((lamp.emission, notes), (Vec3::new(100.0, 50.0, 0.0), vec![]));
+    assert_eq!(lamp.surface, plain.surface, "it reflects as before");
+
+    let textured = |factor: Value| {
+        let mut gltf = triangle();
+        gltf["images"] = json!([{ "uri": "x.png" }]);
+        gltf["textures"] = json!([{ "source": 0 }]);
+        gltf["materials"][0]["emissiveFactor"] = factor;
+        gltf["materials"][0]["emissiveTexture"] = json!({ "index": 0 });
+        loaded(&gltf).warnings
+    };
+    let said = "material \"paint\": its emissive texture is not read yet: all of its surface gives light by the factor \
+                alone, also where the texture is dark";
+    assert_eq!(textured(json!([1, 1, 1])), [said]);
+    assert_eq!(textured(json!([0, 0, 0])), [""; 0]);
+}
+
+#[test]
 fn cameras_are_found_by_name_and_number_and_made_if_missing() {
     let mut gltf = triangle();
     gltf["nodes"][2]["rotation"] = json!([0, 1, 0, 0]);
@@ -90,27 +173,61 @@ fn cameras_are_found_by_name_and_number_and_made_if_missing() {
 
     gltf["scenes"][0]["nodes"] = json!([0, 1]);
     let scene = loaded(&gltf);
-    assert_eq!(scene.warnings, ["no perspective camera: one is made that frames the whole scene"]);
+    assert_eq!(scene.warnings, ["no camera: one is made that frames the whole scene"]);
     let camera = scene.camera(None).expect("a framing camera");
     let sees = |p: Vec3| {
-        let (v, half) = (p - camera.position, (0.5 * camera.yfov).tan());
-        v.dot(camera.up).abs().max(v.dot(camera.right).abs()) <= half * v.dot(camera.forward)
+        let v = p - camera.position;
+        let half = camera.projection.half_height_at(v.dot(camera.forward));
+        v.dot(camera.up).abs().max(v.dot(camera.right).abs()) <= half
     };
     assert!(scene.triangles[0].positions.iter().all(|p| sees(*p)));
     assert!(!sees(Vec3::new(0.0, 3.0, 0.0)), "not everything is in view");
 }
 
 #[test]
+fn orthographic_cameras_keep_their_height_and_aspect() {
+    let mut gltf = triangle();
+    gltf["cameras"][0] =
+        json!({ "type": "orthographic", "orthographic": { "xmag": 3, "ymag": 2, "znear": 0, "zfar": 9 } });
+    // A camera ignores its node's scale (glTF 2.0, 3.10.2).
+    gltf["nodes"][2]["scale"] = json!([5, 5, 5]);
+    let scene = loaded(&gltf);
+    let camera = scene.camera(None).expect("a camera");
+    assert_eq!((camera.projection, camera.aspect), (Projection::Orthographic { ymag: 2.0 }, Some(1.5)));
+    assert_eq!(scene.warnings, [""; 0]);
+    let info = scene.describe().to_string();
+    assert!(info.contains("0  view  at 0 0 3  orthographic, ymag 2 m  aspect 1.5\n"), "{info}");
+}
+
+#[test]
 fn info_reads_well() {
-    insta::assert_snapshot!(loaded(&triangle()).describe().to_string().replace(&loaded(&triangle()).hash, "HASH"), @r#"
+    let mut gltf = triangle();
+    gltf["extensions"]["KHR_lights_punctual"]["lights"] = json!([
+        { "type": "point" },
+        { "type": "spot", "spot": { "innerConeAngle": 0.5 } },
+        { "type": "directional", "intensity": 2 },
+    ]);
+    for light in [1, 2] {
+        let node = json!({ "extensions": { "KHR_lights_punctual": { "light": light } } });
+        gltf["nodes"].as_array_mut().expect("nodes").push(node);
+    }
+    gltf["scenes"][0]["nodes"] = json!([0, 1, 2, 3, 4]);
+    gltf["materials"][0]["emissiveFactor"] = json!([1, 0.5, 0]);
+    gltf["materials"][0]["doubleSided"] = true.into();
+    let scene = loaded(&gltf);
+    insta::assert_snapshot!(scene.describe().to_string().replace(&scene.hash, "HASH"), @r#"
     test.gltf
       sha256     HASH
       meshes     1
       triangles  1
       spheres    0
       bounds     0 0 0 .. 1 1 0 m
-      point lights (1)
-        0  lamp  at 0 0 2  12.5664 12.5664 12.5664 W
+      lights (3)
+        0  lamp  point  at 0 0 2  12.5664 12.5664 12.5664 W
+        1  light 1  spot 28.65° to 45.00°  at 0 0 0  along 0 0 -1  1.12622 1.12622 1.12622 W
+        2  light 2  directional  along 0 0 -1  3.14159 3.14159 3.14159 W
+      emissive materials (1)
+        0  paint  1 triangle  0.5 m² on both sides  1 0.5 0 W/(m² sr)  3.14159 1.5708 0 W
       cameras (1)
         0  view  at 0 0 3  yfov 34.38°
       materials (1)

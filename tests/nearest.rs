@@ -140,6 +140,20 @@ fn nearest_photons_equal_brute_force_at_awkward_sizes() {
 }
 
 #[test]
+fn few_photons_in_a_wide_scene_give_numbers() {
+    let mut bench = Bench::open();
+    let mut random = Random(11);
+    let wide = |p: &mut [f32; 3]| *p = p.map(|x| x * 100.0);
+    let mut photons = uniform_box(&mut random, 70);
+    photons.iter_mut().for_each(|p| wide(&mut p.position));
+    let mut points: Vec<_> = (0..60).map(|_| point(&mut random, false)).collect();
+    points.iter_mut().for_each(|p| wide(&mut p.position));
+    for k in [3, 100] {
+        check(&mut bench, &photons, &points, &settings(k), true);
+    }
+}
+
+#[test]
 fn an_empty_map_gives_nothing() {
     let mut bench = Bench::open();
     let map = bench.map(&[]);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use caustica::scene::{Scene, Surface};
+use caustica::scene::{Environment, LightKind, Scene, Surface};
 
 #[path = "../examples/make_scenes/main.rs"]
 #[allow(dead_code)]
@@ -27,14 +27,34 @@ fn files_are_what_the_generator_writes() {
 
 #[test]
 fn all_can_be_rendered_without_a_warning() {
-    for name in ["mirror-and-glass", "diffuse", "diffuse-in-glass", "one-light", "three-lights", "water"] {
-        let scene = load(&format!("{name}.gltf"));
+    let rooms = ["mirror-and-glass", "diffuse", "diffuse-in-glass", "one-light", "three-lights", "area-light", "spot"];
+    for name in rooms.into_iter().chain(["water", "sky"]) {
+        let mut scene = load(&format!("{name}.gltf"));
+        if name == "sky" {
+            assert!(scene.check_renderable().is_err(), "its light is beside it");
+            let sky = Environment::load(&folder().join("sky.hdr"), 1.0, 0.0).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(sky.warnings, [""; 0]);
+            scene.environment = Some(sky);
+        }
         assert!(scene.check_renderable().is_ok(), "{name}");
         assert_eq!(scene.warnings, [""; 0], "{name}");
         assert_eq!(scene.camera(None).expect("a camera").name, "camera", "{name}");
         assert_eq!(scene.has_delta(), name != "diffuse", "{name}");
     }
     assert_eq!((load("one-light.gltf").lights.len(), load("three-lights.gltf").lights.len()), (1, 3));
+}
+
+#[test]
+fn each_kind_of_light_has_its_scene() {
+    let lamp = &load("area-light.gltf").describe().emitters[0];
+    assert!(lamp.triangles == 2 && (lamp.area - 0.25).abs() < 1e-6, "{lamp}");
+    let spot = load("spot.gltf");
+    assert!(matches!(spot.lights[0].kind, LightKind::Spot { .. }) && spot.lights[1].kind == LightKind::Directional);
+    let to_ball = (spot.spheres[0].center - spot.lights[0].position).normalize();
+    assert!(spot.lights[0].direction.dot(to_ball) > 0.9999, "the spot is aimed at the ball");
+    let sky = Environment::load(&folder().join("sky.hdr"), 1.0, 0.0).unwrap_or_else(|error| panic!("{error}"));
+    let sun = make_scenes::sky::sun_direction();
+    assert!(sky.radiance(sun).x > 20.0 * sky.radiance(-sun.with_y(-sun.y)).x, "the sun is where it should be");
 }
 
 /// Edges of the water's triangles that do not have exactly one neighbour, running the other way.

@@ -7,7 +7,7 @@ use std::{fs, path::Path};
 use caustica::{
     image::{Frame, difference, flip, read_exr},
     progress::Silent,
-    scene::Scene,
+    scene::{Environment, Scene},
     settings::{Mode, Settings},
     study::{self, Combination, Finer, Look, Plan, Reference, Results, Subject},
 };
@@ -126,6 +126,13 @@ fn what_is_finished_is_kept_and_what_is_not_is_rendered() {
     let mut other = small();
     other.subjects[0].scene.hash = "2".to_string();
     assert_eq!(counts(&run(&other, path)), (4, 0), "another scene");
+    let mut sky = Environment::uniform(Vec3::ONE);
+    for (what, strength) in [("the room opened to a sky", 1.0), ("a sky of another strength", 2.0)] {
+        let mut other = small();
+        sky.strength = strength;
+        other.subjects[0].scene.environment = Some(sky.clone());
+        assert_eq!(counts(&run(&other, path)), (4, 0), "{what}");
+    }
     let mut other = small();
     other.combinations[0].settings.max_radius = Some(0.3);
     assert_eq!(counts(&run(&other, path)), (1, 3), "another radius of one");

@@ -74,6 +74,17 @@ impl Builder {
         }))
     }
 
+    /// Lambert reflectance, and light of its own: radiance `strength` times `color`, W/(m² sr), from the front side.
+    pub fn emissive(&mut self, name: &str, reflectance: f64, color: [f64; 3], strength: f64) -> usize {
+        let material = self.diffuse(name, [reflectance; 3]);
+        self.uses("KHR_materials_emissive_strength");
+        let json = &mut self.materials[material];
+        json["doubleSided"] = false.into();
+        json["emissiveFactor"] = json!(color);
+        json["extensions"]["KHR_materials_emissive_strength"] = json!({ "emissiveStrength": strength });
+        material
+    }
+
     pub fn mirror(&mut self, name: &str) -> usize {
         self.material(json!({
             "name": name,
@@ -109,13 +120,30 @@ impl Builder {
 
     /// A point light of the same radiant intensity, W/sr, in each channel.
     pub fn light(&mut self, name: &str, position: Vec3, intensity: f64) {
+        let light = json!({ "type": "point", "color": [1.0, 1.0, 1.0], "intensity": intensity });
+        self.light_node(light, json!({ "name": name, "translation": decimals(position) }));
+    }
+
+    /// A spot light at a place, aimed at another: W/sr times `color` along its axis, half angles of its cones in degrees.
+    pub fn spot(&mut self, name: &str, [from, to]: [Vec3; 2], intensity: f64, color: [f64; 3], cones: [f32; 2]) {
+        let [inner, outer] = cones.map(|degrees| decimal(degrees.to_radians()));
+        let spot = json!({ "innerConeAngle": inner, "outerConeAngle": outer });
+        let light = json!({ "type": "spot", "color": color, "intensity": intensity, "spot": spot });
+        let node = json!({ "name": name, "translation": decimals(from), "rotation": aim(to - from) });
+        self.light_node(light, node);
+    }
+
+    /// Light from infinitely far away along a direction: W/m² times `color` where it falls straight.
+    pub fn sun(&mut self, name: &str, direction: Vec3, irradiance: f64, color: [f64; 3]) {
+        let light = json!({ "type": "directional", "color": color, "intensity": irradiance });
+        self.light_node(light, json!({ "name": name, "rotation": aim(direction) }));
+    }
+
+    fn light_node(&mut self, light: Value, mut node: Value) {
         self.uses("KHR_lights_punctual");
-        self.lights.push(json!({ "type": "point", "color": [1.0, 1.0, 1.0], "intensity": intensity }));
-        self.nodes.push(json!({
-            "name": name,
-            "translation": decimals(position),
-            "extensions": { "KHR_lights_punctual": { "light": self.lights.len() - 1 } },
-        }));
+        self.lights.push(light);
+        node["extensions"] = json!({ "KHR_lights_punctual": { "light": self.lights.len() - 1 } });
+        self.nodes.push(node);
     }
 
     /// The camera, looking along -Z and turned about X by `pitch` degrees (down < 0).
@@ -186,7 +214,10 @@ impl Builder {
         }
         let encoded = || base64::engine::general_purpose::STANDARD.encode(&self.bytes);
         let uri = bin.map_or_else(|| format!("data:application/octet-stream;base64,{}", encoded()), str::to_owned);
-        let mut extensions = json!({ "KHR_lights_punctual": { "lights": self.lights } });
+        let mut extensions = json!({});
+        if !self.lights.is_empty() {
+            extensions["KHR_lights_punctual"] = json!({ "lights": self.lights });
+        }
         if !self.shapes.is_empty() {
             extensions["KHR_implicit_shapes"] = json!({ "shapes": self.shapes });
         }
@@ -214,6 +245,12 @@ impl Builder {
 /// The shortest decimal number that reads back as the same `f32`.
 fn decimal(x: f32) -> f64 {
     x.to_string().parse().expect("a number's own text is a number")
+}
+
+/// The rotation that turns -Z into a direction.
+fn aim(direction: Vec3) -> [f64; 4] {
+    let rotation = Quat::from_rotation_arc(Vec3::NEG_Z, direction.normalize()).to_array();
+    rotation.map(|x| decimal((x * 1e6).round() / 1e6))
 }
 
 fn decimals(v: Vec3) -> [f64; 3] {

@@ -118,7 +118,7 @@ impl RenderArgs {
 mod tests {
     use caustica::{
         density::DensityKernel,
-        settings::{LightSampling, LightUnit, Mode, Search},
+        settings::{Emission, LightSampling, LightUnit, Mode, Search},
     };
 
     use super::*;
@@ -161,7 +161,8 @@ mod tests {
     fn every_option_reaches_the_settings() {
         let s = settings(
             "--max-paths 3M -k 50 --kernel gaussian --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
-             --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree",
+             --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
+             --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
         let expected = Settings {
             max_paths: Some(3_000_000),
@@ -177,6 +178,9 @@ mod tests {
             light_sampling: LightSampling::Uniform,
             light_unit: LightUnit::Photometric,
             search: Search::KdTree,
+            light_photons: vec![("lamp".into(), 2.0), ("sky".into(), 0.5)],
+            light_samples: 9,
+            emission: Emission::Unaimed,
             ..Settings::default()
         };
         assert_eq!(s, expected);

@@ -6,13 +6,13 @@ use caustica::{
     Error, Result,
     compare::{FILES, Options, compare},
     gpu::Gpu,
-    image::{Origin, check_output},
     progress::{Progress, Stage},
     scene::Scene,
 };
 
 use super::{
     args::CompareArgs,
+    files::Files,
     progress::Display,
     render::{RAW_NOTE, log_library},
     say::print,
@@ -27,7 +27,8 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     let display = Display::new(options.shared.quiet, options.shared.verbose);
     display.report(Stage::Load, 0, 0);
-    let scene = Scene::load(&args.scene)?;
+    let mut scene = Scene::load(&args.scene)?;
+    options.shared.environment.light([&mut scene])?;
     display.check()?;
     prepare(args)?;
     let settings = options.settings();
@@ -44,7 +45,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         display.note(&format!("warning: {warning}"));
     }
     let stats = &comparison.stats;
-    let origin = Origin { scene: &scene.file_name, scene_hash: &scene.hash, settings: &settings, stats };
+    let origin = scene.origin(&settings, stats);
     display.check()?;
     comparison.write(&args.output, &origin, options.shared.exposure, options.shared.tonemap.into())?;
     display.note(&format!("wrote {} in {:.1} s", args.output.display(), started.elapsed().as_secs_f64()));
@@ -58,5 +59,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 fn prepare(args: &CompareArgs) -> Result<()> {
     let folder = &args.output;
     fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
-    FILES.iter().try_for_each(|name| check_output(&folder.join(name)))
+    let environment = args.options.shared.environment.env.as_deref();
+    let mut files = Files::read(environment.map(|path| (path, "the environment")));
+    FILES.iter().try_for_each(|name| files.write(&folder.join(name)))
 }

@@ -3,6 +3,8 @@
 mod args;
 mod compare;
 mod devices;
+mod environment;
+mod files;
 mod info;
 mod options;
 mod progress;

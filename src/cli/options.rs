@@ -3,11 +3,13 @@
 use caustica::{
     density::DensityKernel,
     image::Tonemap,
-    settings::{LightSampling, LightUnit, Mode, Search, Settings},
+    pixel_filter::PixelFilter,
+    settings::{Crop, Emission, LightSampling, LightUnit, Mode, Sampler, Search, Settings},
 };
 use clap::ValueEnum;
 
-use super::values::{cone_constant, count, exposure, photons, radius, size};
+use super::environment::EnvironmentOptions;
+use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, share_reach, size};
 
 /// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
@@ -44,9 +46,26 @@ pub struct SharedOptions {
     #[arg(long, value_name = "HOW", value_enum, default_value = "power", help_heading = "Light")]
     pub light_sampling: LightSamplingArg,
 
+    /// Multiplies the share of a light's photons, by the name of the light, emissive material or environment; may be given
+    /// several times
+    #[arg(long, value_name = "NAME=WEIGHT", value_parser = light_weight, help_heading = "Light")]
+    pub light_photons: Vec<(String, f64)>,
+
+    /// Samples of the direct light of emissive surfaces and the environment per visible point
+    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Light")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub light_samples: u32,
+
+    /// Where photon paths are sent
+    #[arg(long, value_name = "HOW", value_enum, default_value = "aimed", help_heading = "Photons")]
+    pub emission: EmissionArg,
+
     /// How the file's light intensities are read
     #[arg(long, value_name = "UNIT", value_enum, default_value = "radiometric", help_heading = "Light")]
     pub light_unit: LightUnitArg,
+
+    #[command(flatten)]
+    pub environment: EnvironmentOptions,
 
     /// Photon paths emitted at most [default: 100 times the capacity]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
@@ -74,6 +93,10 @@ pub struct SharedOptions {
     #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
     pub max_radius: Option<f32>,
 
+    /// Points on one surface share an estimate within this fraction of its radius, 0 to 2; 0 makes one for every sample
+    #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = share_reach, help_heading = "Estimate")]
+    pub share: f32,
+
     /// Jittered camera samples per pixel, averaged over the pixel's square; 1 is the pixel's centre [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
     pub spp: Option<u32>,
@@ -86,6 +109,22 @@ pub struct SharedOptions {
     #[arg(long, value_name = "NAME|INDEX", help_heading = "Picture")]
     pub camera: Option<String>,
 
+    /// Part of the picture to render: column and row of its upper left pixel, width, height
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crop, help_heading = "Picture")]
+    pub crop: Option<Crop>,
+
+    /// How the light around a pixel's centre is weighed
+    #[arg(long, value_name = "FILTER", value_enum, default_value = "box", help_heading = "Picture")]
+    pub pixel_filter: PixelFilterArg,
+
+    /// Diameter of the lens in metres; needs --focus [default: 0, all is sharp]
+    #[arg(long, value_name = "D", value_parser = aperture, requires = "focus", help_heading = "Picture")]
+    pub aperture: Option<f32>,
+
+    /// Distance of the sharp plane along the camera's axis, in metres
+    #[arg(long, value_name = "DIST", value_parser = radius, requires = "aperture", help_heading = "Picture")]
+    pub focus: Option<f32>,
+
     /// Brightens the PNG by this many stops
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, help_heading = "Picture")]
     #[arg(allow_negative_numbers = true)]
@@ -94,6 +133,10 @@ pub struct SharedOptions {
     /// Tone curve of the PNG
     #[arg(long, value_name = "CURVE", value_enum, default_value = "neutral", help_heading = "Picture")]
     pub tonemap: TonemapArg,
+
+    /// Numbers for sampling of photons, pixels, lens and lights
+    #[arg(long, value_name = "HOW", value_enum, default_value = "sobol", help_heading = "Run")]
+    pub sampler: SamplerArg,
 
     /// One number that decides all randomness
     #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Run")]
@@ -138,13 +181,22 @@ impl SharedOptions {
             raw_estimate: self.raw_estimate,
             cone_constant: self.cone_constant,
             max_radius: self.max_radius,
+            share_reach: self.share,
             max_bounces: self.max_bounces,
             spp: self.spp.unwrap_or(defaults.spp),
             size: self.size,
             camera: self.camera.clone(),
             seed: self.seed,
+            crop: self.crop,
+            pixel_filter: self.pixel_filter.into(),
+            aperture: self.aperture.unwrap_or(defaults.aperture),
+            focus: self.focus,
+            sampler: self.sampler.into(),
             light_sampling: self.light_sampling.into(),
             light_unit: self.light_unit.into(),
+            light_photons: self.light_photons.clone(),
+            light_samples: self.light_samples,
+            emission: self.emission.into(),
             ..defaults
         }
     }
@@ -189,6 +241,13 @@ value_enum!(LightSamplingArg => LightSampling {
     Uniform,
 });
 
+value_enum!(EmissionArg => Emission {
+    /// Towards the scene for the global map, and apart from that towards mirrors and glass for the caustic map
+    Aimed,
+    /// Wherever the lights shine, for both maps at once
+    Unaimed,
+});
+
 value_enum!(LightUnitArg => LightUnit {
     /// Candela read as W/sr in each channel
     Radiometric,
@@ -217,6 +276,22 @@ value_enum!(SearchArg => Search {
     KdTree,
     /// All photons within --radius, in the grid
     Radius,
+});
+
+value_enum!(SamplerArg => Sampler {
+    /// Owen-scrambled Sobol sequences: spread evenly
+    Sobol,
+    /// Independent numbers
+    Random,
+});
+
+value_enum!(PixelFilterArg => PixelFilter {
+    /// The pixel's square
+    Box,
+    /// exp(-x² / 2σ²), σ = 0.5 pixels, cut at 1.5
+    Gaussian,
+    /// Blackman and Harris' window, 3 pixels wide
+    BlackmanHarris,
 });
 
 value_enum!(TonemapArg => Tonemap {

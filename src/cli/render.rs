@@ -1,15 +1,11 @@
 //! `caustica render`.
 
-use std::{
-    io,
-    path::{Path, PathBuf},
-    time::Instant,
-};
+use std::{io, path::Path, time::Instant};
 
 use caustica::{
     Error, Result,
     gpu::Gpu,
-    image::{Frame, Origin, check_output, write_exr, write_file, write_png},
+    image::{Frame, Origin, write_exr, write_file, write_png},
     progress::{Progress, Stage},
     renderer,
     scene::Scene,
@@ -17,7 +13,7 @@ use caustica::{
     stats::{Stats, timed},
 };
 
-use super::{args::RenderArgs, progress::Display, values::extension};
+use super::{args::RenderArgs, files::Files, progress::Display, values::extension};
 
 /// Loads, renders and writes.
 pub fn render(args: &RenderArgs) -> Result<()> {
@@ -27,12 +23,19 @@ pub fn render(args: &RenderArgs) -> Result<()> {
         log_library();
     }
     let display = Display::new(options.shared.quiet, options.shared.verbose);
-    check_files(args)?;
+    let inputs = [(args.scene.as_path(), "the scene")];
+    let environment = options.shared.environment.env.as_deref().map(|path| (path, "the environment"));
+    let mut files = Files::read(inputs.into_iter().chain(environment));
+    args.outputs.iter().chain(&args.stats).try_for_each(|path| files.write(path))?;
     let settings = args.settings();
 
     let mut load_seconds = 0.0;
     display.report(Stage::Load, 0, 0);
-    let scene = timed(&mut load_seconds, || Scene::load(&args.scene))?;
+    let scene = timed(&mut load_seconds, || -> Result<Scene> {
+        let mut scene = Scene::load(&args.scene)?;
+        options.shared.environment.light([&mut scene])?;
+        Ok(scene)
+    })?;
     display.check()?;
     display.note(&light_unit_line(&settings));
     if settings.search == Search::KdTree && !settings.raw_estimate {
@@ -54,7 +57,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     warnings.extend(stats.warnings.iter().filter(|w| !scene.warnings.contains(w)).cloned());
     stats.warnings = warnings;
 
-    let origin = Origin { scene: &scene.file_name, scene_hash: &scene.hash, settings: &settings, stats: &stats };
+    let origin = scene.origin(&settings, &stats);
     for path in &args.outputs {
         display.check()?;
         write_picture(path, &frame, &origin, args)?;
@@ -70,30 +73,6 @@ pub fn render(args: &RenderArgs) -> Result<()> {
 
 /// Why a kd-tree's picture differs from the default one.
 pub(super) const RAW_NOTE: &str = "the kd-tree is the report's: the estimate is raw, as with --raw-estimate";
-
-/// Finds out before the work that no output would fail or overwrite another file of the same run.
-fn check_files(args: &RenderArgs) -> Result<()> {
-    let mut seen = vec![(identity(&args.scene), "the scene")];
-    for path in args.outputs.iter().chain(&args.stats) {
-        let identity = identity(path);
-        if let Some((_, what)) = seen.iter().find(|(other, _)| *other == identity) {
-            let source = io::Error::new(io::ErrorKind::InvalidInput, format!("is {what} as well"));
-            return Err(Error::Io { path: path.clone(), source });
-        }
-        check_output(path)?;
-        seen.push((identity, "another output"));
-    }
-    Ok(())
-}
-
-/// The same for all ways to write the path of one file, whether it exists or not.
-fn identity(path: &Path) -> PathBuf {
-    let of_new_file = || {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Some(folder.canonicalize().ok()?.join(path.file_name()?))
-    };
-    path.canonicalize().ok().or_else(of_new_file).unwrap_or_else(|| path.to_path_buf())
-}
 
 fn write_picture(path: &Path, frame: &Frame, origin: &Origin, args: &RenderArgs) -> Result<()> {
     match extension(path).as_str() {

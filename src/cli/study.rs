@@ -40,7 +40,11 @@ pub fn run(args: &StudyArgs) -> Result<()> {
         log_library();
     }
     let display = Display::new(options.quiet, options.verbose);
-    let plan = plan(args)?;
+    let mut plan = plan(args)?;
+    options.environment.light(plan.subjects.iter_mut().map(|subject| &mut subject.scene))?;
+    if let Some(environment) = plan.subjects.first().and_then(|subject| subject.scene.environment.as_ref()) {
+        plan.title = format!("{} under {}", plan.title, environment.name);
+    }
     plan.check()?;
     for warning in plan.subjects.iter().flat_map(|s| &s.scene.warnings).collect::<BTreeSet<_>>() {
         display.note(&format!("warning: {warning}"));

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use caustica::settings::Crop;
+
 /// A whole number of at least 1 with an optional suffix: `250`, `200k`, `1.5M`.
 pub fn count(text: &str) -> Result<u64, String> {
     let wrong = || "a number of at least 1, as 250, 200k or 1.5M".to_string();
@@ -48,6 +50,25 @@ pub fn radius(text: &str) -> Result<f32, String> {
     number(text).filter(|r| *r > 0.0).ok_or_else(|| "a length in metres, more than 0".to_string())
 }
 
+/// `X,Y,W,H` in pixels.
+pub fn crop(text: &str) -> Result<Crop, String> {
+    let numbers: Option<Vec<u32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[column, row, width, height]) if width > 0 && height > 0 => Ok(Crop { column, row, width, height }),
+        _ => Err("column, row, width and height in pixels, as 100,50,64,64".to_string()),
+    }
+}
+
+/// Diameter of a lens.
+pub fn aperture(text: &str) -> Result<f32, String> {
+    number(text).filter(|d| *d >= 0.0).ok_or_else(|| "a length in metres, at least 0".to_string())
+}
+
+/// A fraction of the radius of an estimate.
+pub fn share_reach(text: &str) -> Result<f32, String> {
+    number(text).filter(|f| (0.0..=2.0).contains(f)).ok_or_else(|| "a number from 0 to 2".to_string())
+}
+
 /// A relative difference.
 pub fn tolerance(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|t| *t >= 0.0 && t.is_finite());
@@ -57,6 +78,31 @@ pub fn tolerance(text: &str) -> Result<f64, String> {
 /// A factor above 0.
 pub fn scale(text: &str) -> Result<f64, String> {
     number(text).filter(|s| *s > 0.0).map(f64::from).ok_or_else(|| "a number above 0".to_string())
+}
+
+/// A factor of at least 0.
+pub fn strength(text: &str) -> Result<f32, String> {
+    number(text).filter(|s| *s >= 0.0).ok_or_else(|| "a number of at least 0".to_string())
+}
+
+/// An angle.
+pub fn rotation(text: &str) -> Result<f32, String> {
+    number(text).ok_or_else(|| "a number of degrees".to_string())
+}
+
+/// `R,G,B`, each at least 0.
+pub fn color(text: &str) -> Result<[f32; 3], String> {
+    let channels: Option<Vec<f32>> = text.split(',').map(|s| number(s.trim()).filter(|x| *x >= 0.0)).collect();
+    let color = channels.and_then(|channels| channels.try_into().ok());
+    color.ok_or_else(|| "three numbers of at least 0, as 0.5,0.7,1".to_string())
+}
+
+/// `NAME=WEIGHT`; the name may hold a `=` itself.
+pub fn light_weight(text: &str) -> Result<(String, f64), String> {
+    let wrong = || "a light's name, '=' and a number above 0, as lamp=2".to_string();
+    let (name, weight) = text.rsplit_once('=').ok_or_else(wrong)?;
+    let weight = weight.parse::<f64>().ok().filter(|w| *w > 0.0 && w.is_finite()).ok_or_else(wrong)?;
+    Ok((name.to_string(), weight))
 }
 
 /// Stops of exposure.
@@ -124,7 +170,15 @@ mod tests {
                 && tolerance("-1").is_err()
                 && tolerance("inf").is_err()
         );
+        assert!(strength("0").is_ok() && strength("-1").is_err() && strength("inf").is_err());
+        assert!(rotation("-90").is_ok() && rotation("NaN").is_err() && rotation("north").is_err());
+        assert_eq!(color("0, 0.5,2e3"), Ok([0.0, 0.5, 2000.0]));
+        for text in ["", "1", "1,2", "1,2,3,4", "1,2,", "1,-2,3", "1,2,inf", "a,b,c"] {
+            assert!(color(text).is_err(), "{text}");
+        }
         assert!(exposure("-2.5").is_ok() && exposure("101").is_err());
+        assert_eq!(light_weight("a=b=0.5"), Ok(("a=b".to_string(), 0.5)));
+        assert!(["lamp", "lamp=", "lamp=0", "lamp=-1", "lamp=inf"].iter().all(|text| light_weight(text).is_err()));
         assert!(output("a.EXR".into()).is_ok() && output("a.jpg".into()).is_err() && output("exr".into()).is_err());
     }
 }

@@ -19,7 +19,7 @@ pub struct AdapterReport {
 }
 
 /// Storage buffers that the largest kernel binds.
-pub const NEEDED_STORAGE_BUFFERS: u32 = 12;
+pub const NEEDED_STORAGE_BUFFERS: u32 = 14;
 
 /// All adapters, best first: real GPUs before software, discrete before integrated, usable before others.
 #[must_use]

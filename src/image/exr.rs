@@ -8,14 +8,14 @@ use std::{collections::BTreeMap, io::Cursor, path::Path};
 
 use exr::{
     math::Vec2,
-    meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text},
+    meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text},
     prelude::{
         AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels,
         ReadLayers, WritableImage,
     },
 };
 
-use super::{Frame, write_file};
+use super::{Frame, PlaceInWhole, write_file};
 use crate::{
     error::{Error, Result},
     settings::Settings,
@@ -29,9 +29,25 @@ pub struct Origin<'a> {
     pub scene: &'a str,
     /// Hash of the scene's bytes.
     pub scene_hash: &'a str,
+    /// The light from all around, if there is any.
+    pub environment: Option<EnvironmentOrigin<'a>>,
     pub settings: &'a Settings,
     /// Of these the device and the photon counts are kept: equal runs give equal files.
     pub stats: &'a Stats,
+}
+
+/// The light from all around, as a file's attributes tell of it.
+#[derive(Clone, Copy, Debug)]
+pub struct EnvironmentOrigin<'a> {
+    /// File name without folders, or what stands for one.
+    pub name: &'a str,
+    /// Hash of the file's bytes.
+    pub hash: &'a str,
+    /// Of a uniform one: W/(m² sr) in each channel.
+    pub radiance: Option<[f32; 3]>,
+    pub strength: f32,
+    /// Radians.
+    pub rotation: f32,
 }
 
 /// CIE xy of ITU-R BT.709 primaries and D65.
@@ -62,6 +78,11 @@ fn encode(frame: &Frame, origin: &Origin) -> exr::error::Result<Vec<u8>> {
     let mut image = Image::from_encoded_channels(size, encoding, AnyChannels::sort(channels.into_iter().collect()));
     image.attributes.chromaticities = Some(REC709);
     image.layer_data.attributes = attributes(origin);
+    if let Some(PlaceInWhole { whole, column, row }) = frame.place {
+        // The display window is the whole picture, the data window the part that is there.
+        image.attributes.display_window = IntegerBounds::from_dimensions((whole.0 as usize, whole.1 as usize));
+        image.layer_data.attributes.layer_position = Vec2(column as i32, row as i32);
+    }
     let mut file = Cursor::new(Vec::new());
     image.write().to_buffered(&mut file)?;
     let mut bytes = file.into_inner();
@@ -87,12 +108,23 @@ fn attributes(origin: &Origin) -> LayerAttributes {
         ("causticEmitted", maps.caustic.emitted.to_string()),
         ("causticStored", maps.caustic.stored.to_string()),
     ];
+    let environment = origin.environment.iter().flat_map(|environment| {
+        let degrees = (f64::from(environment.rotation).to_degrees() * 1e4).round() / 1e4;
+        let uniform = environment.radiance.map(|[r, g, b]| ("environmentRadiance", format!("{r},{g},{b}")));
+        let file = [
+            ("environment", environment.name.to_string()),
+            ("environmentHash", environment.hash.to_string()),
+            ("environmentStrength", environment.strength.to_string()),
+            ("environmentRotation", degrees.to_string()),
+        ];
+        file.into_iter().chain(uniform)
+    });
     let attribute = |(name, value): (&str, String)| {
         (Text::from(format!("caustica:{name}").as_str()), AttributeValue::Text(text(&value)))
     };
     LayerAttributes {
         software_name: Some(text(&format!("Caustica {version}"))),
-        other: texts.into_iter().map(attribute).collect(),
+        other: texts.into_iter().chain(environment).map(attribute).collect(),
         ..LayerAttributes::default()
     }
 }
@@ -138,12 +170,24 @@ pub fn read_exr(path: &Path) -> Result<Frame> {
     Ok(Frame {
         width: layer.size.width() as u32,
         height: layer.size.height() as u32,
+        place: place_of(&image),
         radiance: zip([need("R")?, need("G")?, need("B")?]),
         alpha: or("A", 1.0),
         depth: or("Z", 0.0),
         normal: zip(["N.X", "N.Y", "N.Z"].map(|name| or(name, 0.0))),
         albedo: zip(["albedo.R", "albedo.G", "albedo.B"].map(|name| or(name, 0.0))),
     })
+}
+
+/// Where the data window lies in the display window, if it is a part of that.
+fn place_of(image: &Image<exr::image::Layer<AnyChannels<FlatSamples>>>) -> Option<PlaceInWhole> {
+    let (whole, layer) = (image.attributes.display_window, &image.layer_data);
+    let from = layer.attributes.layer_position - whole.position;
+    let offset = |at: i32, size: usize, whole: usize| u32::try_from(at).ok().filter(|&at| at as usize + size <= whole);
+    let column = offset(from.x(), layer.size.width(), whole.size.width())?;
+    let row = offset(from.y(), layer.size.height(), whole.size.height())?;
+    let size = (whole.size.width() as u32, whole.size.height() as u32);
+    (layer.size != whole.size).then_some(PlaceInWhole { whole: size, column, row })
 }
 
 /// Reads the texts that [`write_exr`] left, by name without the prefix `caustica:`.
@@ -190,6 +234,7 @@ mod tests {
         Frame {
             width: 3,
             height: 2,
+            place: None,
             radiance: pixels(1),
             alpha: samples(2),
             depth: samples(3),
@@ -208,7 +253,7 @@ mod tests {
     }
 
     fn write(path: &Path, frame: &Frame, settings: &Settings) {
-        let origin = Origin { scene: "räume.gltf", scene_hash: "ab12", settings, stats: &stats() };
+        let origin = Origin { scene: "räume.gltf", scene_hash: "ab12", environment: None, settings, stats: &stats() };
         write_exr(path, frame, &origin).unwrap();
     }
 
@@ -236,6 +281,32 @@ mod tests {
             assert_eq!(found[name], value, "{name}");
         }
         assert_eq!(found.len(), 11);
+    }
+
+    #[test]
+    fn tells_how_the_scene_was_lit_from_all_around() {
+        let folder = tempfile::tempdir().unwrap();
+        let found = |environment: Option<EnvironmentOrigin>| {
+            let path = folder.path().join("a.exr");
+            let settings = Settings::default();
+            let origin = Origin { scene: "", scene_hash: "", environment, settings: &settings, stats: &stats() };
+            write_exr(&path, &frame(), &origin).unwrap();
+            let mut all = read_exr_attributes(&path).unwrap();
+            all.retain(|name, _| name.starts_with("environment"));
+            all.into_iter().map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>()
+        };
+        let map = EnvironmentOrigin {
+            name: "sky.hdr",
+            hash: "cd",
+            radiance: None,
+            strength: 0.5,
+            rotation: 30_f32.to_radians(),
+        };
+        let of_map = ["environment sky.hdr", "environmentHash cd", "environmentRotation 30", "environmentStrength 0.5"];
+        assert_eq!(found(Some(map)), of_map);
+        let uniform = EnvironmentOrigin { radiance: Some([1.0, 0.25, 0.0]), ..map };
+        assert_eq!(found(Some(uniform))[2], "environmentRadiance 1,0.25,0");
+        assert_eq!(found(None), [""; 0]);
     }
 
     #[test]

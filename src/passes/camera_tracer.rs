@@ -1,13 +1,13 @@
 //! The camera pass: the picture's samples, tile by tile: camera rays to their visible points, direct light, and the
 //! sum over each pixel's samples. Memory depends on the size of a tile alone.
 
-use super::SceneBuffers;
+use super::{SceneBuffers, SharedPoints, direct_light::DirectLighting};
 use crate::{
-    error::Result,
+    error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CameraTile, Counters, DirectLight, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
-    scene::Camera,
-    settings::Settings,
+    layout::{CameraTile, Counters, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
+    scene::{Camera, Projection},
+    settings::{Crop, Settings},
 };
 
 /// Visible points that a tile has room for.
@@ -18,15 +18,17 @@ const BRANCHES: u32 = 4;
 const PIXEL_SAMPLES: u32 = 256;
 /// Bounces handed to the device at once.
 const BOUNCES_PER_SUBMISSION: u32 = 32;
-/// Width and height of the blocks in which pixels are counted; see `shaders/lib/camera_tile.wesl`.
-const BLOCK: u32 = 8;
+/// Pixels of a tile at least.
+const MIN_TILE_PIXELS: u32 = 64;
 
 /// A part of the picture's samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Tile {
-    /// Pixels, counted along blocks: some of them lie outside the picture.
+    /// Pixels, a power of 2, in Morton order; some of them may lie outside the picture.
     pub pixels: u32,
-    pub first_pixel: u32,
+    /// Pixel of the upper left corner.
+    pub first_column: u32,
+    pub first_row: u32,
     pub first_sample: u32,
     /// Samples of each pixel.
     pub samples: u32,
@@ -38,7 +40,7 @@ pub struct CameraTracer {
     start: Kernel,
     advance: Kernel,
     trace: Kernel,
-    direct: Kernel,
+    direct: DirectLighting,
     resolve: Kernel,
     paths: Buffer,
     queues: [Buffer; 2],
@@ -52,8 +54,9 @@ pub struct CameraTracer {
     pub gathered: Buffer,
     first_hits: Buffer,
     pixels: Buffer,
+    filter_table: Buffer,
     view: CameraTile,
-    lights: u32,
+    window: Crop,
 }
 
 /// What one step did, for the statistics.
@@ -66,7 +69,7 @@ pub struct StepCount {
 
 impl CameraTracer {
     /// # Errors
-    /// Limits of the adapter.
+    /// Limits of the adapter; a lens before an orthographic camera.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -75,12 +78,17 @@ impl CameraTracer {
         settings: &Settings,
     ) -> Result<Self> {
         let branches = if scene.has_dielectrics { BRANCHES } else { 1 };
+        let offsets = settings.pixel_filter_offsets();
         let queue = || gpu.storage::<u32>("camera queue", TILE_POINTS);
         Ok(Self {
-            start: Kernel::new(gpu, "start_camera", &[]),
+            start: scene.kernel(gpu, "start_camera"),
             advance: Kernel::new(gpu, "advance_queue", &[]),
-            trace: scene.kernel(gpu, "trace_camera"),
-            direct: scene.kernel(gpu, "light_directly"),
+            trace: scene.kernel_with(
+                gpu,
+                "trace_camera",
+                &[("SEES_LIGHTS", f64::from(u8::from(settings.mode.sees_lights())))],
+            ),
+            direct: DirectLighting::new(gpu, scene, settings.light_samples),
             resolve: Kernel::new(gpu, "resolve", &[]),
             paths: gpu.storage::<Path>("camera paths", TILE_POINTS)?,
             queues: [queue()?, queue()?],
@@ -91,28 +99,34 @@ impl CameraTracer {
             gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
-            view: CameraTile { branches, ..view(camera, size, settings) },
-            lights: scene.light_table.len() as u32,
+            filter_table: gpu.storage_with("pixel filter", &offsets)?,
+            view: CameraTile {
+                branches,
+                filter_steps: offsets.len() as u32 - 1,
+                ..view(camera, size, settings)?
+            },
+            window: settings.window(size),
         })
     }
 
-    /// The tiles that make up the picture, in order.
+    /// The tiles of the whole picture that the asked part of it touches, in order: a tile is the same whatever the part, down to
+    /// the last bit.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
-        let (width, height) = (self.view.width, self.view.height);
-        let all_pixels = width.div_ceil(BLOCK) * height.div_ceil(BLOCK) * BLOCK * BLOCK;
         let samples = self.view.spp.min(PIXEL_SAMPLES);
-        let tile_samples = TILE_POINTS as u32 / self.view.branches;
-        let pixels = ((tile_samples / samples) / (BLOCK * BLOCK)).max(1) * BLOCK * BLOCK;
+        let pixels = (TILE_POINTS as u32 / (self.view.branches * samples)).max(MIN_TILE_PIXELS);
+        let bits = pixels.ilog2();
+        let (width, height) = (1_u32 << bits.div_ceil(2), 1_u32 << (bits / 2));
         let mut tiles = Vec::new();
-        for first_pixel in (0..all_pixels).step_by(pixels as usize) {
-            for first_sample in (0..self.view.spp).step_by(samples as usize) {
-                tiles.push(Tile {
-                    pixels: pixels.min(all_pixels - first_pixel),
-                    first_pixel,
-                    first_sample,
-                    samples: samples.min(self.view.spp - first_sample),
-                });
+        for first_row in (0..self.view.height).step_by(height as usize) {
+            for first_column in (0..self.view.width).step_by(width as usize) {
+                if !self.window.touches((first_column, first_row), (width, height)) {
+                    continue;
+                }
+                for first_sample in (0..self.view.spp).step_by(samples as usize) {
+                    let samples = samples.min(self.view.spp - first_sample);
+                    tiles.push(Tile { pixels: 1 << bits, first_column, first_row, first_sample, samples });
+                }
             }
         }
         tiles
@@ -124,16 +138,27 @@ impl CameraTracer {
         self.view.branches * tile.pixels * tile.samples
     }
 
-    /// Column and row of the `i`-th pixel of a tile; `None` outside the picture.
+    /// What a tile's estimates are shared among.
+    #[must_use]
+    pub fn shared_points(&self, tile: &Tile) -> SharedPoints<'_> {
+        SharedPoints {
+            points: &self.points,
+            pixels: tile.pixels,
+            samples: tile.samples,
+            branches: self.view.branches,
+            radiance: &self.radiance,
+            gathered: &self.gathered,
+        }
+    }
+
+    /// Column and row of the `i`-th pixel of a tile in the asked part of the picture; `None` outside.
     #[must_use]
     pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
-        let pixel = tile.first_pixel + i;
-        let block = pixel / (BLOCK * BLOCK);
-        let blocks_x = self.view.width.div_ceil(BLOCK);
-        let even_bits = |p: u32| (p & 1) | ((p >> 1) & 2) | ((p >> 2) & 4);
-        let x = block % blocks_x * BLOCK + even_bits(pixel);
-        let y = block / blocks_x * BLOCK + even_bits(pixel >> 1);
-        (x < self.view.width && y < self.view.height).then_some((x, y))
+        let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
+        let (x, y) = (tile.first_column + even_bits(i), tile.first_row + even_bits(i >> 1));
+        let window = &self.window;
+        let (x, y) = (x.checked_sub(window.column)?, y.checked_sub(window.row)?);
+        (x < window.width && y < window.height).then_some((x, y))
     }
 
     /// Traces the tile's camera paths to their visible points; sets all radiance to 0.
@@ -153,6 +178,7 @@ impl CameraTracer {
                 ("points", &self.points),
                 ("first_hits", &self.first_hits),
                 ("radiance", &self.radiance),
+                ("filter_table", &self.filter_table),
             ])
         };
         let advance = self.advance.bind(gpu, &named(0));
@@ -183,22 +209,12 @@ impl CameraTracer {
     /// # Errors
     /// Faults of the driver.
     pub fn light_directly(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
-        let points = self.point_count(tile);
+        let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
+        let buffers =
+            [("tile", &uniform), ("points", &self.points), ("radiance", &self.radiance), ("counters", &self.counters)];
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
-        for light in 0..self.lights {
-            let uniform = gpu.uniform("direct light", &DirectLight { light, points, ..Default::default() });
-            let bindings = self.direct.bind(
-                gpu,
-                &scene.with(&[
-                    ("direct", &uniform),
-                    ("points", &self.points),
-                    ("radiance", &self.radiance),
-                    ("counters", &self.counters),
-                ]),
-            );
-            self.direct.dispatch(&mut encoder, &bindings, u64::from(points));
-        }
+        self.direct.add(gpu, scene, &mut encoder, self.point_count(tile), &buffers);
         gpu.submit(encoder);
         let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
         Ok(StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) })
@@ -227,7 +243,8 @@ impl CameraTracer {
 
     fn tile_view(&self, tile: &Tile) -> CameraTile {
         CameraTile {
-            first_pixel: tile.first_pixel,
+            first_column: tile.first_column,
+            first_row: tile.first_row,
             pixels: tile.pixels,
             first_sample: tile.first_sample,
             samples: tile.samples,
@@ -247,11 +264,16 @@ impl From<Counters> for StepCount {
 }
 
 /// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows from the aspect.
-fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> CameraTile {
-    let half_height = (camera.yfov / 2.0).tan();
+fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Result<CameraTile> {
+    let parallel = matches!(camera.projection, Projection::Orthographic { .. });
+    if parallel && settings.aperture > 0.0 {
+        let problem = "needs a perspective camera; this one is orthographic".to_owned();
+        return Err(Error::Setting { name: "aperture", value: settings.aperture.to_string(), problem });
+    }
+    let half_height = camera.projection.half_height_at(1.0);
     let half_width = half_height * width as f32 / height as f32;
     let bounces = if settings.max_bounces == 0 { super::BOUNCE_CEILING } else { settings.max_bounces };
-    CameraTile {
+    Ok(CameraTile {
         position: camera.position.to_array(),
         seed: settings.seed,
         right: (camera.right * half_width).to_array(),
@@ -261,6 +283,9 @@ fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Ca
         forward: camera.forward.to_array(),
         spp: settings.spp,
         max_bounces: bounces.min(super::BOUNCE_CEILING),
+        parallel: u32::from(parallel),
+        lens_radius: 0.5 * settings.aperture,
+        focus: settings.focus.unwrap_or(1.0),
         ..Default::default()
-    }
+    })
 }

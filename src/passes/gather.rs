@@ -1,7 +1,7 @@
-//! Radiance from the photons around a point. Kernels: `key_points`, `aim_search`,
+//! Radiance from the photons around a point. Kernels: `mark_points`, `key_points`, `aim_search`,
 //! `count_photons`, `survey_surface`, `gather`, `finish_gather`.
 
-use super::{SceneBuffers, photon_map::PhotonMap, radix_sort::RadixSort};
+use super::{SceneBuffers, photon_map::PhotonMap, radix_sort::{RadixSort, scan_levels}};
 use crate::{
     density::Density,
     error::Result,
@@ -13,8 +13,8 @@ use crate::{
 
 /// Points that are searched together; more go in several batches.
 const BATCH: u32 = 65_536;
-/// Bits of a point's key: 30 of its place on the curve, and one that puts those without a place last.
-const POINT_KEY_BITS: u32 = 31;
+/// Bits of a point's key: its place on the curve.
+const POINT_KEY_BITS: u32 = 30;
 /// Queries of one invocation.
 const PACKET: u32 = 4;
 /// Packets that are searched or wait together.
@@ -98,6 +98,7 @@ pub struct Gather<'s> {
     options: GatherOptions,
     /// Where the surfaces are, if they matter.
     scene: Option<&'s SceneBuffers>,
+    mark: Kernel,
     key: Kernel,
     radix: RadixSort,
     /// Search and sum, each variant compiled when first needed.
@@ -134,7 +135,6 @@ struct Scratch {
     sums: Buffer,
     discs: Buffer,
     open: Buffer,
-    valid: Buffer,
 }
 
 impl<'s> Gather<'s> {
@@ -151,8 +151,9 @@ impl<'s> Gather<'s> {
     }
 
     fn with_scene(gpu: &Gpu, scene: Option<&'s SceneBuffers>, options: GatherOptions) -> Self {
-        let key = Kernel::new(gpu, "key_points", &[]);
-        Self { options, scene, key, radix: RadixSort::new(gpu), compiled: Vec::new(), scratch: None }
+        let kernel = |stem| Kernel::new(gpu, stem, &[]);
+        let (mark, key) = (kernel("mark_points"), kernel("key_points"));
+        Self { options, scene, mark, key, radix: RadixSort::new(gpu), compiled: Vec::new(), scratch: None }
     }
 
     /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to `radiance` (`array<vec4f>`), and writes the
@@ -167,6 +168,25 @@ impl<'s> Gather<'s> {
         map: &PhotonMap,
         points: &Buffer,
         count: u32,
+        settings: &GatherSettings,
+        results: (&Buffer, &Buffer),
+        progress: &dyn Progress,
+    ) -> Result<GatherStats> {
+        self.run_turn(gpu, map, points, (count, u32::MAX), settings, results, progress)
+    }
+
+    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of a turn; see
+    /// [`crate::layout::VisiblePoint::valid`].
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn run_turn(
+        &mut self,
+        gpu: &Gpu,
+        map: &PhotonMap,
+        points: &Buffer,
+        (count, turn): (u32, u32),
         settings: &GatherSettings,
         (radiance, gathered): (&Buffer, &Buffer),
         progress: &dyn Progress,
@@ -196,6 +216,7 @@ impl<'s> Gather<'s> {
                 takes_all: u32::from(settings.radius.is_some()),
                 max_radius_squared: settings.radius.or(settings.max_radius).map_or(-1.0, |r| r * r),
                 per_path: (1.0 / map.emitted().max(1) as f64) as f32,
+                turn,
                 kernel_mean: polynomial.mean() as f32,
                 kernel: first_four,
                 kernel_fifth: fifth,
@@ -224,8 +245,8 @@ impl<'s> Gather<'s> {
         progress: &dyn Progress,
     ) -> Result<u32> {
         let scratch = self.scratch.as_ref().expect("run has made it");
-        let (entries, valid) = self.order(gpu, map, info, points, scratch)?;
-        if valid == 0 {
+        let (entries, waiting) = self.order(gpu, map, info, points, scratch)?;
+        if waiting == 0 {
             return Ok(0);
         }
         let mut buffers = map.bindings().to_vec();
@@ -242,14 +263,14 @@ impl<'s> Gather<'s> {
         ]);
         let with_info = |info| [buffers.as_slice(), &[("gather_info", info)]].concat();
         let infos =
-            STRIDES.map(|(stride, _)| gpu.uniform("gather info", &GatherInfo { count: valid, stride, ..*info }));
+            STRIDES.map(|(stride, _)| gpu.uniform("gather info", &GatherInfo { count: waiting, stride, ..*info }));
         let search_bindings =
             infos.each_ref().map(|info| (aim.bind(gpu, &with_info(info)), count.bind(gpu, &with_info(info))));
         let (sum_bindings, finish_bindings) =
             (sum.bind(gpu, &with_info(&infos[0])), finish.bind(gpu, &with_info(&infos[0])));
         let survey = survey.as_ref().zip(self.scene);
         let survey = survey.map(|(kernel, scene)| (kernel, kernel.bind(gpu, &scene.with(&with_info(&infos[0])))));
-        let packets = u64::from(valid.div_ceil(PACKET));
+        let packets = u64::from(waiting.div_ceil(PACKET));
         let mut dispatches = 0;
         loop {
             progress.check()?;
@@ -269,10 +290,10 @@ impl<'s> Gather<'s> {
                 aim.dispatch(&mut encoder, aim_bindings, packets * u64::from(PACKET));
             }
             if let Some((survey, bindings)) = &survey {
-                survey.dispatch(&mut encoder, bindings, valid.into());
+                survey.dispatch(&mut encoder, bindings, waiting.into());
             }
             sum.dispatch(&mut encoder, &sum_bindings, packets);
-            finish.dispatch(&mut encoder, &finish_bindings, valid.into());
+            finish.dispatch(&mut encoder, &finish_bindings, waiting.into());
             gpu.submit(encoder);
             dispatches += 1;
             if gpu.read::<u32>(&scratch.open, 0, 1)?[0] == 0 {
@@ -281,7 +302,7 @@ impl<'s> Gather<'s> {
         }
     }
 
-    /// Sorts the points of a batch, the valid ones first; returns their order and the number of valid ones.
+    /// Sorts the points of a batch that wait; returns their order and number.
     fn order<'b>(
         &self,
         gpu: &Gpu,
@@ -291,19 +312,24 @@ impl<'s> Gather<'s> {
         scratch: &'b Scratch,
     ) -> Result<(&'b Buffer, u32)> {
         let uniform = gpu.uniform("gather info", info);
+        let marks = scan_levels(gpu, u64::from(info.count) + 1)?;
         let mut buffers = map.bindings().to_vec();
         buffers.extend([
             ("gather_info", &uniform),
             ("points", points),
+            ("values", &marks[0]),
+            ("places", &marks[0]),
             ("keyed", &scratch.entries[0]),
-            ("valid_count", &scratch.valid),
         ]);
         let mut encoder = gpu.encoder();
-        encoder.clear_buffer(&scratch.valid, 0, None);
+        self.mark.dispatch(&mut encoder, &self.mark.bind(gpu, &buffers), u64::from(info.count) + 1);
+        self.radix.prefix_sums(gpu, &mut encoder, &marks);
         self.key.dispatch(&mut encoder, &self.key.bind(gpu, &buffers), info.count.into());
         gpu.submit(encoder);
-        let sorted = self.radix.sort(gpu, [&scratch.entries[0], &scratch.entries[1]], info.count, POINT_KEY_BITS)?;
-        Ok((&scratch.entries[sorted], gpu.read::<u32>(&scratch.valid, 0, 1)?[0]))
+        let waiting = gpu.read::<u32>(&marks[0], info.count.into(), 1)?[0];
+        let entries = [&scratch.entries[0], &scratch.entries[1]];
+        let sorted = self.radix.sort(gpu, entries, waiting, POINT_KEY_BITS)?;
+        Ok((&scratch.entries[sorted], waiting))
     }
 
     /// Place of the kernels of a variant, which are compiled once.
@@ -350,7 +376,6 @@ impl Scratch {
             sums: gpu.storage::<[u8; GATHER_STATE_BYTES]>("unfinished sums", packets)?,
             discs: gpu.storage::<[u8; DISC_BYTES]>("discs", if surveys { u64::from(capacity) + 3 } else { 1 })?,
             open: gpu.storage::<u32>("open packets", 1)?,
-            valid: gpu.storage::<u32>("valid points", 1)?,
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Stable radix sort of (key, index) pairs. Kernels: `count_digits`, `sum_spans`, `scan_spans`, `scatter_entries`.
+//! Stable radix sort of (key, index) pairs, and prefix sums. Kernels: `count_digits`, `sum_spans`, `scan_spans`, `scatter_entries`.
 
 use crate::{
     error::Result,
@@ -58,7 +58,7 @@ impl RadixSort {
             ];
             encoder.clear_buffer(&levels[0], 0, None);
             self.count.dispatch(&mut encoder, &self.count.bind(gpu, &buffers), chunks.into());
-            self.scan_counts(gpu, &mut encoder, &levels);
+            self.prefix_sums(gpu, &mut encoder, &levels);
             self.scatter.dispatch(&mut encoder, &self.scatter.bind(gpu, &buffers), chunks.into());
             gpu.submit(std::mem::replace(&mut encoder, gpu.encoder()));
             from = 1 - from;
@@ -66,8 +66,8 @@ impl RadixSort {
         Ok(from)
     }
 
-    /// Turns the values of the first level into their exclusive prefix sums.
-    fn scan_counts(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, levels: &[Buffer]) {
+    /// Turns the values of the first of [`scan_levels`] into their exclusive prefix sums.
+    pub(super) fn prefix_sums(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, levels: &[Buffer]) {
         let buffers = |l: usize| [("values", &levels[l]), ("sums", &levels[l + 1])];
         let spans = |l: usize| levels[l + 1].size() / 4;
         for l in 0..levels.len() - 1 {
@@ -82,8 +82,8 @@ impl RadixSort {
 }
 
 /// Buffers for `count` values and for the sums of their spans, of the spans' spans, down to one.
-fn scan_levels(gpu: &Gpu, mut count: u64) -> Result<Vec<Buffer>> {
-    let mut levels = vec![gpu.storage::<u32>("digit counts", count)?];
+pub(super) fn scan_levels(gpu: &Gpu, mut count: u64) -> Result<Vec<Buffer>> {
+    let mut levels = vec![gpu.storage::<u32>("values to sum", count)?];
     while count > 1 {
         count = count.div_ceil(SPAN);
         levels.push(gpu.storage::<u32>("sums of spans", count)?);

@@ -1,14 +1,20 @@
 //! Bind group 0: the scene on the device. Owner of `shaders/bindings/scene.wesl`.
 
+use std::borrow::Cow;
+
 use bytemuck::Pod;
 
+use super::{
+    light_buffers::LightBuffers,
+    light_table::{LightTable, emission_in},
+};
 use crate::{
     bvh::Bvh,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
     layout::{self, BvhNode, Primitive},
-    scene::{Scene, Surface},
-    settings::{LightSampling, Settings},
+    scene::{Material, Scene, Surface},
+    settings::{LightUnit, Sampler, Settings},
 };
 
 /// The scene's buffers.
@@ -18,12 +24,11 @@ pub struct SceneBuffers {
     primitives: Windows,
     normals: Buffer,
     materials: Buffer,
-    lights: Buffer,
     has_spheres: bool,
+    sampler: Sampler,
     /// Some surface both reflects and transmits.
     pub has_dielectrics: bool,
-    /// The lights as uploaded.
-    pub light_table: Vec<layout::Light>,
+    pub lights: LightBuffers,
 }
 
 /// An array in one binding, or in two where it exceeds one.
@@ -39,19 +44,19 @@ impl SceneBuffers {
     /// Uploads the scene.
     ///
     /// # Errors
-    /// [`crate::Error::Limit`] if an array exceeds two bindings, or the normals one.
+    /// [`crate::Error::Limit`] if an array exceeds two bindings, or the normals one; as [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &Settings) -> Result<Self> {
-        let materials: Vec<_> = scene.materials.iter().map(|m| material(&m.surface)).collect();
-        let light_table = light_table(scene, settings);
+        let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.light_unit)).collect();
+        let lights = LightBuffers::new(gpu, scene, settings)?;
         Ok(Self {
             nodes: Windows::new::<BvhNode>(gpu, "bvh nodes", &bvh.nodes)?,
-            primitives: Windows::new::<Primitive>(gpu, "primitives", &bvh.primitives)?,
+            primitives: Windows::new::<Primitive>(gpu, "primitives", &with_emitters(&bvh.primitives, &lights.table))?,
             normals: gpu.storage_with("normals", &bvh.normals)?,
             materials: gpu.storage_with("materials", &materials)?,
-            lights: gpu.storage_with("lights", &light_table)?,
             has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
             has_spheres: !scene.spheres.is_empty(),
-            light_table,
+            sampler: settings.sampler,
+            lights,
         })
     }
 
@@ -65,13 +70,22 @@ impl SceneBuffers {
     #[must_use]
     pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
+            ("SAMPLER", f64::from(self.sampler())),
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
+            ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
             ("SPLIT", f64::from(u8::from(self.nodes.window + self.primitives.window > 0))),
             ("NODE_WINDOW", window_or_all(self.nodes.window)),
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
         ];
         overrides.extend_from_slice(others);
         Kernel::new(gpu, stem, &overrides)
+    }
+
+    fn sampler(&self) -> u32 {
+        match self.sampler {
+            Sampler::Sobol => layout::SAMPLER_SOBOL,
+            Sampler::Random => layout::SAMPLER_RANDOM,
+        }
     }
 
     /// The scene's variables, followed by others.
@@ -84,8 +98,8 @@ impl SceneBuffers {
             ("primitives_high", &self.primitives.high),
             ("normals", &self.normals),
             ("materials", &self.materials),
-            ("lights", &self.lights),
         ];
+        all.extend(self.lights.bindings());
         all.extend_from_slice(others);
         all
     }
@@ -104,41 +118,22 @@ fn window_or_all(window: u64) -> f64 {
     if window == 0 { f64::from(u32::MAX) } else { window as f64 }
 }
 
-fn material(surface: &Surface) -> layout::Material {
-    let (kind, color, ior) = match *surface {
+/// The primitives, each with the light that it is.
+fn with_emitters<'a>(primitives: &'a [Primitive], lights: &LightTable) -> Cow<'a, [Primitive]> {
+    if !lights.has_surfaces() {
+        return Cow::Borrowed(primitives);
+    }
+    primitives.iter().map(|p| Primitive { emitter: lights.emitter(p.id), ..*p }).collect()
+}
+
+fn material(material: &Material, unit: LightUnit) -> layout::Material {
+    let (kind, color, ior) = match material.surface {
         Surface::Diffuse { albedo } => (layout::DIFFUSE, albedo, 1.0),
         Surface::Mirror { tint } => (layout::MIRROR, tint, 1.0),
         Surface::Glass { ior, tint } => (layout::GLASS, tint, ior),
         Surface::Pane { ior, tint } => (layout::PANE, tint, ior),
     };
-    layout::Material { kind, color: color.to_array(), ior, ..Default::default() }
-}
-
-/// Lights in the renderer's unit, with the probability that a path starts at each.
-fn light_table(scene: &Scene, settings: &Settings) -> Vec<layout::Light> {
-    let power = |light: &crate::scene::Light| f64::from(light.intensity.element_sum());
-    let total: f64 = scene.lights.iter().map(power).sum();
-    let mut sum = 0.0;
-    let mut table: Vec<_> = scene
-        .lights
-        .iter()
-        .map(|light| {
-            let probability = match settings.light_sampling {
-                LightSampling::Power => power(light) / total,
-                LightSampling::Uniform => 1.0 / scene.lights.len() as f64,
-            };
-            sum += probability;
-            layout::Light {
-                position: light.position.to_array(),
-                intensity: light.intensity_in(settings.light_unit).to_array(),
-                cdf: sum as f32,
-                probability: probability as f32,
-            }
-        })
-        .collect();
-    // Rounding must not leave a gap below 1 that no light covers, nor choose a dark light at the end.
-    if let Some(last) = table.iter().rposition(|l| l.probability > 0.0) {
-        table[last..].iter_mut().for_each(|l| l.cdf = 1.0);
-    }
-    table
+    let emission = emission_in(material.emission, unit).to_array();
+    let double_sided = u32::from(material.double_sided);
+    layout::Material { kind, color: color.to_array(), emission, ior, double_sided, ..Default::default() }
 }

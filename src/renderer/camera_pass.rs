@@ -6,10 +6,10 @@ use super::{Session, count_faults, picture_size};
 use crate::{
     error::Result,
     gpu::Gpu,
-    image::Frame,
+    image::{Frame, PlaceInWhole},
     layout::{TilePixel, VisiblePoint},
     passes::{CameraTracer, GatherSettings, SceneBuffers, StepCount, Tile},
-    settings::Settings,
+    settings::{Crop, Settings},
     stats::{Stats, timed},
 };
 
@@ -23,6 +23,7 @@ pub(crate) struct CameraPass<'a> {
     /// The radiance estimate that the settings ask for.
     pub estimate: GatherSettings,
     size: (u32, u32),
+    window: Crop,
     direct: bool,
 }
 
@@ -37,13 +38,14 @@ impl<'a> CameraPass<'a> {
             tracer: CameraTracer::new(session.gpu, &session.buffers, camera, size, settings)?,
             estimate: GatherSettings::from(settings),
             size,
+            window: settings.window(size),
             direct: settings.mode.direct_by_rays(),
         })
     }
 
-    /// An empty film of the picture's size.
+    /// An empty film of the asked part of the picture.
     pub fn film(&self) -> Film {
-        Film::new(self.size)
+        Film::new(self.size, self.window)
     }
 
     /// Camera rays to the tile's visible points, and direct light there if the mode takes it from shadow rays.
@@ -82,19 +84,22 @@ impl<'a> CameraPass<'a> {
 
 /// Sums over samples, on the host: device memory does not grow with the picture.
 pub(crate) struct Film {
-    size: (u32, u32),
+    /// The whole picture, and the part of it that is here.
+    whole: (u32, u32),
+    window: Crop,
     sums: Vec<TilePixel>,
 }
 
 impl Film {
-    fn new(size: (u32, u32)) -> Self {
-        Self { size, sums: vec![TilePixel::default(); size.0 as usize * size.1 as usize] }
+    fn new(whole: (u32, u32), window: Crop) -> Self {
+        let pixels = window.width as usize * window.height as usize;
+        Self { whole, window, sums: vec![TilePixel::default(); pixels] }
     }
 
     fn add(&mut self, tracer: &CameraTracer, tile: &Tile, pixels: &[TilePixel]) {
         for (i, pixel) in (0..).zip(pixels) {
             let Some((x, y)) = tracer.pixel(tile, i) else { continue };
-            let sum = &mut self.sums[y as usize * self.size.0 as usize + x as usize];
+            let sum = &mut self.sums[y as usize * self.window.width as usize + x as usize];
             let add = |a: &mut [f32; 3], b: [f32; 3]| *a = (Vec3::from(*a) + Vec3::from(b)).to_array();
             add(&mut sum.radiance, pixel.radiance);
             add(&mut sum.normal, pixel.normal);
@@ -110,8 +115,9 @@ impl Film {
         let per_hit = |p: &TilePixel| if p.alpha > 0.0 { 1.0 / p.alpha } else { 0.0 };
         let scaled = |v: [f32; 3], s: f32| (Vec3::from(v) * s).to_array();
         Frame {
-            width: self.size.0,
-            height: self.size.1,
+            width: self.window.width,
+            height: self.window.height,
+            place: PlaceInWhole::of(self.whole, self.window),
             radiance: self.sums.iter().map(|p| scaled(p.radiance, per_sample)).collect(),
             alpha: self.sums.iter().map(|p| p.alpha * per_sample).collect(),
             depth: self.sums.iter().map(|p| p.depth * per_hit(p)).collect(),

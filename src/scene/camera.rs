@@ -1,10 +1,32 @@
 //! Cameras.
 
 use glam::Vec3;
+use serde::Serialize;
 
 use super::Bounds;
 
-/// A perspective camera.
+/// How a camera maps what it sees to a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Projection {
+    /// From one point; `yfov` is the full vertical angle of view, radians, 0 < yfov < π.
+    Perspective { yfov: f32 },
+    /// Along parallel rays; `ymag` is half the height of what is seen, metres, > 0.
+    Orthographic { ymag: f32 },
+}
+
+impl Projection {
+    /// Half the height of what is seen at a distance along the camera's axis, metres.
+    #[must_use]
+    pub fn half_height_at(&self, depth: f32) -> f32 {
+        match *self {
+            Projection::Perspective { yfov } => depth * (0.5 * yfov).tan(),
+            Projection::Orthographic { ymag } => ymag,
+        }
+    }
+}
+
+/// A camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     pub name: String,
@@ -13,8 +35,7 @@ pub struct Camera {
     pub right: Vec3,
     pub up: Vec3,
     pub forward: Vec3,
-    /// Full vertical angle of view, radians.
-    pub yfov: f32,
+    pub projection: Projection,
     /// Width over height, where the file says.
     pub aspect: Option<f32>,
 }
@@ -38,7 +59,7 @@ impl Camera {
             right: Vec3::X,
             up: Vec3::new(0.0, cos, -sin),
             forward: -back,
-            yfov,
+            projection: Projection::Perspective { yfov },
             aspect: None,
         }
     }

@@ -1,12 +1,12 @@
 //! What a file holds and how it is read, for `caustica info`.
 
-use std::fmt;
+use std::{f64::consts::PI, fmt};
 
 use serde::Serialize;
 
-use super::Scene;
+use super::{LightKind, Projection, Scene};
 
-/// Facts about a scene. Coordinates and angles are the file's: metres in its world, degrees.
+/// Facts about a scene. Coordinates are the file's: metres in its world. Angles are in radians.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneInfo {
     pub file_name: String,
@@ -17,29 +17,50 @@ pub struct SceneInfo {
     pub spheres: usize,
     /// Corners of the box around all geometry; none without any.
     pub bounds: Option<[[f64; 3]; 2]>,
+    /// Lights without extent.
     pub lights: Vec<LightInfo>,
+    /// Materials in use that give light.
+    pub emitters: Vec<EmitterInfo>,
     pub cameras: Vec<CameraInfo>,
     pub materials: Vec<MaterialInfo>,
     /// What is ignored or read in a special way.
     pub notes: Vec<String>,
 }
 
-/// A point light.
+/// A light without extent.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LightInfo {
     pub name: String,
-    pub position: [f64; 3],
-    /// Power in W, each channel: 4π I.
+    pub kind: LightKind,
+    /// None for a directional light.
+    pub position: Option<[f64; 3]>,
+    /// Unit vector along which it shines; none for a point light.
+    pub direction: Option<[f32; 3]>,
+    /// Power in W, each channel; of a directional light what the sphere around the scene's box catches.
     pub power: [f32; 3],
 }
 
-/// A perspective camera.
+/// All surfaces of one emissive material.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EmitterInfo {
+    pub name: String,
+    pub triangles: usize,
+    pub spheres: usize,
+    /// Square metres, one side.
+    pub area: f64,
+    /// W/(m² sr), each channel.
+    pub radiance: [f32; 3],
+    pub double_sided: bool,
+    /// Power in W, each channel: π times radiance and area, of both sides where the material has two.
+    pub power: [f64; 3],
+}
+
+/// A camera.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CameraInfo {
     pub name: String,
     pub position: [f64; 3],
-    /// Full vertical angle of view, degrees.
-    pub yfov: f32,
+    pub projection: Projection,
     /// Width over height, where the file says.
     pub aspect: Option<f32>,
 }
@@ -68,15 +89,18 @@ impl Scene {
             lights: (self.lights.iter())
                 .map(|light| LightInfo {
                     name: light.name.clone(),
-                    position: world(light.position),
+                    kind: light.kind,
+                    position: (light.kind != LightKind::Directional).then(|| world(light.position)),
+                    direction: (light.kind != LightKind::Point).then(|| light.direction.to_array()),
                     power: light.power(0.5 * bounds.diagonal()).to_array(),
                 })
                 .collect(),
+            emitters: self.emitters(),
             cameras: (self.cameras.iter())
                 .map(|camera| CameraInfo {
                     name: camera.name.clone(),
                     position: world(camera.position),
-                    yfov: camera.yfov.to_degrees(),
+                    projection: camera.projection,
                     aspect: camera.aspect,
                 })
                 .collect(),
@@ -86,18 +110,51 @@ impl Scene {
             notes: self.warnings.clone(),
         }
     }
+
+    /// The emissive materials that something shows.
+    fn emitters(&self) -> Vec<EmitterInfo> {
+        let mut emitters: Vec<EmitterInfo> = (self.materials.iter())
+            .map(|material| EmitterInfo {
+                name: material.name.clone(),
+                triangles: 0,
+                spheres: 0,
+                area: 0.0,
+                radiance: material.emission.to_array(),
+                double_sided: material.double_sided,
+                power: [0.0; 3],
+            })
+            .collect();
+        for triangle in &self.triangles {
+            let emitter = &mut emitters[triangle.material as usize];
+            emitter.triangles += 1;
+            emitter.area += triangle.area();
+        }
+        for sphere in &self.spheres {
+            let emitter = &mut emitters[sphere.material as usize];
+            emitter.spheres += 1;
+            emitter.area += sphere.area();
+        }
+        emitters.retain(|emitter| emitter.radiance != [0.0; 3] && emitter.area > 0.0);
+        for emitter in &mut emitters {
+            let sides = if emitter.double_sided { 2.0 } else { 1.0 };
+            emitter.power = emitter.radiance.map(|radiance| PI * sides * emitter.area * f64::from(radiance));
+        }
+        emitters
+    }
 }
 
 /// Three numbers with about six digits of the largest.
 fn triple(v: [f64; 3]) -> String {
     let largest = v.into_iter().map(f64::abs).fold(1e-6, f64::max);
+    v.map(|x| decimal(x, largest)).join(" ")
+}
+
+/// A number with about six digits of `largest`.
+fn decimal(x: f64, largest: f64) -> String {
     let digits = (5.0 - largest.log10().floor()).clamp(0.0, 9.0) as usize;
-    v.map(|x| {
-        let text = format!("{x:.digits$}");
-        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-        if text == "-0" { "0".to_owned() } else { text.to_owned() }
-    })
-    .join(" ")
+    let text = format!("{x:.digits$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 impl fmt::Display for SceneInfo {
@@ -111,16 +168,53 @@ impl fmt::Display for SceneInfo {
             Some([min, max]) => writeln!(f, "  bounds     {} .. {} m", triple(min), triple(max))?,
             None => writeln!(f, "  bounds     none: nothing to draw")?,
         }
-        section(f, "point lights", self.lights.iter(), |light| {
-            let power = triple(light.power.map(f64::from));
-            format!("{}  at {}  {power} W", light.name, triple(light.position))
-        })?;
+        section(f, "lights", self.lights.iter(), ToString::to_string)?;
+        section(f, "emissive materials", self.emitters.iter(), ToString::to_string)?;
         section(f, "cameras", self.cameras.iter(), |camera| {
             let aspect = camera.aspect.map_or(String::new(), |aspect| format!("  aspect {aspect}"));
-            format!("{}  at {}  yfov {:.2}°{aspect}", camera.name, triple(camera.position), camera.yfov)
+            let view = match camera.projection {
+                Projection::Perspective { yfov } => format!("yfov {:.2}°", yfov.to_degrees()),
+                Projection::Orthographic { ymag } => format!("orthographic, ymag {ymag} m"),
+            };
+            format!("{}  at {}  {view}{aspect}", camera.name, triple(camera.position))
         })?;
         section(f, "materials", self.materials.iter(), |material| format!("{}  {}", material.name, material.read_as))?;
         section(f, "notes", self.notes.iter(), Clone::clone)
+    }
+}
+
+impl fmt::Display for LightInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}  ", self.name)?;
+        match self.kind {
+            LightKind::Point => write!(f, "point")?,
+            LightKind::Spot { inner, outer } => {
+                write!(f, "spot {:.2}° to {:.2}°", inner.to_degrees(), outer.to_degrees())?;
+            }
+            LightKind::Directional => write!(f, "directional")?,
+        }
+        if let Some(position) = self.position {
+            write!(f, "  at {}", triple(position))?;
+        }
+        if let Some(direction) = self.direction {
+            write!(f, "  along {}", triple(direction.map(f64::from)))?;
+        }
+        write!(f, "  {} W", triple(self.power.map(f64::from)))
+    }
+}
+
+impl fmt::Display for EmitterInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let counted = |n: usize, what: &str| match n {
+            0 => String::new(),
+            1 => format!("  1 {what}"),
+            n => format!("  {n} {what}s"),
+        };
+        let shapes = counted(self.triangles, "triangle") + &counted(self.spheres, "sphere");
+        let sides = if self.double_sided { " on both sides" } else { "" };
+        let area = decimal(self.area, self.area.max(1e-6));
+        let radiance = triple(self.radiance.map(f64::from));
+        write!(f, "{}{shapes}  {area} m²{sides}  {radiance} W/(m² sr)  {} W", self.name, triple(self.power))
     }
 }
 

@@ -1,6 +1,14 @@
 //! Light from all around, infinitely far away.
 
-use glam::Vec3;
+use std::{f64::consts::TAU, path::Path};
+
+use glam::{DVec3, Vec3};
+use sha2::{Digest as _, Sha256};
+
+use crate::{
+    Error, Result,
+    image::{decode_radiance, read_radiance_bytes},
+};
 
 /// An equirectangular picture of the radiance that arrives from each direction: row 0 is the top (+Y), and a direction
 /// (x, y, z) lies at u = 0.5 + atan2(z, x)/2π, v = acos(y)/π, before the rotation.
@@ -19,20 +27,212 @@ pub struct Environment {
     pub strength: f32,
     /// Turn about +Y, radians, counterclockwise as seen from above: what lay at direction d lies at d so turned.
     pub rotation: f32,
+    /// What of the file was read in a special way, one line each.
+    pub warnings: Vec<String>,
 }
 
 impl Environment {
+    /// Reads an OpenEXR or Radiance HDR file, whichever it is by its content. OpenEXR: any type of sample; R, G and B,
+    /// or luminance alone, of the first part and layer that has them. `strength` is a factor ≥ 0, `rotation` in degrees.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, is damaged, or has more than 2²⁷ pixels; [`Error::Setting`] for a
+    /// strength or rotation that is no such number, or a strength that takes the brightest pixel beyond all numbers.
+    pub fn load(path: &Path, strength: f32, rotation: f32) -> Result<Self> {
+        let wrong = |name, value: f32, problem: &str| Error::Setting {
+            name,
+            value: value.to_string(),
+            problem: problem.to_owned(),
+        };
+        if !(strength.is_finite() && strength >= 0.0) {
+            return Err(wrong("environment strength", strength, "is not a number from 0"));
+        }
+        if !rotation.is_finite() {
+            return Err(wrong("environment rotation", rotation, "is not a number of degrees"));
+        }
+        let bytes = read_radiance_bytes(path)?;
+        let picture = decode_radiance(path, &bytes)?;
+        let brightest = picture.pixels.as_flattened().iter().copied().fold(0.0, f32::max);
+        if !(brightest * strength).is_finite() {
+            let problem = format!("the brightest pixel of {}, {brightest:e}, gets infinitely bright", path.display());
+            return Err(wrong("environment strength", strength, &problem));
+        }
+        let name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+        let warnings = picture.notes.into_iter().map(|note| format!("{name}: {note}")).collect();
+        Ok(Self {
+            name,
+            hash: hash(&bytes),
+            width: picture.width,
+            height: picture.height,
+            pixels: picture.pixels,
+            strength,
+            rotation: rotation.rem_euclid(360.0).to_radians(),
+            warnings,
+        })
+    }
+
     /// The same radiance from everywhere.
     #[must_use]
     pub fn uniform(radiance: Vec3) -> Self {
         Self {
             name: "background".to_owned(),
-            hash: String::new(),
+            hash: hash(bytemuck::bytes_of(&radiance)),
             width: 1,
             height: 1,
             pixels: vec![radiance.to_array()],
             strength: 1.0,
             rotation: 0.0,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// It gives no light at all.
+    #[must_use]
+    pub fn is_dark(&self) -> bool {
+        self.strength == 0.0 || self.pixels.iter().all(|pixel| *pixel == [0.0; 3])
+    }
+
+    /// Radiance that arrives from a direction (a unit vector), W/(m² sr): bilinear between the middles of pixels, around
+    /// the horizon without a seam, and above the top row's and below the bottom row's middles as there.
+    #[must_use]
+    pub fn radiance(&self, direction: Vec3) -> Vec3 {
+        let DVec3 { x, y, z } = direction.as_dvec3();
+        // A turn counterclockwise lessens the azimuth atan2(z, x), since z points to the viewer from above.
+        let u = 0.5 + (z.atan2(x) + f64::from(self.rotation)) / TAU;
+        let v = y.clamp(-1.0, 1.0).acos() / (0.5 * TAU);
+        let (width, height) = (i64::from(self.width), i64::from(self.height));
+        let (column, row) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
+        let (left, top) = (column.floor(), row.floor());
+        let pixel = |dx: i64, dy: i64| {
+            let (x, y) = ((left as i64 + dx).rem_euclid(width), (top as i64 + dy).clamp(0, height - 1));
+            Vec3::from(self.pixels[(y * width + x) as usize])
+        };
+        let (across, down) = ((column - left) as f32, (row - top) as f32);
+        let above = pixel(0, 0).lerp(pixel(1, 0), across);
+        let below = pixel(0, 1).lerp(pixel(1, 1), across);
+        self.strength * above.lerp(below, down)
+    }
+}
+
+/// SHA-256 in hexadecimal.
+fn hash(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::FRAC_1_SQRT_2;
+
+    use super::*;
+
+    /// Eight columns and four rows, each pixel of a colour of its own: red counts columns, green rows.
+    fn map() -> Environment {
+        let pixels = (0..32).map(|i| [(i % 8) as f32, (i / 8) as f32, 1.0]).collect();
+        Environment { width: 8, height: 4, pixels, ..Environment::uniform(Vec3::ZERO) }
+    }
+
+    fn assert_near(found: Vec3, expected: Vec3) {
+        assert!((found - expected).length() < 1e-5, "{found}, expected {expected}");
+    }
+
+    #[test]
+    fn directions_lie_where_three_js_has_them() {
+        let map = map();
+        // u = 0.5 + atan2(z, x)/2π: +X is the middle of the picture, +Z three quarters, -Z one quarter, -X both ends.
+        // Between two columns both count half; the horizon is between the rows 1 and 2.
+        for (direction, column, row) in [
+            (Vec3::X, 3.5, 1.5),
+            (Vec3::Z, 5.5, 1.5),
+            (Vec3::NEG_Z, 1.5, 1.5),
+            (Vec3::NEG_X, 3.5, 1.5),
+            (Vec3::new(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0), 3.5, 0.5),
+            (Vec3::new(0.0, -FRAC_1_SQRT_2, FRAC_1_SQRT_2), 5.5, 2.5),
+        ] {
+            assert_near(map.radiance(direction), Vec3::new(column, row, 1.0));
+        }
+        // The poles take the outer rows as they are.
+        assert_eq!((map.radiance(Vec3::Y).y, map.radiance(Vec3::NEG_Y).y), (0.0, 3.0));
+        // The middle of a pixel is that pixel.
+        let (sin, cos) = (std::f32::consts::TAU * (2.5 / 8.0 - 0.5)).sin_cos();
+        let v = std::f32::consts::PI * 2.5 / 4.0;
+        assert_near(map.radiance(Vec3::new(cos * v.sin(), v.cos(), sin * v.sin())), Vec3::new(2.0, 2.0, 1.0));
+    }
+
+    #[test]
+    fn the_seam_is_none_and_pixels_blend() {
+        let map = map();
+        let at = |u: f32| {
+            let (sin, cos) = (std::f32::consts::TAU * (u - 0.5)).sin_cos();
+            map.radiance(Vec3::new(cos, 0.0, sin)).x
+        };
+        // From the middle of the last column to that of the first: 7, then 0.
+        for (u, expected) in [(7.5, 7.0), (7.75, 5.25), (8.0, 3.5), (0.0, 3.5), (0.25, 1.75), (0.5, 0.0), (1.25, 0.75)]
+        {
+            assert!((at(u / 8.0) - expected).abs() < 1e-4, "{u}: {}", at(u / 8.0));
+        }
+    }
+
+    #[test]
+    fn rotation_turns_the_map_and_strength_scales_it() {
+        let (plain, degrees) = (map(), 40.0_f32);
+        let turned = Environment { rotation: degrees.to_radians(), strength: 3.0, ..map() };
+        let turn = |by: f32| glam::Quat::from_rotation_y(by.to_radians());
+        for d in [Vec3::X, Vec3::new(0.3, 0.2, -0.8).normalize(), Vec3::new(-0.5, -0.7, 0.1).normalize()] {
+            assert_near(turned.radiance(turn(degrees) * d) / 3.0, plain.radiance(d));
+            assert!((turned.radiance(turn(-degrees) * d) / 3.0 - plain.radiance(d)).length() > 0.1, "control: {d}");
+        }
+        // Counterclockwise from above: a quarter turn takes +X to -Z.
+        let quarter = Environment { rotation: 90_f32.to_radians(), ..map() };
+        assert_near(quarter.radiance(Vec3::NEG_Z), plain.radiance(Vec3::X));
+    }
+
+    #[test]
+    fn a_uniform_one_is_the_same_from_everywhere() {
+        let (sky, other) = (Environment::uniform(Vec3::new(1.0, 2.0, 3.0)), Environment::uniform(Vec3::ONE));
+        for d in [Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(-0.6, 0.0, 0.8)] {
+            assert_near(sky.radiance(d), Vec3::new(1.0, 2.0, 3.0));
+        }
+        assert!(!sky.is_dark() && Environment::uniform(Vec3::ZERO).is_dark());
+        assert!(Environment { strength: 0.0, ..sky.clone() }.is_dark());
+        assert!(sky.hash.len() == 64 && sky.hash != other.hash);
+    }
+
+    #[test]
+    fn files_are_read_and_faults_are_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("sky.hdr");
+        // One pixel of radiance 1, 0.5 and 0; one of 2^126.
+        let write = |exponent: u8| {
+            let bytes = [&b"#?RGBE\nEXPOSURE=2\n\n-Y 1 +X 1\n"[..], &[128, 64, 0, exponent]].concat();
+            std::fs::write(&path, bytes).expect("can be written");
+        };
+        let load = |strength: f32, rotation: f32| Environment::load(&path, strength, rotation);
+        write(129);
+        let sky = load(2.0, -90.0).expect("it loads");
+        assert_eq!((sky.name.as_str(), sky.strength, sky.rotation), ("sky.hdr", 2.0, 270_f32.to_radians()));
+        assert_eq!(sky.warnings, ["sky.hdr: its EXPOSURE of 2 is not undone, as in other renderers"]);
+        assert_near(sky.radiance(Vec3::X), Vec3::new(2.0, 1.0, 0.0));
+        let digest = "1ac12aad04ffe539158961e10343c4890259a58a56ba06051e566d69e6bc50a3";
+        assert_eq!(sky.hash, digest);
+        write(255);
+        assert_ne!(load(1.0, 0.0).expect("it loads").hash, digest);
+        let refused = |strength: f32, rotation: f32| {
+            let error = load(strength, rotation).expect_err("it must be refused").to_string();
+            error.replace(&path.display().to_string(), "sky.hdr")
+        };
+        for (strength, rotation, expected) in [
+            (-1.0, 0.0, "environment strength -1: is not a number from 0"),
+            (f32::NAN, 0.0, "environment strength NaN: is not a number from 0"),
+            (f32::INFINITY, 0.0, "environment strength inf: is not a number from 0"),
+            (1.0, f32::INFINITY, "environment rotation inf: is not a number of degrees"),
+            (
+                8.0,
+                0.0,
+                "environment strength 8: the brightest pixel of sky.hdr, 8.507059e37, gets \
+                 infinitely bright",
+            ),
+        ] {
+            assert_eq!(refused(strength, rotation), expected);
         }
     }
 }

@@ -4,6 +4,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use serde::Serialize;
 
 use crate::settings::LightUnit;
 
@@ -11,7 +12,8 @@ use crate::settings::LightUnit;
 pub const LUMENS_PER_WATT: f32 = 683.0;
 
 /// How a light without extent shines (KHR_lights_punctual).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum LightKind {
     /// Alike in all directions.
     Point,
@@ -45,13 +47,22 @@ impl Light {
         }
     }
 
-    /// Power, W in each channel: of a point light 4π I. A directional light sends as much as a disc of `scene_radius`,
-    /// metres, catches.
+    /// Integral over all directions of the share of `intensity` that goes there, sr; 0 for a directional light.
+    #[must_use]
+    pub fn solid_angle(&self) -> f32 {
+        match self.kind {
+            LightKind::Point => 4.0 * PI,
+            LightKind::Spot { inner, outer } => spot_solid_angle(inner, outer),
+            LightKind::Directional => 0.0,
+        }
+    }
+
+    /// Power, W in each channel: intensity times solid angle. A directional light sends as much as a disc of
+    /// `scene_radius`, metres, catches.
     #[must_use]
     pub fn power(&self, scene_radius: f32) -> Vec3 {
         match self.kind {
-            LightKind::Point => 4.0 * PI * self.intensity,
-            LightKind::Spot { inner, outer } => self.intensity * spot_solid_angle(inner, outer),
+            LightKind::Point | LightKind::Spot { .. } => self.solid_angle() * self.intensity,
             LightKind::Directional => PI * scene_radius * scene_radius * self.intensity,
         }
     }

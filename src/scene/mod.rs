@@ -1,12 +1,16 @@
 //! What a file holds, in the renderer's own nouns. Coordinates are metres, right-handed, +Y up, relative to
 //! [`Scene::center`].
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use crate::{Error, Result};
+use crate::{
+    Error, Result,
+    image::{EnvironmentOrigin, Origin},
+    settings::Settings,
+    stats::Stats,
+};
 
 mod camera;
 mod describe;
@@ -16,8 +20,8 @@ mod light;
 mod material;
 mod shape;
 
-pub use camera::Camera;
-pub use describe::{CameraInfo, LightInfo, MaterialInfo, SceneInfo};
+pub use camera::{Camera, Projection};
+pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};
 pub use environment::Environment;
 pub use light::{LEAST_FALLOFF, LUMENS_PER_WATT, Light, LightKind};
 pub use material::{Material, Surface};
@@ -47,8 +51,6 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// Number of meshes in the file.
     pub mesh_count: usize,
-    /// Kinds of light that the scene holds and that are not read, with their number.
-    pub unread_lights: BTreeMap<&'static str, usize>,
 }
 
 impl Scene {
@@ -70,10 +72,34 @@ impl Scene {
     /// Some surface scatters into single directions only, so that there can be caustics.
     #[must_use]
     pub fn has_delta(&self) -> bool {
-        let delta: Vec<bool> = self.materials.iter().map(|material| material.surface.is_delta()).collect();
-        let is_delta = |material: u32| delta.get(material as usize) == Some(&true);
-        self.triangles.iter().any(|triangle| is_delta(triangle.material))
-            || self.spheres.iter().any(|sphere| is_delta(sphere.material))
+        self.shows(|material| material.surface.is_delta())
+    }
+
+    /// Some surface gives light by itself.
+    #[must_use]
+    pub fn has_emission(&self) -> bool {
+        self.shows(|material| material.emission != Vec3::ZERO)
+    }
+
+    /// Some triangle or sphere has such a material.
+    fn shows(&self, such: impl Fn(&Material) -> bool) -> bool {
+        let such: Vec<bool> = self.materials.iter().map(such).collect();
+        let is_such = |material: u32| such.get(material as usize) == Some(&true);
+        self.triangles.iter().any(|triangle| is_such(triangle.material))
+            || self.spheres.iter().any(|sphere| is_such(sphere.material))
+    }
+
+    /// What a picture's file is to tell of where it comes from.
+    #[must_use]
+    pub fn origin<'a>(&'a self, settings: &'a Settings, stats: &'a Stats) -> Origin<'a> {
+        let environment = self.environment.as_ref().map(|environment| EnvironmentOrigin {
+            name: &environment.name,
+            hash: &environment.hash,
+            radiance: (environment.pixels.len() == 1).then(|| environment.pixels[0]),
+            strength: environment.strength,
+            rotation: environment.rotation,
+        });
+        Origin { scene: &self.file_name, scene_hash: &self.hash, environment, settings, stats }
     }
 
     /// The camera of that name, or of that number in [`Scene::cameras`]; the first if none is asked for.
@@ -102,7 +128,7 @@ impl Scene {
     /// Whether there is something to draw and light to see it by.
     ///
     /// # Errors
-    /// [`Error::Scene`] that says what is there but not read yet.
+    /// [`Error::Scene`] that says what is missing.
     pub fn check_renderable(&self) -> Result<()> {
         let error =
             |place: &str, problem: String| Error::Scene { path: self.path.clone(), place: place.to_owned(), problem };
@@ -111,20 +137,12 @@ impl Scene {
                 if self.warnings.is_empty() { String::new() } else { format!(" ({})", self.warnings.join("; ")) };
             return Err(error("scene", format!("nothing to draw: it holds no triangle and no sphere{notes}")));
         }
-        if self.lights.is_empty() {
-            let unread: Vec<String> = self.unread_lights.iter().map(|(kind, n)| counted(*n, kind)).collect();
-            let problem = if unread.is_empty() {
-                "no light: add a point light (KHR_lights_punctual)".to_owned()
-            } else {
-                format!("no light that is read yet: it holds {}; add a point light", unread.join(" and "))
-            };
-            return Err(error("scene", problem));
+        if self.lights.is_empty() && !self.has_emission() && self.environment.as_ref().is_none_or(Environment::is_dark)
+        {
+            let problem = "no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give \
+                           --env or --background";
+            return Err(error("scene", problem.to_owned()));
         }
         Ok(())
     }
-}
-
-/// "1 spot light", "2 spot lights".
-fn counted(n: usize, what: &str) -> String {
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }

@@ -1,5 +1,7 @@
 //! What light meets: triangles and exact spheres.
 
+use std::f64::consts::PI;
+
 use glam::Vec3;
 
 /// A triangle in scene coordinates; its outside is where the corners run counterclockwise.
@@ -20,6 +22,13 @@ impl Triangle {
         let [a, b, c] = self.positions.map(Vec3::as_dvec3);
         (b - a).cross(c - a).normalize_or_zero().as_vec3()
     }
+
+    /// Square metres.
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        let [a, b, c] = self.positions.map(Vec3::as_dvec3);
+        0.5 * (b - a).cross(c - a).length()
+    }
 }
 
 /// An exact sphere.
@@ -30,6 +39,14 @@ pub struct Sphere {
     pub radius: f32,
     /// Index into [`Scene::materials`](super::Scene::materials).
     pub material: u32,
+}
+
+impl Sphere {
+    /// Square metres.
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        4.0 * PI * f64::from(self.radius).powi(2)
+    }
 }
 
 /// An axis-aligned box.

@@ -12,8 +12,8 @@ use super::radii::Radii;
 use crate::{
     error::{Error, Result},
     gpu::Gpu,
-    image::{Frame, Origin, read_exr, write_exr, write_file},
-    scene::Scene,
+    image::{Frame, read_exr, write_exr, write_file},
+    scene::{Environment, Scene},
     settings::Settings,
     stats::Stats,
 };
@@ -23,12 +23,16 @@ use crate::{
 pub(super) struct Key(String);
 
 impl Key {
-    /// Scenes count by the bytes of their files ([`Scene::hash`]), not by their names.
+    /// Scenes and environments count by the bytes of their files ([`Scene::hash`]), not by their names.
     pub fn new(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Self {
         let settings = serde_json::to_string(settings).expect("settings hold nothing that JSON cannot");
         let (version, hash) = (env!("CARGO_PKG_VERSION"), &scene.hash);
+        let environment = scene.environment.as_ref().map_or(String::new(), |environment| {
+            let Environment { hash, strength, rotation, .. } = environment;
+            format!("environment {hash} strength {strength} rotation {rotation}\n")
+        });
         Self(format!(
-            "caustica {version}\nscene {hash}\nsettings {settings}\nadapter {}\ndriver {}",
+            "caustica {version}\nscene {hash}\n{environment}settings {settings}\nadapter {}\ndriver {}",
             gpu.name, gpu.driver
         ))
     }
@@ -89,7 +93,7 @@ impl Cells {
 
     /// The record is written last: it says that the picture is there.
     pub fn keep(&self, key: &Key, scene: &Scene, settings: &Settings, frame: &Frame, measured: Measured) -> Result<()> {
-        let origin = Origin { scene: &scene.file_name, scene_hash: &scene.hash, settings, stats: &measured.stats };
+        let origin = scene.origin(settings, &measured.stats);
         write_exr(&self.picture_path(key), frame, &origin)?;
         let path = self.record_path(key);
         let text = serde_json::to_vec_pretty(&Record { key: key.0.clone(), measured })

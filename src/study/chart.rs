@@ -124,13 +124,9 @@ pub(super) fn heat_map(title: &str, columns: &[String], rows: &[String], values:
 
 /// A colour of the scale viridis, 0 to 1, and one that reads on it; neither is [`INK`].
 fn viridis(place: f64) -> (RGBColor, RGBColor) {
-    const STOPS: [[f64; 3]; 5] =
-        [[68.0, 1.0, 84.0], [59.0, 82.0, 139.0], [33.0, 145.0, 140.0], [94.0, 201.0, 98.0], [253.0, 231.0, 37.0]];
-    let at = place.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
-    let stop = (at as usize).min(STOPS.len() - 2);
-    let mixed = |c: usize| (STOPS[stop][c] + (STOPS[stop + 1][c] - STOPS[stop][c]) * (at - stop as f64)).round() as u8;
+    let [r, g, b] = colorous::VIRIDIS.eval_continuous(place.clamp(0.0, 1.0)).as_array();
     let ink = if place < 0.55 { RGBColor(255, 255, 255) } else { RGBColor(1, 1, 1) };
-    (RGBColor(mixed(0), mixed(1), mixed(2)), ink)
+    (RGBColor(r, g, b), ink)
 }
 
 fn svg(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {

@@ -3,7 +3,10 @@
 
 use glam::Vec3;
 
-use crate::{image::Frame, scene::Camera};
+use crate::{
+    image::Frame,
+    scene::{Camera, Projection},
+};
 
 /// Cosine between normals below which surfaces meet in a corner and not in a curve.
 const BENT: f32 = 0.7;
@@ -39,27 +42,32 @@ struct Points<'a> {
     frame: &'a Frame,
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
-    /// Width of a pixel at distance 1, metres.
-    pixel: f32,
+    /// Width of each pixel where its first hit is, metres.
+    widths: Vec<f32>,
 }
 
 impl<'a> Points<'a> {
     fn new(frame: &'a Frame, camera: &Camera) -> Self {
         let (width, height) = (frame.width as usize, frame.height as f32);
-        let half = (camera.yfov / 2.0).tan();
-        let pixel = 2.0 * half / height;
-        let ray = |i: usize| {
-            let x = ((i % width) as f32 + 0.5 - width as f32 / 2.0) * pixel;
-            let y = (height / 2.0 - (i / width) as f32 - 0.5) * pixel;
-            camera.forward + camera.right * x + camera.up * y
+        let widths: Vec<f32> =
+            frame.depth.iter().map(|&depth| 2.0 * camera.projection.half_height_at(depth) / height).collect();
+        let across = |i: usize| {
+            let x = ((i % width) as f32 + 0.5 - width as f32 / 2.0) * widths[i];
+            let y = (height / 2.0 - (i / width) as f32 - 0.5) * widths[i];
+            camera.right * x + camera.up * y
         };
-        let positions: Vec<_> = (0..frame.pixels()).map(|i| camera.position + ray(i) * frame.depth[i]).collect();
+        let position = |i: usize| camera.position + across(i) + camera.forward * frame.depth[i];
+        let positions: Vec<_> = (0..frame.pixels()).map(position).collect();
+        let view = |i: usize| match camera.projection {
+            Projection::Perspective { .. } => positions[i] - camera.position,
+            Projection::Orthographic { .. } => camera.forward,
+        };
         let towards_viewer = |i: usize| {
             let normal = Vec3::from(frame.normal[i]);
-            if normal.dot(positions[i] - camera.position) > 0.0 { -normal } else { normal }
+            if normal.dot(view(i)) > 0.0 { -normal } else { normal }
         };
         let normals = (0..frame.pixels()).map(towards_viewer).collect();
-        Self { frame, positions, normals, pixel }
+        Self { frame, positions, normals, widths }
     }
 
     /// Whether the surfaces at two pixels, `step` apart, belong to one concave corner: neither is the silhouette of
@@ -68,7 +76,7 @@ impl<'a> Points<'a> {
         // Pixels that hold more than one surface have no normal of their own.
         let whole = |i: usize| self.frame.alpha[i] > 0.99 && self.normals[i].length_squared() > 0.98;
         let (na, nb, between) = (self.normals[a], self.normals[b], self.positions[b] - self.positions[a]);
-        let near = 8.0 * self.pixel * step as f32 * self.frame.depth[a].min(self.frame.depth[b]);
+        let near = 8.0 * step as f32 * self.widths[a].min(self.widths[b]);
         let slack = 0.05 * between.length();
         whole(a)
             && whole(b)
@@ -93,7 +101,7 @@ mod tests {
             right: Vec3::X,
             up: Vec3::Y,
             forward: -Vec3::Z,
-            yfov: std::f32::consts::FRAC_PI_2,
+            projection: Projection::Perspective { yfov: std::f32::consts::FRAC_PI_2 },
             aspect: None,
         };
         let mut frame = Frame { width: SIZE, height: SIZE, ..Frame::default() };
@@ -111,6 +119,18 @@ mod tests {
     #[test]
     fn a_corner_is_found_where_the_planes_meet() {
         let (frame, camera) = wedge(1.0);
+        let region = corner_region(&frame, &camera);
+        let row: Vec<usize> = (0..SIZE as usize).filter(|&x| region[5 * SIZE as usize + x]).collect();
+        assert_eq!(row, [23, 24]);
+    }
+
+    #[test]
+    fn an_orthographic_camera_finds_it_too() {
+        let camera = Camera { projection: Projection::Orthographic { ymag: 2.0 }, ..wedge(1.0).1 };
+        let mut frame = wedge(1.0).0;
+        for (i, depth) in frame.depth.iter_mut().enumerate() {
+            *depth = 2.0 - 2.0 * (((i % SIZE as usize) as f32 + 0.5) / SIZE as f32 * 2.0 - 1.0).abs();
+        }
         let region = corner_region(&frame, &camera);
         let row: Vec<usize> = (0..SIZE as usize).filter(|&x| region[5 * SIZE as usize + x]).collect();
         assert_eq!(row, [23, 24]);

@@ -30,6 +30,11 @@ pub(super) fn photon_part(settings: &Settings) -> Settings {
         spp: free.spp,
         size: free.size,
         camera: free.camera,
+        share_reach: free.share_reach,
+        pixel_filter: free.pixel_filter,
+        aperture: free.aperture,
+        focus: free.focus,
+        crop: free.crop,
         ..settings.clone()
     }
 }

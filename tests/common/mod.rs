@@ -7,7 +7,7 @@ use caustica::{
     gpu::Gpu,
     progress::Silent,
     renderer::{Render, render},
-    scene::{Camera, Light, LightKind, Material, Scene, Sphere, Surface, Triangle},
+    scene::{Camera, Light, LightKind, Material, Projection, Scene, Sphere, Surface, Triangle},
     settings::{Mode, Settings},
 };
 use glam::Vec3;
@@ -44,13 +44,18 @@ pub fn point_light(position: Vec3, intensity: f32) -> Light {
     }
 }
 
+/// A diffuse material that shines.
+pub fn emissive(name: &str, albedo: f32, emission: f32, double_sided: bool) -> Material {
+    Material { name: name.to_owned(), surface: diffuse(albedo), emission: Vec3::splat(emission), double_sided }
+}
+
 /// A camera at `position` that looks at `target`; full vertical angle in degrees.
 pub fn camera(position: Vec3, target: Vec3, degrees: f32) -> Camera {
     let forward = (target - position).normalize();
     let helper = if forward.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
     let right = forward.cross(helper).normalize();
-    let yfov = degrees.to_radians();
-    Camera { name: String::new(), position, right, up: right.cross(forward), forward, yfov, aspect: Some(1.0) }
+    let projection = Projection::Perspective { yfov: degrees.to_radians() };
+    Camera { name: String::new(), position, right, up: right.cross(forward), forward, projection, aspect: Some(1.0) }
 }
 
 pub fn sphere(center: Vec3, radius: f32, material: u32) -> Sphere {

@@ -29,9 +29,11 @@ pub(super) fn default_material(notes: &mut Notes) -> Read<Material> {
 pub(super) fn read(root: &json::Root, index: usize, notes: &mut Notes) -> Read<Material> {
     let material = &root.materials[index];
     let name = name(material, index);
-    let surface = surface(material, &name, &format!("materials[{index}]"), notes)?;
-    note_unread(material, &name, notes);
-    Ok(Material { name, surface, emission: Vec3::ZERO, double_sided: false })
+    let place = format!("materials[{index}]");
+    let surface = surface(material, &name, &place, notes)?;
+    let emission = emission(material, &name, &place, notes)?;
+    note_unread(material, notes);
+    Ok(Material { name, surface, emission, double_sided: material.double_sided })
 }
 
 /// The surface that comes nearest.
@@ -109,13 +111,31 @@ fn ior(material: &json::Material, place: &str) -> Read<f32> {
     }
 }
 
-/// The material gives light, which is not read yet.
-pub(super) fn is_emissive(material: &json::Material) -> bool {
-    material.emissive_factor.0.iter().any(|factor| *factor > 0.0)
+/// Radiance that the surface sends out: its factor times its strength, nits read as W/(m² sr).
+fn emission(material: &json::Material, name: &str, place: &str, notes: &mut Notes) -> Read<Vec3> {
+    let factor = Vec3::from_array(material.emissive_factor.0);
+    if !factor.is_finite() || factor.min_element() < 0.0 {
+        let [r, g, b] = factor.to_array();
+        return fault(format!("{place}.emissiveFactor"), format!("{r} {g} {b} is not a colour of positive numbers"));
+    }
+    let strength = material.extensions.as_ref().and_then(|extensions| extensions.emissive_strength.as_ref());
+    let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
+    let emission = factor * strength;
+    if !(strength >= 0.0 && strength.is_finite() && emission.is_finite()) {
+        let at = format!("{place}.extensions.KHR_materials_emissive_strength.emissiveStrength");
+        return fault(at, format!("{strength} is not a positive number that its factor can be multiplied by"));
+    }
+    if material.emissive_texture.is_some() && emission != Vec3::ZERO {
+        notes.add(format!(
+            "material {name:?}: its emissive texture is not read yet: all of its surface gives light by the factor \
+             alone, also where the texture is dark"
+        ));
+    }
+    Ok(emission)
 }
 
 /// Names what the material has beyond its factors.
-fn note_unread(material: &json::Material, name: &str, notes: &mut Notes) {
+fn note_unread(material: &json::Material, notes: &mut Notes) {
     let pbr = &material.pbr_metallic_roughness;
     let extensions = material.extensions.as_ref();
     let transmission = extensions.and_then(|e| e.transmission.as_ref());
@@ -125,15 +145,11 @@ fn note_unread(material: &json::Material, name: &str, notes: &mut Notes) {
         || pbr.metallic_roughness_texture.is_some()
         || material.normal_texture.is_some()
         || material.occlusion_texture.is_some()
-        || material.emissive_texture.is_some()
         || transmission.is_some_and(|transmission| transmission.transmission_texture.is_some())
         || volume.is_some_and(|volume| volume.thickness_texture.is_some())
         || specular.is_some_and(|s| s.specular_texture.is_some() || s.specular_color_texture.is_some());
     if textured {
         notes.add("textures are not read yet: factors alone are used");
-    }
-    if is_emissive(material) {
-        notes.add(format!("material {name:?}: emission is not read yet"));
     }
     if volume.is_some_and(|volume| volume.attenuation_distance.0.is_finite() && volume.attenuation_color.0 != [1.0; 3])
     {

@@ -6,7 +6,7 @@
 use std::io;
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use gltf::json;
 use sha2::{Digest as _, Sha256};
 
@@ -15,18 +15,21 @@ use crate::{Error, Result};
 
 mod accessor;
 mod buffers;
+mod cameras;
 mod container;
 mod fault;
+mod lights;
 mod materials;
 mod meshes;
 mod nodes;
-mod objects;
 mod placing;
+mod spheres;
 
 use accessor::Document;
 use fault::{Notes, Read, fault};
-use objects::{PlacedLight, PlacedSphere};
+use lights::PlacedLight;
 use placing::{Shown, TOO_FAR, WorldBounds};
+use spheres::PlacedSphere;
 
 /// Reads a file into a scene.
 pub(super) fn load(path: &Path) -> Result<Scene> {
@@ -70,7 +73,7 @@ fn read(bytes: &[u8], folder: &Path) -> Read<Scene> {
     carried
         .lights
         .iter()
-        .map(|(at, _)| at)
+        .filter_map(|(at, _)| at.as_ref())
         .chain(carried.cameras.iter().map(|(_, at, _)| at))
         .for_each(|at| reach.add(*at, 0.0));
     if !reach.fits() {
@@ -109,9 +112,6 @@ fn read_materials(
             continue;
         }
         scene.materials.push(materials::read(root, i, notes)?);
-        if materials::is_emissive(&root.materials[i]) {
-            *scene.unread_lights.entry("emissive material").or_default() += 1;
-        }
     }
     Ok(slots)
 }
@@ -119,27 +119,19 @@ fn read_materials(
 /// What the nodes carry besides meshes, in the world.
 #[derive(Default)]
 struct Carried {
-    lights: Vec<(DVec3, Light)>,
+    lights: Vec<PlacedLight>,
     /// With the number in the file, which decides their order.
     cameras: Vec<(usize, DVec3, Camera)>,
     spheres: Vec<PlacedSphere>,
-    unread_lights: Vec<&'static str>,
 }
 
 impl Carried {
     fn read(root: &json::Root, placed: &[nodes::Placed], notes: &mut Notes) -> Read<Self> {
         let mut carried = Self::default();
         for placed in placed {
-            match objects::light(root, placed, notes)? {
-                Some(PlacedLight::Point(position, light)) => carried.lights.push((position, light)),
-                Some(PlacedLight::Unread(kind)) => {
-                    notes.add(format!("{kind}s are not read yet"));
-                    carried.unread_lights.push(kind);
-                }
-                Some(PlacedLight::Dark) | None => {}
-            }
-            carried.cameras.extend(objects::camera(root, placed, notes)?);
-            carried.spheres.extend(objects::sphere(root, placed, notes)?);
+            carried.lights.extend(lights::read(root, placed, notes)?);
+            carried.cameras.extend(cameras::read(root, placed)?);
+            carried.spheres.extend(spheres::read(root, placed, notes)?);
         }
         carried.cameras.sort_by_key(|(index, ..)| *index);
         Ok(carried)
@@ -149,13 +141,13 @@ impl Carried {
     fn finish(self, scene: &mut Scene, notes: &mut Notes) {
         let center = scene.center;
         let at = |position: DVec3| (position - center).as_vec3();
-        scene.lights = self.lights.into_iter().map(|(p, light)| Light { position: at(p), ..light }).collect();
+        let light = |(p, light): PlacedLight| Light { position: p.map_or(Vec3::ZERO, at), ..light };
+        scene.lights = self.lights.into_iter().map(light).collect();
         scene.cameras = self.cameras.into_iter().map(|(_, p, camera)| Camera { position: at(p), ..camera }).collect();
-        self.unread_lights.iter().for_each(|kind| *scene.unread_lights.entry(kind).or_default() += 1);
         if scene.cameras.is_empty() {
             let bounds = scene.bounds();
             if bounds != Bounds::EMPTY {
-                notes.add("no perspective camera: one is made that frames the whole scene");
+                notes.add("no camera: one is made that frames the whole scene");
             }
             scene.cameras.push(Camera::framing(bounds));
         }

@@ -1,0 +1,46 @@
+//! Options of the light from all around.
+
+use std::path::PathBuf;
+
+use caustica::{
+    Result,
+    scene::{Environment, Scene},
+};
+
+use super::values::{color, rotation, strength};
+
+/// Light from infinitely far away, which no glTF file holds.
+#[derive(Debug, clap::Args)]
+pub struct EnvironmentOptions {
+    /// Light from all around: equirectangular picture, OpenEXR or Radiance HDR
+    #[arg(long, value_name = "FILE", help_heading = "Light")]
+    pub env: Option<PathBuf>,
+
+    /// Factor on the light of --env, at least 0
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = strength, help_heading = "Light")]
+    #[arg(requires = "env", conflicts_with = "background")]
+    pub env_strength: f32,
+
+    /// Turns --env about the vertical, degrees counterclockwise as seen from above
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = rotation, help_heading = "Light")]
+    #[arg(requires = "env", conflicts_with = "background", allow_negative_numbers = true)]
+    pub env_rotation: f32,
+
+    /// The same light from all around: radiance in W/(m² sr)
+    #[arg(long, value_name = "R,G,B", value_parser = color, help_heading = "Light", conflicts_with = "env")]
+    pub background: Option<[f32; 3]>,
+}
+
+impl EnvironmentOptions {
+    /// Gives the scenes the light that is asked for, and what is to be said of it.
+    pub fn light<'a>(&self, scenes: impl IntoIterator<Item = &'a mut Scene>) -> Result<()> {
+        let file = self.env.as_deref().map(|path| Environment::load(path, self.env_strength, self.env_rotation));
+        let uniform = self.background.map(|radiance| Environment::uniform(radiance.into()));
+        let Some(environment) = file.transpose()?.or(uniform) else { return Ok(()) };
+        for scene in scenes {
+            scene.warnings.extend(environment.warnings.iter().cloned());
+            scene.environment = Some(environment.clone());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,231 @@
+//! Pictures of radiance that others made, OpenEXR and Radiance HDR, read for their colours alone.
+
+use std::{
+    fs::File,
+    io::{self, Cursor, Read},
+    path::Path,
+};
+
+use exr::{
+    math::Vec2,
+    meta::{MetaData, header::Header},
+    prelude::{ReadChannels, ReadLayers, ReadSpecificChannel},
+};
+use image::{ImageDecoder, ImageError, codecs::hdr::HdrDecoder};
+
+use crate::error::{Error, Result};
+
+/// Bytes of a file that are read: more than the largest picture takes uncompressed.
+const MAX_BYTES: u64 = 4 << 30;
+/// Pixels of a picture: 16384 x 8192.
+const MAX_PIXELS: u64 = 1 << 27;
+
+/// How files of the two formats begin.
+const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
+const HDR: &[u8] = b"#?";
+
+/// Scene-linear colours, row 0 at the top, each number finite and ≥ 0.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct RadiancePicture {
+    pub width: u32,
+    pub height: u32,
+    pub pixels: Vec<[f32; 3]>,
+    /// What was read in a special way, one line each.
+    pub notes: Vec<String>,
+}
+
+/// What is wrong with a file.
+type Problem = Box<dyn std::error::Error + Send + Sync>;
+
+/// Bytes of a file that begins as one of the two formats.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read, begins otherwise or is too large.
+pub(crate) fn read_radiance_bytes(path: &Path) -> Result<Vec<u8>> {
+    let read = || -> std::result::Result<Vec<u8>, Problem> {
+        let mut file = File::open(path)?;
+        // Only what looks right is read to the end: the path may be that of a device.
+        let mut bytes = Vec::new();
+        file.by_ref().take(EXR.len() as u64).read_to_end(&mut bytes)?;
+        if !bytes.starts_with(EXR) && !bytes.starts_with(HDR) {
+            return Err("is neither OpenEXR nor Radiance HDR".into());
+        }
+        file.take(MAX_BYTES).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 >= MAX_BYTES {
+            return Err(format!("is larger than {MAX_BYTES} bytes").into());
+        }
+        Ok(bytes)
+    };
+    read().map_err(|problem| failure(path, problem))
+}
+
+/// The picture in the bytes of [`read_radiance_bytes`]. NaN and numbers below 0 become 0, infinity the largest finite
+/// number of the picture.
+///
+/// # Errors
+/// [`Error::Io`] with the path if they are damaged, hold no R, G, B and no luminance, or are too large.
+pub(crate) fn decode_radiance(path: &Path, bytes: &[u8]) -> Result<RadiancePicture> {
+    let decoded = if bytes.starts_with(EXR) { decode_exr(bytes) } else { decode_hdr(bytes) };
+    let mut picture = decoded.map_err(|problem| failure(path, problem))?;
+    let note = make_finite(&mut picture.pixels);
+    picture.notes.extend(note);
+    Ok(picture)
+}
+
+fn failure(path: &Path, problem: Problem) -> Error {
+    let source = match problem.downcast::<io::Error>() {
+        Ok(source) => *source,
+        Err(problem) => io::Error::other(problem),
+    };
+    Error::Io { path: path.to_path_buf(), source }
+}
+
+/// Width and height of a picture that may be read.
+fn checked_size(width: u64, height: u64) -> std::result::Result<(u32, u32), Problem> {
+    match (u32::try_from(width), u32::try_from(height)) {
+        (Ok(w @ 1..), Ok(h @ 1..)) if width * height <= MAX_PIXELS => Ok((w, h)),
+        _ => Err(format!("is {width} x {height} pixels; 1 to {MAX_PIXELS} pixels are read").into()),
+    }
+}
+
+/// What a decoder says of a file that it does not take to its end.
+fn of_hdr(error: ImageError) -> Problem {
+    match error {
+        ImageError::IoError(_) => "is damaged: it ends too early".into(),
+        ImageError::Unsupported(error) => format!("cannot be read: {error}").into(),
+        error => format!("is damaged: {error}").into(),
+    }
+}
+
+/// The same of OpenEXR.
+fn of_exr(error: exr::error::Error) -> Problem {
+    match error {
+        exr::error::Error::NotSupported(what) => format!("cannot be read: {what}").into(),
+        exr::error::Error::Invalid(what) => format!("is damaged: {what}").into(),
+        error => format!("is damaged: {error}").into(),
+    }
+}
+
+fn decode_hdr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
+    // The strict decoder takes one of the signatures in use only, and this one takes any.
+    let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(of_hdr)?;
+    let exposure = decoder.metadata().exposure.unwrap_or(1.0);
+    let (width, height) = decoder.dimensions();
+    let (width, height) = checked_size(width.into(), height.into())?;
+    let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
+    decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(of_hdr)?;
+    let note = format!("its EXPOSURE of {exposure} is not undone, as in other renderers");
+    Ok(RadiancePicture { width, height, pixels, notes: Vec::from_iter((exposure != 1.0).then_some(note)) })
+}
+
+/// Channels of an OpenEXR part that make up a colour.
+enum Channels {
+    Rgb([String; 3]),
+    Luminance(String),
+}
+
+/// The first of the part's layers with R, G and B, the one without a name before others; else its luminance.
+fn channels(header: &Header) -> Option<Channels> {
+    let names: Vec<String> = header.channels.list.iter().map(|channel| channel.name.to_string()).collect();
+    let has = |name: &str| names.iter().any(|n| n == name);
+    let layers = names.iter().filter_map(|name| name.strip_suffix(".R")).map(|layer| format!("{layer}."));
+    let rgb = |layer: String| ["R", "G", "B"].map(|channel| format!("{layer}{channel}"));
+    let mut colors = std::iter::once(String::new()).chain(layers).map(rgb);
+    let luminance = (has("Y") && !has("RY") && !has("BY")).then(|| Channels::Luminance("Y".to_owned()));
+    colors.find(|names| names.iter().all(|name| has(name))).map(Channels::Rgb).or(luminance)
+}
+
+fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(of_exr)?;
+    let part = meta.headers.iter().filter(|header| !header.deep).find_map(|header| Some((header, channels(header)?)));
+    let (header, channels) = part.ok_or("has neither the channels R, G and B nor the luminance Y alone")?;
+    if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
+        return Err("has subsampled channels, which are not read".into());
+    }
+    checked_size(header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+    let display = header.shared_attributes.display_window;
+    let (width, height) = checked_size(display.size.width() as u64, display.size.height() as u64)?;
+    let window = Window { width, height, offset: header.own_attributes.layer_position - display.position };
+    let read = exr::prelude::read().no_deep_data().largest_resolution_level().specific_channels();
+    let pixels = match channels {
+        Channels::Rgb([r, g, b]) => {
+            read.required(r.as_str())
+                .required(g.as_str())
+                .required(b.as_str())
+                .collect_pixels(
+                    move |_, _| window.black(),
+                    move |pixels: &mut Vec<_>, at, (r, g, b): (f32, f32, f32)| window.put(pixels, at, [r, g, b]),
+                )
+                .first_valid_layer()
+                .all_attributes()
+                .from_buffered(Cursor::new(bytes))
+                .map_err(of_exr)?
+                .layer_data
+                .channel_data
+                .pixels
+        }
+        Channels::Luminance(y) => {
+            read.required(y.as_str())
+                .collect_pixels(
+                    move |_, _| window.black(),
+                    move |pixels: &mut Vec<_>, at, (y,): (f32,)| window.put(pixels, at, [y; 3]),
+                )
+                .first_valid_layer()
+                .all_attributes()
+                .from_buffered(Cursor::new(bytes))
+                .map_err(of_exr)?
+                .layer_data
+                .channel_data
+                .pixels
+        }
+    };
+    Ok(RadiancePicture { width, height, pixels, notes: Vec::new() })
+}
+
+/// The display window of an OpenEXR file: what of the data lies outside is cut off, where there are none it is black.
+#[derive(Clone, Copy)]
+struct Window {
+    width: u32,
+    height: u32,
+    /// Of the first datum from the window's corner.
+    offset: Vec2<i32>,
+}
+
+impl Window {
+    fn black(self) -> Vec<[f32; 3]> {
+        vec![[0.0; 3]; self.width as usize * self.height as usize]
+    }
+
+    /// Writes the pixel of the datum `at`.
+    fn put(self, pixels: &mut [[f32; 3]], at: Vec2<usize>, color: [f32; 3]) {
+        let (x, y) = (at.x() as i64 + i64::from(self.offset.x()), at.y() as i64 + i64::from(self.offset.y()));
+        if (0..i64::from(self.width)).contains(&x) && (0..i64::from(self.height)).contains(&y) {
+            pixels[y as usize * self.width as usize + x as usize] = color;
+        }
+    }
+}
+
+/// Makes all numbers finite and ≥ 0. Returns what had to be changed.
+fn make_finite(pixels: &mut [[f32; 3]]) -> Option<String> {
+    let numbers = || pixels.as_flattened().iter();
+    let largest = numbers().copied().filter(|x| x.is_finite()).fold(0.0, f32::max);
+    let (mut wrong, mut infinite) = (0_u64, 0_u64);
+    for x in pixels.as_flattened_mut() {
+        if x.is_nan() || *x < 0.0 {
+            *x = 0.0;
+            wrong += 1;
+        } else if x.is_infinite() {
+            *x = largest;
+            infinite += 1;
+        }
+    }
+    let wrong = (wrong > 0).then(|| format!("numbers below 0 or NaN, read as 0: {wrong}"));
+    let infinite =
+        (infinite > 0).then(|| format!("infinite numbers, read as the largest finite one, {largest}: {infinite}"));
+    let changed: Vec<String> = wrong.into_iter().chain(infinite).collect();
+    (!changed.is_empty()).then(|| changed.join("; "))
+}
+
+#[cfg(test)]
+#[path = "radiance_tests.rs"]
+mod tests;

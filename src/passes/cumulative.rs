@@ -1,0 +1,69 @@
+//! Tables by which the shaders choose one of many with a given probability.
+
+/// Steps of the shaders' random numbers in [0, 1).
+const STEPS: u64 = 1 << 24;
+/// Weights above 0 that a table can hold: each needs a step of its own.
+pub const MAX_CHOICES: usize = 1 << 22;
+
+/// Cumulative probabilities of `weights`, each ≥ 0: the first entry above a random number is chosen. Entries are multiples of
+/// the random numbers' step, so that the difference to its predecessor is exactly the probability with which an entry
+/// is chosen. No weight above 0 gets less than one step, none of 0 gets any, and from the last above 0 on all are 1.
+///
+/// # Panics
+/// If more than [`MAX_CHOICES`] weights are above 0.
+#[must_use]
+pub fn cumulative(weights: &[f64]) -> Vec<f32> {
+    let positive = weights.iter().filter(|w| **w > 0.0).count();
+    assert!(positive <= MAX_CHOICES, "{positive} choices are too many");
+    let total: f64 = weights.iter().sum();
+    let shared = (STEPS - positive as u64) as f64;
+    let (mut sum, mut own_steps) = (0.0, 0);
+    let mut table: Vec<f32> = weights
+        .iter()
+        .map(|weight| {
+            sum += weight;
+            own_steps += u64::from(*weight > 0.0);
+            let share = if total > 0.0 { (sum / total).min(1.0) } else { 0.0 };
+            ((shared * share).round() as u64 + own_steps) as f32 / STEPS as f32
+        })
+        .collect();
+    // The sums are the same f64 in the same order, but of no promise at the end.
+    if let Some(last) = weights.iter().rposition(|w| *w > 0.0) {
+        table[last..].fill(1.0);
+    }
+    table
+}
+
+/// Probability of each entry of such a table.
+#[must_use]
+pub fn probabilities(cumulative: &[f32]) -> Vec<f32> {
+    let before = [0.0].iter().chain(cumulative);
+    cumulative.iter().zip(before).map(|(this, before)| this - before).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn probabilities_follow_the_weights() {
+        let weights: Vec<f64> = (0..10_000).map(|i| if i % 3 == 0 { 0.0 } else { f64::from(i % 7) + 1e-9 }).collect();
+        let table = cumulative(&weights);
+        let total: f64 = weights.iter().sum();
+        assert!(table.is_sorted() && table.last() == Some(&1.0));
+        for (weight, probability) in weights.iter().zip(probabilities(&table)) {
+            let (probability, expected) = (f64::from(probability), weight / total);
+            assert!((probability - expected).abs() < 2e-7, "{probability} for {expected}");
+            assert_eq!(*weight > 0.0, probability > 0.0, "weight {weight}");
+        }
+    }
+
+    #[test]
+    fn zeros_at_the_end_are_never_chosen() {
+        let table = cumulative(&[0.0, 1.0, 3.0, 0.0]);
+        assert_eq!([table[0], table[2], table[3]], [0.0, 1.0, 1.0]);
+        assert!((table[1] - 0.25).abs() < 2e-7, "{table:?}");
+        assert_eq!(probabilities(&table)[3], 0.0);
+        assert_eq!(cumulative(&[0.0, 0.0]), [0.0, 0.0]);
+    }
+}

@@ -1,0 +1,108 @@
+//! The lights' part of bind group 0: all that shines, the tables by which passes choose from it, targets, environment.
+
+use super::{
+    environment_map::EnvironmentMap,
+    light_table::{Choices, LightTable},
+    targets::{delta_targets, scene_target},
+};
+use crate::{
+    error::Result,
+    gpu::{Buffer, Gpu},
+    layout::Surroundings,
+    scene::Scene,
+    settings::Settings,
+};
+
+/// A table on the device, `array<LightChoice>`.
+#[derive(Debug)]
+pub struct ChoiceBuffer {
+    pub buffer: Buffer,
+    /// See [`Choices::turns`].
+    pub turns: u32,
+}
+
+/// The lights on the device.
+#[derive(Debug)]
+pub struct LightBuffers {
+    /// As uploaded.
+    pub table: LightTable,
+    /// For photon paths, for those aimed at mirrors and glass, and for direct light of what has an extent.
+    pub photons: ChoiceBuffer,
+    pub aimed: ChoiceBuffer,
+    pub direct: ChoiceBuffer,
+    /// Spheres around mirrors and glass; the sphere around the scene lies before them.
+    pub delta_targets: u32,
+    pub has_environment: bool,
+    pub warnings: Vec<String>,
+    lights: Buffer,
+    targets: Buffer,
+    surroundings: Buffer,
+    environment: Buffer,
+    environment_rows: Buffer,
+}
+
+impl LightBuffers {
+    /// Uploads all that shines.
+    ///
+    /// # Errors
+    /// As [`LightTable::new`], and [`crate::Error::Limit`] if the lights exceed a binding.
+    pub fn new(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<Self> {
+        let around = scene_target(scene);
+        let targets = delta_targets(scene);
+        let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, gpu.max_binding()));
+        let table = LightTable::new(scene, map.as_ref(), &around, settings)?;
+        let upload = |label: &str, choices: &Choices| -> Result<ChoiceBuffer> {
+            Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, turns: choices.turns })
+        };
+        let spheres: Vec<[f32; 4]> =
+            [&around].into_iter().chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
+        let (sine, cosine) = map.as_ref().map_or(0.0, |map| map.rotation).sin_cos();
+        let surroundings = Surroundings {
+            center: around.center.to_array(),
+            radius: around.radius,
+            columns: map.as_ref().map_or(0, |map| map.columns),
+            rows: map.as_ref().map_or(0, |map| map.rows),
+            rotation_cos: cosine,
+            rotation_sin: sine,
+        };
+        let (pixels, rows) = map.as_ref().map_or((&[][..], &[][..]), |map| (&map.pixels[..], &map.marginal[..]));
+        Ok(Self {
+            photons: upload("photon light choices", &table.for_photons(settings))?,
+            aimed: upload("aimed light choices", &table.for_aimed_photons(&targets, &around, settings))?,
+            direct: upload("direct light choices", &table.for_direct_light())?,
+            delta_targets: targets.len() as u32,
+            has_environment: map.is_some(),
+            warnings: reduced(scene, map.as_ref()).into_iter().collect(),
+            lights: gpu.storage_with("lights", &table.lights)?,
+            targets: gpu.storage_with("targets", &spheres)?,
+            surroundings: gpu.uniform("surroundings", &surroundings),
+            environment: gpu.storage_with("environment", pixels)?,
+            environment_rows: gpu.storage_with("environment rows", rows)?,
+            table,
+        })
+    }
+
+    /// The variables that all passes share; a pass binds its `choices` besides.
+    #[must_use]
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 5] {
+        [
+            ("lights", &self.lights),
+            ("targets", &self.targets),
+            ("surroundings", &self.surroundings),
+            ("environment", &self.environment),
+            ("environment_rows", &self.environment_rows),
+        ]
+    }
+}
+
+/// What to say where the environment map had to be made smaller.
+fn reduced(scene: &Scene, map: Option<&EnvironmentMap>) -> Option<String> {
+    let (environment, map) = (scene.environment.as_ref()?, map?);
+    let (from, to) = ((environment.width, environment.height), (map.columns, map.rows));
+    (from != to).then(|| {
+        format!(
+            "the environment {} was averaged from {} x {} to {} x {} pixels to fit the device",
+            environment.name, from.0, from.1, to.0, to.1
+        )
+    })
+}

@@ -1,0 +1,137 @@
+//! Light at the visible points of a tile by fewer queries than points: where an estimate is a mean over a disc much wider than
+//! points are apart, they share it. Kernels: `choose_queries`, `share_estimates`.
+
+use crate::{
+    error::Result,
+    gpu::{Buffer, Gpu, Kernel},
+    layout::{Gathered, ShareRound, VisiblePoint},
+};
+
+/// Pixels of a cell in each round. A coarser cell than 8 x 8 saves little: its points are few already.
+const ROUNDS: [u32; 3] = [64, 16, 1];
+
+/// What of a tile is shared.
+#[derive(Debug)]
+pub struct SharedPoints<'a> {
+    /// [`VisiblePoint`]s: for each pixel, in Morton order, its samples, each with its branches.
+    pub points: &'a Buffer,
+    /// A power of 2, at least 64.
+    pub pixels: u32,
+    pub samples: u32,
+    pub branches: u32,
+    /// Radiance from each point, `vec4f`, and what was found there, [`Gathered`].
+    pub radiance: &'a Buffer,
+    pub gathered: &'a Buffer,
+}
+
+/// Points at which estimates are asked for.
+#[derive(Debug)]
+pub struct Asked<'a> {
+    /// [`VisiblePoint`]s, of which those take part that wait for the turn.
+    pub points: &'a Buffer,
+    pub count: u32,
+    pub turn: u32,
+    /// What the estimates are added to, `vec4f`, and what is said of them, [`Gathered`].
+    pub radiance: &'a Buffer,
+    pub gathered: &'a Buffer,
+}
+
+/// Makes the estimates over one map.
+pub type Estimates<'a> = dyn FnMut(&Asked) -> Result<()> + 'a;
+
+/// The kernels, and room for queries.
+#[derive(Debug)]
+pub struct EstimateSharing {
+    choose: Kernel,
+    share: Kernel,
+    /// Distance within which points share an estimate, as a fraction of its radius.
+    reach: f32,
+    scratch: Option<Scratch>,
+}
+
+#[derive(Debug)]
+struct Scratch {
+    capacity: u32,
+    queries: Buffer,
+    irradiance: Buffer,
+    gathered: Buffer,
+}
+
+impl EstimateSharing {
+    /// Compiles the kernels. `reach`: distance within which points share an estimate, as a fraction of its radius; 0: none do.
+    #[must_use]
+    pub fn new(gpu: &Gpu, reach: f32) -> Self {
+        let kernel = |stem| Kernel::new(gpu, stem, &[]);
+        Self { choose: kernel("choose_queries"), share: kernel("share_estimates"), reach, scratch: None }
+    }
+
+    /// Adds the light of a map's photons to the radiance of the tile's points: by queries in large cells of pixels, then in
+    /// smaller ones for the points that are left, and at last by a query for each point. Maps are gathered in turns from 1.
+    ///
+    /// # Errors
+    /// Those of `estimates`.
+    pub fn run(&mut self, gpu: &Gpu, turn: u32, tile: &SharedPoints, estimates: &mut Estimates) -> Result<()> {
+        let count = tile.pixels * tile.samples * tile.branches;
+        for cell_pixels in ROUNDS {
+            // A cell of one sample is the point itself.
+            if self.reach == 0.0 || cell_pixels * tile.samples == 1 {
+                break;
+            }
+            let round = ShareRound {
+                cells: tile.pixels / cell_pixels,
+                cell_pixels,
+                samples: tile.samples,
+                candidates: if cell_pixels > 1 { 1 } else { tile.samples },
+                branches: tile.branches,
+                reach_squared: self.reach * self.reach,
+                points: count,
+                turn,
+            };
+            self.run_round(gpu, &round, tile, estimates)?;
+        }
+        estimates(&Asked { points: tile.points, count, turn, radiance: tile.radiance, gathered: tile.gathered })
+    }
+
+    fn run_round(
+        &mut self,
+        gpu: &Gpu,
+        round: &ShareRound,
+        tile: &SharedPoints,
+        estimates: &mut Estimates,
+    ) -> Result<()> {
+        let queries = round.cells * round.branches;
+        if self.scratch.as_ref().is_none_or(|s| s.capacity < queries) {
+            self.scratch = Some(Scratch::new(gpu, queries)?);
+        }
+        let scratch = self.scratch.as_ref().expect("made above");
+        let uniform = gpu.uniform("share round", round);
+        let buffers = [
+            ("round", &uniform),
+            ("points", tile.points),
+            ("queries", &scratch.queries),
+            ("irradiance", &scratch.irradiance),
+            ("gathered", &scratch.gathered),
+            ("radiance", tile.radiance),
+        ];
+        let mut encoder = gpu.encoder();
+        self.choose.dispatch(&mut encoder, &self.choose.bind(gpu, &buffers), queries.into());
+        gpu.submit(encoder);
+        let (radiance, gathered) = (&scratch.irradiance, &scratch.gathered);
+        estimates(&Asked { points: &scratch.queries, count: queries, turn: 1, radiance, gathered })?;
+        let mut encoder = gpu.encoder();
+        self.share.dispatch(&mut encoder, &self.share.bind(gpu, &buffers), round.points.into());
+        gpu.submit(encoder);
+        Ok(())
+    }
+}
+
+impl Scratch {
+    fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
+        Ok(Self {
+            capacity,
+            queries: gpu.storage::<VisiblePoint>("queries", capacity.into())?,
+            irradiance: gpu.storage::<[f32; 4]>("irradiance at queries", capacity.into())?,
+            gathered: gpu.storage::<Gathered>("gathered at queries", capacity.into())?,
+        })
+    }
+}

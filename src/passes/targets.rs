@@ -1,0 +1,181 @@
+//! What photon paths are aimed at: spheres around clusters of mirrors and glass, so that no path that could become a caustic
+//! is left out and few others are traced (the projection map of Jensen 2001, section 5.3, as bounding spheres).
+
+use glam::Vec3;
+
+use crate::{
+    layout::MAX_TARGETS,
+    scene::{Bounds, Scene},
+};
+
+/// A sphere that holds something.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    pub center: Vec3,
+    /// Metres.
+    pub radius: f32,
+}
+
+impl Target {
+    /// Solid angle under which it is seen, sr; `None` from inside.
+    #[must_use]
+    pub fn solid_angle(&self, from: Vec3) -> Option<f64> {
+        let sin2 = f64::from(self.radius).powi(2) / self.center.as_dvec3().distance_squared(from.as_dvec3());
+        (sin2 < 1.0).then(|| std::f64::consts::TAU * sin2 / (1.0 + (1.0 - sin2).sqrt()))
+    }
+
+    fn cross_section(&self) -> f64 {
+        f64::from(self.radius).powi(2)
+    }
+}
+
+/// What one delta primitive needs to be bounded.
+#[derive(Clone, Copy)]
+enum Item {
+    Triangle([Vec3; 3]),
+    Sphere(Vec3, f32),
+}
+
+impl Item {
+    fn bounds(&self) -> Bounds {
+        match *self {
+            Item::Triangle([a, b, c]) => Bounds { min: a.min(b).min(c), max: a.max(b).max(c) },
+            Item::Sphere(center, radius) => Bounds { min: center - radius, max: center + radius },
+        }
+    }
+
+    fn middle(&self) -> Vec3 {
+        let Bounds { min, max } = self.bounds();
+        0.5 * (min + max)
+    }
+
+    /// Distance of its farthest point.
+    fn reach(&self, from: Vec3) -> f32 {
+        match *self {
+            Item::Triangle(corners) => corners.into_iter().map(|p| p.distance(from)).fold(0.0, f32::max),
+            Item::Sphere(center, radius) => center.distance(from) + radius,
+        }
+    }
+}
+
+/// A cluster, and its halves where it was split.
+struct Cluster {
+    target: Target,
+    items: Vec<Item>,
+    halves: Option<[usize; 2]>,
+}
+
+impl Cluster {
+    fn new(items: Vec<Item>) -> Self {
+        Self { target: sphere_around(&items), items, halves: None }
+    }
+}
+
+/// Sphere around all geometry.
+#[must_use]
+pub fn scene_target(scene: &Scene) -> Target {
+    sphere_around(&items(scene, |_| true))
+}
+
+/// Spheres that together hold all delta surfaces, at most [`MAX_TARGETS`]; none where there are none. The largest cluster is
+/// split along its longest axis until there are as many as may be; then halves are kept only where their cross-sections
+/// together are smaller than the whole's.
+#[must_use]
+pub fn delta_targets(scene: &Scene) -> Vec<Target> {
+    let delta = items(scene, |material| scene.materials[material as usize].surface.is_delta());
+    if delta.is_empty() {
+        return Vec::new();
+    }
+    let mut tree = vec![Cluster::new(delta)];
+    for _ in 1..MAX_TARGETS {
+        let leaves = (0..tree.len()).filter(|&i| tree[i].halves.is_none() && tree[i].items.len() > 1);
+        let largest = leaves.max_by(|&a, &b| tree[a].target.radius.total_cmp(&tree[b].target.radius));
+        let Some(largest) = largest else { break };
+        let Some(halves) = split(std::mem::take(&mut tree[largest].items)) else { continue };
+        tree[largest].halves = Some([tree.len(), tree.len() + 1]);
+        tree.extend(halves.map(Cluster::new));
+    }
+    best_cut(&tree, 0).1
+}
+
+/// The summed cross-section of the best spheres for a cluster, and these.
+fn best_cut(tree: &[Cluster], cluster: usize) -> (f64, Vec<Target>) {
+    let whole = tree[cluster].target;
+    let kept = (whole.cross_section(), vec![whole]);
+    let Some([left, right]) = tree[cluster].halves else { return kept };
+    let ((left, mut targets), (right, others)) = (best_cut(tree, left), best_cut(tree, right));
+    if left + right >= kept.0 {
+        return kept;
+    }
+    targets.extend(others);
+    (left + right, targets)
+}
+
+/// The items on either side of the middle of their longest extent; `None` if they lie on one spot.
+fn split(items: Vec<Item>) -> Option<[Vec<Item>; 2]> {
+    let middles = items.iter().map(Item::middle);
+    let box_ = middles.fold(Bounds::EMPTY, |b, p| b.union(Bounds { min: p, max: p }));
+    let axis = (box_.max - box_.min).max_position();
+    let plane = 0.5 * (box_.min[axis] + box_.max[axis]);
+    let (left, right): (Vec<_>, Vec<_>) = items.into_iter().partition(|item| item.middle()[axis] < plane);
+    (!left.is_empty() && !right.is_empty()).then_some([left, right])
+}
+
+fn sphere_around(items: &[Item]) -> Target {
+    let Bounds { min, max } = items.iter().map(Item::bounds).fold(Bounds::EMPTY, Bounds::union);
+    let center = 0.5 * (min + max);
+    // Rounding must leave nothing outside.
+    let radius = items.iter().map(|item| item.reach(center)).fold(0.0, f32::max);
+    Target { center, radius: radius * 1.0001 + center.abs().max_element() * 1e-6 }
+}
+
+fn items(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Item> {
+    let triangles = scene.triangles.iter().filter(|t| wanted(t.material)).map(|t| Item::Triangle(t.positions));
+    let spheres = scene.spheres.iter().filter(|s| wanted(s.material)).map(|s| Item::Sphere(s.center, s.radius));
+    triangles.chain(spheres).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::vec3;
+
+    use super::*;
+    use crate::scene::{Material, Sphere, Surface};
+
+    fn scene(centers: &[Vec3], radius: f32) -> Scene {
+        let surface = Surface::Mirror { tint: Vec3::ONE };
+        let material = Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false };
+        let spheres = centers.iter().map(|&center| Sphere { center, radius, material: 0 }).collect();
+        Scene { materials: vec![material], spheres, ..Scene::default() }
+    }
+
+    #[test]
+    fn what_lies_apart_has_spheres_of_its_own() {
+        let corners = [vec3(0.0, 0.0, 0.0), vec3(9.0, 0.0, 0.0), vec3(0.0, 0.0, 9.0), vec3(9.0, 0.0, 9.0)];
+        let apart = delta_targets(&scene(&corners, 1.0));
+        assert_eq!(apart.len(), 4);
+        assert!(apart.iter().all(|t| (1.0..1.001).contains(&t.radius) && corners.contains(&t.center)), "{apart:?}");
+        // Halves of a close pair would have larger cross-sections together.
+        let close = delta_targets(&scene(&[Vec3::ZERO, vec3(0.1, 0.0, 0.0)], 1.0));
+        assert_eq!(close.len(), 1);
+        assert!(delta_targets(&Scene::default()).is_empty());
+    }
+
+    #[test]
+    fn there_are_never_too_many() {
+        let line: Vec<Vec3> = (0..200).map(|i| vec3(10.0 * i as f32, 0.0, 0.0)).collect();
+        let scene = scene(&line, 1.0);
+        let targets = delta_targets(&scene);
+        assert_eq!(targets.len(), MAX_TARGETS as usize);
+        let held = |s: &Sphere| targets.iter().any(|t| t.center.distance(s.center) + s.radius <= t.radius);
+        assert!(scene.spheres.iter().all(held));
+    }
+
+    #[test]
+    fn solid_angles_are_those_of_spheres() {
+        let target = Target { center: vec3(0.0, 0.0, 5.0), radius: 3.0 };
+        let right = std::f64::consts::TAU * (1.0 - 0.8);
+        assert!((target.solid_angle(Vec3::ZERO).expect("from outside") - right).abs() < 1e-12);
+        assert_eq!(target.solid_angle(vec3(0.0, 2.5, 5.0)), None);
+    }
+}

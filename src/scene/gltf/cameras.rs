@@ -1,0 +1,67 @@
+//! Cameras of nodes. Positions are still the world's, in f64.
+
+use std::f32::consts::PI;
+
+use glam::{DMat4, DVec3, Vec3};
+use gltf::json;
+use json::camera::Type;
+use json::validation::Checked;
+
+use super::fault::{Read, fault};
+use super::nodes::Placed;
+use crate::scene::{Camera, Projection};
+
+/// The camera that a node carries, with its number in the file and its place in the world.
+pub(super) fn read(root: &json::Root, placed: &Placed) -> Read<Option<(usize, DVec3, Camera)>> {
+    let node = &root.nodes[placed.node];
+    let Some(index) = node.camera.map(|camera| camera.value()) else { return Ok(None) };
+    let camera = &root.cameras[index];
+    let own_name = camera.name.clone().unwrap_or_else(|| format!("camera {index}"));
+    let name = node.name.clone().filter(|name| !name.is_empty()).unwrap_or(own_name);
+    let (projection, aspect) = projection(camera, &format!("cameras[{index}]"))?;
+    let Some([right, up, forward]) = axes(placed.world) else {
+        return fault(format!("nodes[{}]", placed.node), "its transform leaves its camera no direction");
+    };
+    let camera = Camera { name, position: Vec3::ZERO, right, up, forward, projection, aspect };
+    Ok(Some((index, placed.world.w_axis.truncate(), camera)))
+}
+
+/// What the camera at `place` sees, and the picture's width over its height where the file says.
+fn projection(camera: &json::Camera, place: &str) -> Read<(Projection, Option<f32>)> {
+    let positive = |x: f32| x.is_normal() && x > 0.0;
+    let view = match (&camera.type_, &camera.perspective, &camera.orthographic) {
+        (Checked::Valid(Type::Perspective), Some(perspective), _) => {
+            let yfov = perspective.yfov;
+            if !(yfov > 0.0 && yfov < PI) {
+                return fault(format!("{place}.perspective.yfov"), format!("{yfov} is not between 0 and pi"));
+            }
+            if perspective.aspect_ratio.is_some_and(|aspect| !positive(aspect)) {
+                return fault(format!("{place}.perspective.aspectRatio"), "is not a positive number");
+            }
+            (Projection::Perspective { yfov }, perspective.aspect_ratio)
+        }
+        (Checked::Valid(Type::Orthographic), _, Some(orthographic)) => {
+            let (xmag, ymag) = (orthographic.xmag, orthographic.ymag);
+            for (key, mag) in [("xmag", xmag), ("ymag", ymag)] {
+                if !positive(mag) {
+                    return fault(format!("{place}.orthographic.{key}"), format!("{mag} is not a positive number"));
+                }
+            }
+            if !positive(xmag / ymag) {
+                return fault(format!("{place}.orthographic"), "xmag / ymag is not a positive number");
+            }
+            (Projection::Orthographic { ymag }, Some(xmag / ymag))
+        }
+        (Checked::Valid(Type::Perspective), None, _) => return fault(place, "perspective is missing"),
+        (Checked::Valid(Type::Orthographic), _, None) => return fault(place, "orthographic is missing"),
+        (Checked::Invalid, ..) => return fault(place, "type is not perspective or orthographic"),
+    };
+    Ok(view)
+}
+
+/// Unit axes of a camera: right, up and the direction of view. None where the transform leaves no direction.
+fn axes(world: DMat4) -> Option<[Vec3; 3]> {
+    let (forward, up) = (-world.z_axis.truncate().normalize_or_zero(), world.y_axis.truncate());
+    let right = forward.cross(up.normalize_or_zero()).normalize_or_zero();
+    (right != DVec3::ZERO).then(|| [right, right.cross(forward), forward].map(|axis| axis.as_vec3()))
+}

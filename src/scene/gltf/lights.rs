@@ -1,0 +1,84 @@
+//! Lights of nodes (KHR_lights_punctual). Positions are still the world's, in f64.
+
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+
+use glam::{DVec3, Vec3};
+use gltf::json;
+use json::extensions::scene::khr_lights_punctual as punctual;
+use json::validation::Checked;
+use punctual::{Spot, Type};
+
+use super::fault::{Notes, Read, fault};
+use super::nodes::{self, Placed};
+use crate::scene::{Light, LightKind};
+
+/// A light and its place in the world; a directional one has none.
+pub(super) type PlacedLight = (Option<DVec3>, Light);
+
+/// The light that a node carries, unless it is dark.
+pub(super) fn read(root: &json::Root, placed: &Placed, notes: &mut Notes) -> Read<Option<PlacedLight>> {
+    let node = &root.nodes[placed.node];
+    let Some(reference) = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref())
+    else {
+        return Ok(None);
+    };
+    let index = reference.light.value();
+    let lights = root.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
+    let lights = lights.map_or(&[][..], |extension| &extension.lights);
+    let Some(light) = lights.get(index) else {
+        let at = format!("nodes[{}].extensions.KHR_lights_punctual.light", placed.node);
+        return fault(at, format!("{index} of {}", lights.len()));
+    };
+    let place = format!("extensions.KHR_lights_punctual.lights[{index}]");
+    let name = nodes::name(node, "light", index);
+    let kind = match light.type_ {
+        Checked::Valid(Type::Point) => LightKind::Point,
+        Checked::Valid(Type::Spot) => spot(light.spot.as_ref(), &name, &place, notes)?,
+        Checked::Valid(Type::Directional) => LightKind::Directional,
+        Checked::Invalid => return fault(format!("{place}.type"), "is not point, spot or directional"),
+    };
+    let intensity = Vec3::from_array(light.color) * light.intensity;
+    if !intensity.is_finite() || intensity.min_element() < 0.0 {
+        return fault(
+            place,
+            format!("intensity {} times color {:?} is not a positive number", light.intensity, light.color),
+        );
+    }
+    if intensity == Vec3::ZERO {
+        notes.add(format!("light {name:?} has no intensity"));
+        return Ok(None);
+    }
+    if light.range.is_some() {
+        notes.add("the range of lights is not read: they reach everywhere");
+    }
+    let direction = match kind {
+        LightKind::Point => Vec3::NEG_Z,
+        LightKind::Spot { .. } | LightKind::Directional => {
+            let direction = -placed.world.z_axis.truncate().normalize_or_zero();
+            if direction == DVec3::ZERO {
+                return fault(format!("nodes[{}]", placed.node), "its transform leaves its light no direction");
+            }
+            direction.as_vec3()
+        }
+    };
+    let position = (kind != LightKind::Directional).then(|| placed.world.w_axis.truncate());
+    Ok(Some((position, Light { name, kind, position: Vec3::ZERO, direction, intensity })))
+}
+
+/// The cones of the spot light at `place`.
+fn spot(spot: Option<&Spot>, name: &str, place: &str, notes: &mut Notes) -> Read<LightKind> {
+    let (inner, outer) = spot.map_or((0.0, FRAC_PI_4), |spot| (spot.inner_cone_angle, spot.outer_cone_angle));
+    if !(outer > 0.0 && outer <= FRAC_PI_2) {
+        return fault(format!("{place}.spot.outerConeAngle"), format!("{outer} is not above 0 and at most pi/2"));
+    }
+    if !(inner >= 0.0 && inner <= outer) {
+        let problem = format!("{inner} is not between 0 and the outer angle, {outer}");
+        return fault(format!("{place}.spot.innerConeAngle"), problem);
+    }
+    if inner == outer {
+        // The specification wants them apart, but exporters write this for an edge without falloff.
+        notes.add(format!("light {name:?}: inner and outer cone are equal; the falloff between them is very narrow"));
+        return Ok(LightKind::Spot { inner: outer.next_down(), outer });
+    }
+    Ok(LightKind::Spot { inner, outer })
+}
