@@ -1,7 +1,11 @@
 //! Radiance from the photons around a point. Kernels: `mark_points`, `key_points`, `aim_search`,
 //! `count_photons`, `survey_surface`, `gather`, `finish_gather`.
 
-use super::{SceneBuffers, photon_map::PhotonMap, radix_sort::{RadixSort, scan_levels}};
+use super::{
+    SceneBuffers,
+    photon_map::PhotonMap,
+    radix_sort::{RadixSort, scan_levels},
+};
 use crate::{
     density::Density,
     error::Result,

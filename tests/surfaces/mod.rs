@@ -11,7 +11,7 @@ use caustica::{
         gather::gathered_buffer,
     },
     progress::Silent,
-    scene::{Camera, Light, LightKind, Material, Scene, Sphere, Surface, Triangle},
+    scene::{Camera, Light, LightKind, Material, Projection, Scene, Sphere, Surface, Triangle},
     settings::{Mode, Settings},
 };
 use glam::{Vec3, vec3};
@@ -114,7 +114,7 @@ fn room(light: Vec3) -> Scene {
             right: Vec3::X,
             up: Vec3::Y,
             forward: Vec3::NEG_Z,
-            yfov: 1.0,
+            projection: Projection::Perspective { yfov: 1.0 },
             aspect: None,
         }],
         ..Scene::default()
