@@ -167,6 +167,9 @@ fn check(settings: &Settings, options: &Options) -> Result<()> {
     if !settings.mode.traces_photons() {
         return fail("mode", settings.mode.name().to_string(), "has no photons to compare");
     }
+    if settings.final_gather > 0 {
+        return fail("final-gather", settings.final_gather.to_string(), "is not compared");
+    }
     if settings.search == Search::Radius {
         return fail("search", "radius".to_string(), "has no nearest photons to compare");
     }

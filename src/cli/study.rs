@@ -97,7 +97,8 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
     if args.preset == Some(PresetArg::Report) {
         let folder = args.scene.clone().unwrap_or_else(|| PathBuf::from(SCENES));
         let size = Some(options.size.unwrap_or(PRESET_SIZE));
-        let settings = Settings { size, spp: options.spp.unwrap_or(PRESET_SPP), ..settings };
+        // The report's estimate, whatever became of it since.
+        let settings = Settings { size, spp: options.spp.unwrap_or(PRESET_SPP), raw_estimate: true, ..settings };
         return study::report(&folder, &settings, args.repeat.unwrap_or(PRESET_REPEATS), args.preset_scale, look);
     }
     // clap has seen to it that all three are there.

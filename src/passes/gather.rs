@@ -54,7 +54,7 @@ impl From<&Settings> for GatherSettings {
 /// Rays that measure the area of a disc of which some is missing.
 const SURVEY_SAMPLES: usize = 24;
 /// Nodes and primitives that one of them visits at most; together they stay within what software Vulkan can loop.
-const SURVEY_TRACE_BUDGET: f64 = 700.0;
+const SURVEY_TRACE_BUDGET: f64 = 230.0;
 
 /// How the kernels are compiled; for tests and benchmarks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
