@@ -3,7 +3,7 @@
 //! Both sides get the same photons, visible points and settings in the same single precision. They may differ in what
 //! rounding decides: where the last photon of an estimate and the next one are tied (their squared distances differ by
 //! at most [`TIE`]), either may be summed. Such queries are counted, may differ in tied photons only, and do not enter
-//! the differences of radius and radiance.
+//! the differences of radius and radiance. Both make the report's raw estimate, whatever [`Settings::raw_estimate`] says.
 
 mod measure;
 mod page;
@@ -25,7 +25,7 @@ use crate::{
     progress::{Progress, Stage},
     renderer::{CameraPass, Session},
     scene::Scene,
-    settings::Settings,
+    settings::{Search, Settings},
     stats::Stats,
 };
 use measure::{Histogram, Measure};
@@ -166,6 +166,12 @@ fn check(settings: &Settings, options: &Options) -> Result<()> {
     let fail = |name, value: String, problem: &str| Err(Error::Setting { name, value, problem: problem.to_string() });
     if !settings.mode.traces_photons() {
         return fail("mode", settings.mode.name().to_string(), "has no photons to compare");
+    }
+    if settings.final_gather > 0 {
+        return fail("final-gather", settings.final_gather.to_string(), "is not compared");
+    }
+    if settings.search == Search::Radius {
+        return fail("search", "radius".to_string(), "has no nearest photons to compare");
     }
     if !(options.tolerance >= 0.0 && options.tolerance.is_finite()) {
         return fail("tolerance", options.tolerance.to_string(), "must be at least 0");

@@ -371,6 +371,18 @@ pub struct EmitterSample {
     pub light_count: u32,
 }
 
+/// Which rays of final gathering `start_final_gather` starts.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FinalStep {
+    /// Which of the rays of a visible point, and how many it has.
+    pub ray: u32,
+    pub rays: u32,
+    /// Visible points.
+    pub points: u32,
+    pub pad: u32,
+}
+
 /// Photons of a finest cell of the photon grid; cells of a coarser one.
 pub const CELL_PHOTONS: u32 = 32;
 pub const CELL_FAN: u32 = 8;

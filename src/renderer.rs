@@ -62,6 +62,8 @@ pub struct Session<'a> {
 #[derive(Debug)]
 pub struct PhotonMaps {
     maps: Vec<PhotonMap>,
+    /// Global maps, 0 or 1; they come first.
+    global: usize,
     stats: Stats,
 }
 
@@ -111,7 +113,7 @@ impl<'a> Session<'a> {
         settings.check()?;
         let (gpu, mut stats) = (self.gpu, self.stats.clone());
         if !settings.mode.traces_photons() {
-            return Ok(PhotonMaps { maps: Vec::new(), stats });
+            return Ok(PhotonMaps { maps: Vec::new(), global: 0, stats });
         }
         let caustics = self.scene.has_delta();
         let traced = timed(&mut stats.seconds.photons, || {
@@ -125,17 +127,19 @@ impl<'a> Session<'a> {
         count_faults(&mut stats, traced.media_overflows, traced.unfinished);
         stats.warnings.extend(traced.warnings);
         progress.report(Stage::Grid, 0, 1);
+        let global = usize::from(traced.global.stored > 0);
         let maps = timed(&mut stats.seconds.grid, || {
             let kernels = MapKernels::new(gpu);
             let maps = [traced.global, traced.caustic].into_iter().filter(|map| map.stored > 0);
             let build = |map: RawMap| PhotonMap::build(gpu, &kernels, map.photons, map.stored as u32, map.emitted);
             maps.map(build).collect::<Result<_>>()
         })?;
-        Ok(PhotonMaps { maps, stats })
+        Ok(PhotonMaps { maps, global, stats })
     }
 
     /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. `mode` is that of the maps; what
-    /// concerns the picture alone (`neighbors`, `cone_constant`, `max_radius`, `search`, `spp`, `size`, `camera`) is free. The
+    /// concerns the picture alone (`neighbors`, `kernel`, `cone_constant`, `max_radius`, `search`, `spp`, `size`, `camera`) is free. Maps
+    /// for final gathering are of no use without it, nor others with it. The
     /// statistics are those of the maps and of this picture; `total` is their sum.
     ///
     /// # Errors
@@ -150,7 +154,8 @@ impl<'a> Session<'a> {
             progress.check()?;
             progress.report(Stage::Camera, done as u64, tiles.len() as u64);
             pass.trace(tile, &mut stats)?;
-            timed(&mut stats.seconds.gather, || searcher.gather(&pass, maps, tile, progress))?;
+            let count = timed(&mut stats.seconds.gather, || searcher.gather(&pass, maps, tile, progress))?;
+            camera_pass::add_step(&mut stats, count);
             pass.resolve(tile, &mut film)?;
         }
         progress.report(Stage::Camera, tiles.len() as u64, tiles.len() as u64);

@@ -107,7 +107,7 @@ pub enum Search {
     /// The nearest, by the grid on the device.
     #[default]
     Grid,
-    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU.
+    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU; makes the raw estimate always.
     KdTree,
     /// All within [`Settings::radius`], by the grid.
     Radius,
@@ -183,6 +183,10 @@ pub struct Settings {
     /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the estimate of the report.
     #[serde(default)]
     pub raw_estimate: bool,
+    /// Rays of final gathering per visible point, 0 to 65,536: light that comes over another surface is what they see of the
+    /// global map there, not what that map holds at the point itself; 0: without. In the modes hybrid and indirect-photons.
+    #[serde(default)]
+    pub final_gather: u32,
     #[serde(default)]
     pub sampler: Sampler,
     #[serde(default)]
@@ -211,7 +215,7 @@ impl Default for Settings {
             max_paths: None,
             neighbors: 100,
             cone_constant: 2.0,
-            share_reach: 1.0,
+            share_reach: 1.5,
             max_radius: None,
             max_bounces: 20,
             spp: 4,
@@ -227,6 +231,7 @@ impl Default for Settings {
             radius: None,
             kernel: DensityKernel::Cone,
             raw_estimate: false,
+            final_gather: 0,
             sampler: Sampler::Sobol,
             pixel_filter: PixelFilter::Box,
             aperture: 0.0,
@@ -256,6 +261,12 @@ impl Settings {
     #[must_use]
     pub fn pixel_filter_offsets(&self) -> Vec<f32> {
         if self.spp == 1 && self.pixel_filter == PixelFilter::Box { vec![0.0; 2] } else { self.pixel_filter.offsets() }
+    }
+
+    /// The global map stores photons that come straight from a light (LD): as the mode says, and for rays of final gathering.
+    #[must_use]
+    pub fn stores_direct(&self) -> bool {
+        self.mode.stores_direct() || self.final_gather > 0
     }
 
     /// The kernel with its constant.
@@ -290,6 +301,13 @@ impl Settings {
             }
             (Search::Radius, Some(_)) | (_, None) => {}
             (_, Some(r)) => return fail("radius", r.to_string(), "goes with the search by radius only"),
+        }
+        if self.final_gather > 65_536 {
+            return fail("final-gather", self.final_gather.to_string(), "must be at most 65536");
+        }
+        if self.final_gather > 0 && !matches!(self.mode, Mode::Hybrid | Mode::IndirectPhotons) {
+            let problem = format!("goes with the modes hybrid and indirect-photons, not {}", self.mode.name());
+            return fail("final-gather", self.final_gather.to_string(), &problem);
         }
         if self.global_photons == 0 || self.caustic_photons == 0 {
             return fail("photons", "0".to_string(), "must be at least 1");

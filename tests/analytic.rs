@@ -3,6 +3,7 @@
 //! | test | closed form | negative control |
 //! |---|---|---|
 //! | closed sphere | L = ρ/π · I/R² · (1 − ρ^B)/(1 − ρ) | the same with B − 1 |
+//! | final gathering | the same series with one bounce more | with B |
 //! | closed box | stored flux = Φ (1 − ρ^B)/(1 − ρ) | the same with B − 1 |
 //! | bounce limit | stored flux · (1 − ρ) + lost flux = Φ | without the lost flux |
 //! | inverse-square law | L = ρ/π · I/d² | 1/d |
@@ -48,6 +49,24 @@ fn closed_sphere_has_the_radiance_of_the_series() {
             assert!(within(measured, right, 0.015), "{mode:?}, k = {neighbors}: {measured} instead of {right}");
             assert!(!within(measured, wrong, 0.015), "{mode:?}, k = {neighbors}: control {wrong} passes");
         }
+    }
+}
+
+#[test]
+fn final_gathering_adds_the_bounce_that_its_rays_make() {
+    let (radius, intensity) = (2.0, 5.0);
+    let mut scene = scene(&[diffuse(ALBEDO as f32)]);
+    scene.spheres.push(sphere(Vec3::ZERO, radius, 0));
+    scene.lights.push(point_light(Vec3::ZERO, intensity));
+    scene.cameras.push(camera(vec3(0.5, 0.0, 0.0), vec3(-1.0, 0.2, 0.3), 100.0));
+    let direct = ALBEDO / PI * f64::from(intensity) / f64::from(radius * radius);
+    for (mode, first) in [(Mode::Hybrid, 0.0), (Mode::IndirectPhotons, 1.0)] {
+        let settings = Settings { max_bounces: BOUNCES, final_gather: 8, ..settings(mode, 50_000, 32) };
+        let measured = mean(&render_scene(&scene, &settings));
+        let right = direct * (series(ALBEDO, BOUNCES + 1) - first);
+        let wrong = direct * (series(ALBEDO, BOUNCES) - first);
+        assert!(within(measured, right, 0.015), "{mode:?}: {measured} instead of {right}");
+        assert!(!within(measured, wrong, 0.015), "{mode:?}: control {wrong} passes");
     }
 }
 

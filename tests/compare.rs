@@ -21,6 +21,7 @@ use std::{
 
 use caustica::{
     compare::{FILES, Options, compare},
+    density::DensityKernel,
     image::read_exr,
     progress::Silent,
     renderer::Session,
@@ -219,6 +220,11 @@ fn small(mode: Mode) -> Settings {
 fn both_searches_agree_in_every_mode() {
     let scene = Scene::load(Path::new(SCENE)).expect("the scene loads");
     let options = Options::default();
+    for kernel in DensityKernel::ALL {
+        let settings = Settings { kernel, ..small(Mode::Photons) };
+        let verdict = compare(gpu(), &scene, &settings, &options, &Silent).expect("the work succeeds").verdict();
+        assert!(verdict.is_ok(), "{kernel:?}: {verdict:?}");
+    }
     for mode in Mode::ALL.into_iter().filter(|mode| mode.traces_photons()) {
         for (neighbors, max_radius, cone_constant) in [(1, None, 2.0), (30, Some(0.2), 1.0), (1000, None, 1.5)] {
             let settings = Settings { neighbors, max_radius, cone_constant, ..small(mode) };
@@ -232,7 +238,7 @@ fn both_searches_agree_in_every_mode() {
 #[test]
 fn both_searches_make_the_same_picture() {
     let scene = Scene::load(Path::new(SCENE)).expect("the scene loads");
-    let settings = small(Mode::Hybrid);
+    let settings = Settings { raw_estimate: true, ..small(Mode::Hybrid) };
     let session = Session::open(gpu(), &scene, &settings, &Silent).expect("the scene fits");
     let maps = session.photon_maps(&settings, &Silent).expect("photons");
     let picture = |settings: Settings| session.picture(&maps, &settings, &Silent).expect("a picture").frame;
@@ -253,7 +259,7 @@ fn render_takes_the_search() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let render = |name: &str, words: &str| {
         let out = folder.path().join(name);
-        let line = format!("render {SCENE} -q --size 16x16 --photons 2k -k 10 {words} -o");
+        let line = format!("render {SCENE} -q --size 16x16 --photons 2k -k 10 --raw-estimate {words} -o");
         assert!(command(&line).arg(&out).status().expect("it starts").success());
         read_exr(&out).expect("an EXR").radiance
     };

@@ -5,14 +5,16 @@
 //! | sum | mode 0 = mode 2 + mode 4, to rounding | mode 3 in place of 4 |
 //! | limit | means of modes 0 and 1 within 1 % at 1 M photons | scaled by 1.02 |
 //! | smooth ball | modes 0 and 1 agree on a coarse smooth-shaded ball | flat-shaded ball |
+//! | final gathering | the same mean as without, whether emission is aimed or not | scaled by 1.03; another mode |
 //! | full map | a map full at 1 % of the paths gives the same mean | normalised by the other map's paths |
 
 mod common;
 
 use caustica::{
-    renderer::Render,
+    progress::Silent,
+    renderer::{Render, render},
     scene::{Scene, Triangle},
-    settings::{LightSampling, Mode, Settings},
+    settings::{Emission, LightSampling, Mode, Settings},
 };
 use common::*;
 use glam::{Vec3, vec3};
@@ -52,6 +54,23 @@ fn hybrid_is_direct_rays_plus_indirect_photons() {
     let wrong = largest_difference(&hybrid, &sum(&direct, &other));
     assert!(right < 1e-4, "modes 2 and 4 differ from mode 0 by {right} of the mean");
     assert!(wrong > 1e-2, "control: mode 3 in place of mode 4 differs by only {wrong}");
+}
+
+#[test]
+fn final_gathering_has_the_mean_of_the_estimate() {
+    let scene = room();
+    let settings = Settings { max_bounces: 0, ..settings(Mode::Hybrid, 200_000, 32) };
+    let plain = mean(&render_scene(&scene, &settings));
+    for emission in [Emission::Aimed, Emission::Unaimed] {
+        let gathered = mean(&render_scene(&scene, &Settings { final_gather: 8, emission, ..settings.clone() }));
+        assert!(within(gathered, plain, 0.015), "{emission:?}: {gathered} instead of {plain}");
+        assert!(!within(1.03 * gathered, plain, 0.015), "control: a picture 3 % brighter passes");
+    }
+    for mode in [Mode::Photons, Mode::DirectPhotons, Mode::DirectRays] {
+        let wrong = Settings { mode, final_gather: 1, ..settings.clone() };
+        let refused = render(gpu(), &scene, &wrong, &Silent).map(drop).expect_err("the mode has no final gathering");
+        assert!(refused.to_string().contains("final-gather"), "{refused}");
+    }
 }
 
 #[test]

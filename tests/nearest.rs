@@ -85,7 +85,9 @@ fn differences(
     let positions: Vec<Vec3> = places.iter().map(|p| p.position.into()).collect();
     let wrong = |(i, point): (usize, &VisiblePoint)| {
         let accepted = |p: usize| !side_test || usable(&places[p], point);
-        let found = brute_force(&positions, point.position.into(), settings.neighbors, settings.max_radius, accepted);
+        let k = settings.radius.map_or(settings.neighbors, |_| u32::MAX);
+        let bound = settings.radius.or(settings.max_radius);
+        let found = brute_force(&positions, point.position.into(), k, bound, accepted);
         let flat = VisiblePoint { ns: point.ng, ..*point };
         let expected = if side_test { *point } else { flat };
         let radiance = estimate((places, fluxes), &found, &expected, settings.density, EMITTED, side_test);
@@ -109,7 +111,7 @@ fn check(bench: &mut Bench, photons: &[Photon], points: &[VisiblePoint], setting
     let (places, fluxes) = map.read(&bench.gpu).unwrap();
     let wrong = differences(&answer, (&places, &fluxes), points, settings, side_test);
     assert_eq!(wrong, 0, "{} photons, {settings:?}, side test {side_test}", photons.len());
-    if photons.len() > 1 && settings.max_radius.is_none() {
+    if photons.len() > 1 && settings.radius.or(settings.max_radius).is_none() {
         let last = points.iter().rfind(|p| p.valid != 0).unwrap();
         let distance = |p: &PhotonPlace| Vec3::from(p.position).distance(last.position.into());
         let lost = (0..places.len())
@@ -222,6 +224,95 @@ fn a_maximal_radius_bounds_the_search() {
 }
 
 #[test]
+fn every_kernel_sums_what_its_formula_says() {
+    let mut bench = Bench::open();
+    let mut random = Random(11);
+    let photons = caustic_box(&mut random, 5000, 0.5, 1e-2);
+    let points: Vec<_> = (0..100).map(|i| point(&mut random, i % 9 == 0)).collect();
+    for kernel in DensityKernel::ALL {
+        for k in [30, 1000] {
+            check(
+                &mut bench,
+                &photons,
+                &points,
+                &GatherSettings { density: Density { kernel, ..CONE }, ..settings(k) },
+                true,
+            );
+        }
+        let density = Density { kernel, cone_constant: 1.2 };
+        let bounded = GatherSettings { max_radius: Some(0.2), density, ..settings(100) };
+        check(&mut bench, &photons, &points, &bounded, true);
+        // Control: another kernel is told apart.
+        let other = Density { kernel: DensityKernel::ALL[(kernel as usize + 1) % 5], ..density };
+        let map = bench.map(&photons);
+        let answer = bench.ask(true, &map, &points, &bounded);
+        let (places, fluxes) = map.read(&bench.gpu).unwrap();
+        let asked = GatherSettings { density: other, ..bounded };
+        assert!(
+            differences(&answer, (&places, &fluxes), &points, &asked, true) > 50,
+            "{kernel:?} passes for {other:?}"
+        );
+    }
+}
+
+#[test]
+fn all_photons_within_a_radius_are_summed() {
+    let mut bench = Bench::open();
+    let mut random = Random(12);
+    let photons = caustic_box(&mut random, 5000, 0.5, 1e-2);
+    let mut points: Vec<_> = (0..100).map(|i| point(&mut random, i % 9 == 0)).collect();
+    points[1].position = [30.0, 0.0, 0.0];
+    let map = bench.map(&photons);
+    for radius in [1e-3, 0.1, 0.5, 100.0] {
+        // A kernel that falls to 0 at the rim weighs two or three photons by differences of nearly equal numbers.
+        let last = if radius < 0.5 { DensityKernel::Gaussian } else { DensityKernel::Silverman };
+        for kernel in [DensityKernel::Cone, last] {
+            let density = Density { kernel, ..CONE };
+            // Neither the number of neighbours nor the largest radius has a say.
+            let within = GatherSettings { radius: Some(radius), max_radius: Some(0.01), density, ..settings(3) };
+            check(&mut bench, &photons, &points, &within, true);
+            let answer = bench.ask(true, &map, &points, &within);
+            let far = (answer.gathered[1].count, answer.radiance[1]);
+            assert!(radius > 10.0 || far == (0, [0.0; 4]), "no photon, no light: {far:?}");
+            let other = bench.ask(true, &map, &points, &GatherSettings { radius: Some(radius * 1.1), ..within });
+            assert!(radius < 0.01 || answer.radiance != other.radiance, "control: the radius matters");
+        }
+    }
+}
+
+#[test]
+fn each_kernel_integrates_to_1_over_its_disc() {
+    // Photons of flux 1 evenly on a unit square at y = 0, one in each cell of a grid: irradiance is their number.
+    let mut bench = Bench::open();
+    let mut random = Random(13);
+    let side = 200;
+    let mut photons = uniform_box(&mut random, side * side);
+    for (i, p) in photons.iter_mut().enumerate() {
+        let place = |cell: usize, jitter: f32| (cell as f32 + jitter) / side as f32;
+        p.position = [place(i % side, random.unit()), 0.0, place(i / side, random.unit())];
+        (p.flux, p.wi) = ([1.0; 3], caustica::layout::octahedral(Vec3::Y));
+    }
+    let mut points: Vec<_> = (0..1000).map(|_| point(&mut random, false)).collect();
+    for p in &mut points {
+        p.position = [0.2 + 0.6 * random.unit(), 0.0, 0.2 + 0.6 * random.unit()];
+        (p.ng, p.ns, p.weight) = ([0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0; 3]);
+    }
+    let map = bench.map(&photons);
+    let even = (side * side) as f64 / EMITTED as f64;
+    for kernel in DensityKernel::ALL {
+        let density = Density { kernel, ..CONE };
+        for radius in [None, Some(0.05)] {
+            let answer = bench.ask(true, &map, &points, &GatherSettings { radius, density, ..settings(300) });
+            let integral = answer.radiance.iter().map(|r| f64::from(r[0])).sum::<f64>() / points.len() as f64 / even;
+            assert!((integral - 1.0).abs() < 0.01, "{kernel:?}, radius {radius:?}: {integral}");
+            // Control: with the mean of the next kernel it does not.
+            let other = Density { kernel: DensityKernel::ALL[(kernel as usize + 1) % 5], ..CONE }.mean();
+            assert!((integral * density.mean() / other - 1.0).abs() > 0.03, "control: {kernel:?}");
+        }
+    }
+}
+
+#[test]
 fn the_side_test_takes_only_photons_before_the_surface() {
     let mut bench = Bench::open();
     let mut random = Random(5);
@@ -264,8 +355,8 @@ fn equal_photons_give_equal_bits() {
     let first = answer(&photons);
     assert!(first == answer(&photons));
     let mut other = photons.clone();
-    other.swap(0, 1);
-    assert!(first != answer(&other), "the control: another order of photons is another map");
+    (other[0].flux, other[1].flux) = (photons[1].flux, photons[0].flux);
+    assert!(first != answer(&other), "the control: other photons are another map");
 }
 
 #[test]

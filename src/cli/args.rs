@@ -72,6 +72,11 @@ pub struct RenderArgs {
     #[arg(required_if_eq("search", "radius"))]
     pub radius: Option<f32>,
 
+    /// Rays of final gathering per visible point: light over other surfaces is what these see of the global map; 0 is none
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=65_536))]
+    #[arg(help_heading = "Estimate")]
+    pub final_gather: u32,
+
     /// Write what happened as JSON: device, seconds by stage, photons, rays, peak device memory, warnings
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     pub stats: Option<PathBuf>,
@@ -110,7 +115,8 @@ pub struct CompareArgs {
 impl RenderArgs {
     /// The library's settings that these arguments ask for.
     pub fn settings(&self) -> Settings {
-        Settings { search: self.search.into(), radius: self.radius, ..self.options.settings() }
+        let (search, radius, final_gather) = (self.search.into(), self.radius, self.final_gather);
+        Settings { search, radius, final_gather, ..self.options.settings() }
     }
 }
 
@@ -160,7 +166,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_settings() {
         let s = settings(
-            "--max-paths 3M -k 50 --kernel gaussian --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
+            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
              --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
              --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
@@ -168,6 +174,8 @@ mod tests {
             max_paths: Some(3_000_000),
             neighbors: 50,
             kernel: DensityKernel::Gaussian,
+            raw_estimate: true,
+            final_gather: 16,
             cone_constant: 1.5,
             max_radius: Some(0.25),
             max_bounces: 0,

@@ -10,7 +10,13 @@ use caustica::{
     scene::Scene,
 };
 
-use super::{args::CompareArgs, files::Files, progress::Display, render::log_library, say::print};
+use super::{
+    args::CompareArgs,
+    files::Files,
+    progress::Display,
+    render::{RAW_NOTE, log_library},
+    say::print,
+};
 
 /// Compares, writes the files and says whether both sides agree.
 pub fn run(args: &CompareArgs) -> Result<()> {
@@ -28,6 +34,9 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let settings = options.settings();
     let gpu = Gpu::open(options.shared.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
+    if !settings.raw_estimate {
+        display.note(RAW_NOTE);
+    }
     let asked = Options { tolerance: args.tolerance, sabotage: args.sabotage };
     let result = compare(&gpu, &scene, &settings, &asked, &display);
     display.finish();

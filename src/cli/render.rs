@@ -9,7 +9,7 @@ use caustica::{
     progress::{Progress, Stage},
     renderer,
     scene::Scene,
-    settings::{LightUnit, Settings},
+    settings::{LightUnit, Search, Settings},
     stats::{Stats, timed},
 };
 
@@ -38,6 +38,9 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     })?;
     display.check()?;
     display.note(&light_unit_line(&settings));
+    if settings.search == Search::KdTree && !settings.raw_estimate {
+        display.note(RAW_NOTE);
+    }
     for warning in &scene.warnings {
         display.note(&format!("warning: {warning}"));
     }
@@ -67,6 +70,9 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     }
     args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats))
 }
+
+/// Why a kd-tree's picture differs from the default one.
+pub(super) const RAW_NOTE: &str = "the kd-tree is the report's: the estimate is raw, as with --raw-estimate";
 
 fn write_picture(path: &Path, frame: &Frame, origin: &Origin, args: &RenderArgs) -> Result<()> {
     match extension(path).as_str() {

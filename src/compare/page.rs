@@ -60,8 +60,9 @@ pub(super) fn page(
 
 fn subtitle(comparison: &Comparison, origin: &Origin) -> String {
     let (settings, photons) = (origin.settings, &comparison.stats.photons);
+    let environment = origin.environment.map_or(String::new(), |environment| format!(" under {}", environment.name));
     format!(
-        "{}, {} mode, k = {}, {} + {} photons, {} x {} pixels, {} spp; Caustica {}",
+        "{}{environment}, {} mode, k = {}, {} + {} photons, {} x {} pixels, {} spp; Caustica {}",
         origin.scene,
         settings.mode.name(),
         settings.neighbors,

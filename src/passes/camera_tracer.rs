@@ -100,11 +100,7 @@ impl CameraTracer {
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
-            view: CameraTile {
-                branches,
-                filter_steps: offsets.len() as u32 - 1,
-                ..view(camera, size, settings)?
-            },
+            view: CameraTile { branches, filter_steps: offsets.len() as u32 - 1, ..view(camera, size, settings)? },
             window: settings.window(size),
         })
     }
@@ -140,6 +136,12 @@ impl CameraTracer {
         self.view.branches * tile.pixels * tile.samples
     }
 
+    /// Visible points that any tile has at most.
+    #[must_use]
+    pub fn room(&self) -> u64 {
+        TILE_POINTS
+    }
+
     /// What a tile's estimates are shared among.
     #[must_use]
     pub fn shared_points(&self, tile: &Tile) -> SharedPoints<'_> {
@@ -169,32 +171,43 @@ impl CameraTracer {
     /// Faults of the driver.
     pub fn trace(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
-        let named = |input: usize| {
-            scene.with(&[
-                ("tile", &uniform),
+        let own = [("tile", &uniform), ("points", &self.points), ("filter_table", &self.filter_table)];
+        self.follow(gpu, scene, (&self.start, &own, tile.pixels * tile.samples), (&self.trace, &own))
+    }
+
+    /// Runs `start` in that many invocations and follows the paths that it starts with `trace`, each with its own buffers besides
+    /// the paths'.
+    pub(super) fn follow<'b>(
+        &'b self,
+        gpu: &Gpu,
+        scene: &'b SceneBuffers,
+        (start, started, invocations): (&Kernel, &[(&'b str, &'b Buffer)], u32),
+        (trace, followed): (&Kernel, &[(&'b str, &'b Buffer)]),
+    ) -> Result<StepCount> {
+        let named = |input: usize, own: &[(&'b str, &'b Buffer)]| {
+            let shared = [
                 ("paths", &self.paths),
                 ("queue_in", &self.queues[input]),
                 ("queue_out", &self.queues[1 - input]),
                 ("counters", &self.counters),
                 ("dispatch_arguments", &self.dispatch_arguments),
-                ("points", &self.points),
                 ("first_hits", &self.first_hits),
                 ("radiance", &self.radiance),
-                ("filter_table", &self.filter_table),
-            ])
+            ];
+            scene.with(&[&shared, own].concat())
         };
-        let advance = self.advance.bind(gpu, &named(0));
-        let trace = [0, 1].map(|input| self.trace.bind(gpu, &named(input)));
+        let advance = self.advance.bind(gpu, &named(0, &[]));
+        let bindings = [0, 1].map(|input| trace.bind(gpu, &named(input, followed)));
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
-        self.start.dispatch(&mut encoder, &self.start.bind(gpu, &named(1)), u64::from(tile.pixels * tile.samples));
+        start.dispatch(&mut encoder, &start.bind(gpu, &named(1, started)), invocations.into());
         // The surface that ends the chain comes after max_bounces delta surfaces.
         let mut surfaces = 0;
         loop {
             for _ in 0..BOUNCES_PER_SUBMISSION.min(self.view.max_bounces + 1 - surfaces) {
                 self.advance.dispatch(&mut encoder, &advance, 1);
-                let bindings = &trace[(surfaces % 2) as usize];
-                self.trace.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, 0);
+                let bindings = &bindings[(surfaces % 2) as usize];
+                trace.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, 0);
                 surfaces += 1;
             }
             gpu.submit(encoder);
@@ -243,7 +256,7 @@ impl CameraTracer {
         gpu.read(&self.pixels, 0, u64::from(tile.pixels))
     }
 
-    fn tile_view(&self, tile: &Tile) -> CameraTile {
+    pub(super) fn tile_view(&self, tile: &Tile) -> CameraTile {
         CameraTile {
             first_column: tile.first_column,
             first_row: tile.first_row,
@@ -252,6 +265,14 @@ impl CameraTracer {
             samples: tile.samples,
             ..self.view
         }
+    }
+}
+
+impl std::ops::AddAssign for StepCount {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.media_overflows += other.media_overflows;
+        self.unfinished += other.unfinished;
     }
 }
 

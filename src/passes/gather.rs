@@ -1,7 +1,11 @@
 //! Radiance from the photons around a point. Kernels: `mark_points`, `key_points`, `aim_search`,
 //! `count_photons`, `survey_surface`, `gather`, `finish_gather`.
 
-use super::{SceneBuffers, photon_map::PhotonMap, radix_sort::{RadixSort, scan_levels}};
+use super::{
+    SceneBuffers,
+    photon_map::PhotonMap,
+    radix_sort::{RadixSort, scan_levels},
+};
 use crate::{
     density::Density,
     error::Result,
@@ -48,9 +52,9 @@ impl From<&Settings> for GatherSettings {
 }
 
 /// Rays that measure the area of a disc of which some is missing.
-const SURVEY_SAMPLES: usize = 32;
+const SURVEY_SAMPLES: usize = 24;
 /// Nodes and primitives that one of them visits at most; together they stay within what software Vulkan can loop.
-const SURVEY_TRACE_BUDGET: f64 = 700.0;
+const SURVEY_TRACE_BUDGET: f64 = 230.0;
 
 /// How the kernels are compiled; for tests and benchmarks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,6 +5,7 @@ pub mod camera_tracer;
 mod cumulative;
 mod direct_light;
 pub mod environment_map;
+pub mod final_gather;
 pub mod gather;
 pub mod light_buffers;
 pub mod light_table;
@@ -19,6 +20,7 @@ pub mod sort_photons;
 pub mod targets;
 
 pub use camera_tracer::{CameraTracer, StepCount, Tile};
+pub use final_gather::FinalGather;
 pub use gather::{Gather, GatherOptions, GatherSettings};
 pub use light_table::LightGroup;
 pub use photon_batch::BOUNCE_CEILING;

@@ -78,7 +78,7 @@ impl PhotonTracer {
         caustics: bool,
         progress: &dyn Progress,
     ) -> Result<TracedPhotons> {
-        let wants_global = settings.mode.stores_direct() || settings.mode.follows_diffuse();
+        let wants_global = settings.stores_direct() || settings.mode.follows_diffuse();
         let mut traced = TracedPhotons {
             global: RawMap::new(gpu, settings.global_photons, wants_global)?,
             caustic: RawMap::new(gpu, settings.caustic_photons, caustics)?,
@@ -168,8 +168,10 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &Settings, caustics: bool) -> Ve
         stream: layout::STREAM_PHOTON,
         first_target: 0,
         target_count: 1,
-        rules: rule(aimed, layout::AIM | layout::CAUSTICS_APART)
-            | rule(settings.mode.stores_direct(), layout::STORE_DIRECT)
+        // Rays of final gathering see what was scattered before it came through glass.
+        rules: rule(aimed, layout::AIM)
+            | rule(aimed || settings.final_gather > 0, layout::CAUSTICS_APART)
+            | rule(settings.stores_direct(), layout::STORE_DIRECT)
             | rule(settings.mode.follows_diffuse(), layout::FOLLOW_DIFFUSE),
         fills_global: true,
         fills_caustic: !aimed,

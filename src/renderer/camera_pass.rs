@@ -5,10 +5,10 @@ use glam::Vec3;
 use super::{Session, count_faults, picture_size};
 use crate::{
     error::Result,
-    gpu::Gpu,
+    gpu::{Buffer, Gpu},
     image::{Frame, PlaceInWhole},
     layout::{TilePixel, VisiblePoint},
-    passes::{CameraTracer, GatherSettings, SceneBuffers, StepCount, Tile},
+    passes::{CameraTracer, FinalGather, GatherSettings, SceneBuffers, StepCount, Tile},
     settings::{Crop, Settings},
     stats::{Stats, timed},
 };
@@ -20,6 +20,8 @@ pub(crate) struct CameraPass<'a> {
     buffers: &'a SceneBuffers,
     /// Holds the visible points and the radiance of the tile that was traced last.
     pub tracer: CameraTracer,
+    /// If the settings ask for it.
+    final_gather: Option<FinalGather>,
     /// The radiance estimate that the settings ask for.
     pub estimate: GatherSettings,
     size: (u32, u32),
@@ -32,10 +34,14 @@ impl<'a> CameraPass<'a> {
         settings.check()?;
         let camera = session.scene.camera(settings.camera.as_deref())?;
         let size = picture_size(camera, settings)?;
+        let (gpu, buffers) = (session.gpu, &session.buffers);
+        let tracer = CameraTracer::new(gpu, buffers, camera, size, settings)?;
+        let rays = Some(settings.final_gather).filter(|rays| *rays > 0);
         Ok(Self {
-            gpu: session.gpu,
-            buffers: &session.buffers,
-            tracer: CameraTracer::new(session.gpu, &session.buffers, camera, size, settings)?,
+            gpu,
+            buffers,
+            final_gather: rays.map(|rays| FinalGather::new(gpu, buffers, &tracer, rays)).transpose()?,
+            tracer,
             estimate: GatherSettings::from(settings),
             size,
             window: settings.window(size),
@@ -58,6 +64,17 @@ impl<'a> CameraPass<'a> {
             add_step(stats, count);
         }
         Ok(())
+    }
+
+    /// Rays of final gathering per visible point; 0 without.
+    pub fn final_rays(&self) -> u32 {
+        self.final_gather.as_ref().map_or(0, FinalGather::rays)
+    }
+
+    /// Traces one ray of final gathering from each of the tile's visible points; returns what they see.
+    pub fn trace_final(&self, tile: &Tile, ray: u32) -> Result<(&Buffer, StepCount)> {
+        let gather = self.final_gather.as_ref().expect("the settings ask for it");
+        Ok((&gather.seen, gather.trace(self.gpu, self.buffers, &self.tracer, tile, ray)?))
     }
 
     /// The tile's visible points, some of them not valid.
@@ -127,7 +144,7 @@ impl Film {
     }
 }
 
-fn add_step(stats: &mut Stats, count: StepCount) {
+pub(super) fn add_step(stats: &mut Stats, count: StepCount) {
     stats.rays += count.rays;
     count_faults(stats, count.media_overflows, count.unfinished);
 }

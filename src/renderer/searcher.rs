@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     gpu::Gpu,
     layout::{Gathered, VisiblePoint},
-    passes::{Asked, EstimateSharing, Gather, PhotonMap, Tile},
+    passes::{Asked, EstimateSharing, Gather, PhotonMap, StepCount, Tile},
     progress::Progress,
     reference::{Estimate, KdMap},
     settings::{Search, Settings},
@@ -36,32 +36,45 @@ impl<'a> Searcher<'a> {
         Ok(Self { search, sharing: EstimateSharing::new(session.gpu, settings.share_reach), settings })
     }
 
-    /// Adds the light of all maps' photons to the radiance of the tile's visible points.
-    pub fn gather(&mut self, pass: &CameraPass, maps: &PhotonMaps, tile: &Tile, progress: &dyn Progress) -> Result<()> {
-        let tile = pass.tracer.shared_points(tile);
-        for (index, map) in maps.maps.iter().enumerate() {
-            let turn = index as u32 + 1;
-            let mut estimate = |asked: &Asked| match &mut self.search {
-                Searches::Grid(gather) => {
-                    let (points, results) = ((asked.count, asked.turn), (asked.radiance, asked.gathered));
-                    gather.run_turn(pass.gpu, map, asked.points, points, &pass.estimate, results, progress).map(drop)
-                }
-                Searches::KdTree(trees) => kd_estimates(pass.gpu, &trees[index], self.settings, asked, progress),
-            };
-            self.sharing.run(pass.gpu, turn, &tile, &mut estimate)?;
+    /// Adds the light of the maps' photons to the radiance of the tile's visible points: that of all maps; with final gathering
+    /// of the caustic map alone, and of all maps where the rays end. Returns what these rays did.
+    pub fn gather(
+        &mut self,
+        pass: &CameraPass,
+        maps: &PhotonMaps,
+        tile: &Tile,
+        progress: &dyn Progress,
+    ) -> Result<StepCount> {
+        let shared = pass.tracer.shared_points(tile);
+        let (search, settings) = (&mut self.search, self.settings);
+        let mut estimate = |asked: &Asked, index: usize| match search {
+            Searches::Grid(gather) => {
+                let (points, results) = ((asked.count, asked.turn), (asked.radiance, asked.gathered));
+                let map = &maps.maps[index];
+                gather.run_turn(pass.gpu, map, asked.points, points, &pass.estimate, results, progress).map(drop)
+            }
+            Searches::KdTree(trees) => kd_estimates(pass.gpu, &trees[index], settings, asked, progress),
+        };
+        let first = if pass.final_rays() > 0 { maps.global } else { 0 };
+        for (index, turn) in (first..maps.maps.len()).zip(1..) {
+            self.sharing.run(pass.gpu, turn, &shared, &mut |asked| estimate(asked, index))?;
         }
-        Ok(())
+        let mut done = StepCount::default();
+        for ray in 0..pass.final_rays() {
+            progress.check()?;
+            let (points, step) = pass.trace_final(tile, ray)?;
+            done += step;
+            let (radiance, gathered, count) = (shared.radiance, shared.gathered, pass.tracer.point_count(tile));
+            for index in 0..maps.maps.len() {
+                estimate(&Asked { points, count, turn: 1, radiance, gathered }, index)?;
+            }
+        }
+        Ok(done)
     }
 }
 
 /// What [`Gather::run_turn`] does, by a tree.
-fn kd_estimates(
-    gpu: &Gpu,
-    tree: &KdMap,
-    settings: &Settings,
-    asked: &Asked,
-    progress: &dyn Progress,
-) -> Result<()> {
+fn kd_estimates(gpu: &Gpu, tree: &KdMap, settings: &Settings, asked: &Asked, progress: &dyn Progress) -> Result<()> {
     let mut points: Vec<VisiblePoint> = gpu.read(asked.points, 0, asked.count.into())?;
     points.iter_mut().filter(|p| p.valid > asked.turn).for_each(|p| p.valid = 0);
     let mut radiance: Vec<[f32; 4]> = gpu.read(asked.radiance, 0, asked.count.into())?;

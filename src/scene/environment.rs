@@ -54,7 +54,7 @@ impl Environment {
         let picture = decode_radiance(path, &bytes)?;
         let brightest = picture.pixels.as_flattened().iter().copied().fold(0.0, f32::max);
         if !(brightest * strength).is_finite() {
-            let problem = format!("the brightest pixel of {}, {brightest}, gets infinitely bright", path.display());
+            let problem = format!("the brightest pixel of {}, {brightest:e}, gets infinitely bright", path.display());
             return Err(wrong("environment strength", strength, &problem));
         }
         let name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
@@ -195,5 +195,44 @@ mod tests {
         assert!(!sky.is_dark() && Environment::uniform(Vec3::ZERO).is_dark());
         assert!(Environment { strength: 0.0, ..sky.clone() }.is_dark());
         assert!(sky.hash.len() == 64 && sky.hash != other.hash);
+    }
+
+    #[test]
+    fn files_are_read_and_faults_are_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("sky.hdr");
+        // One pixel of radiance 1, 0.5 and 0; one of 2^126.
+        let write = |exponent: u8| {
+            let bytes = [&b"#?RGBE\nEXPOSURE=2\n\n-Y 1 +X 1\n"[..], &[128, 64, 0, exponent]].concat();
+            std::fs::write(&path, bytes).expect("can be written");
+        };
+        let load = |strength: f32, rotation: f32| Environment::load(&path, strength, rotation);
+        write(129);
+        let sky = load(2.0, -90.0).expect("it loads");
+        assert_eq!((sky.name.as_str(), sky.strength, sky.rotation), ("sky.hdr", 2.0, 270_f32.to_radians()));
+        assert_eq!(sky.warnings, ["sky.hdr: its EXPOSURE of 2 is not undone, as in other renderers"]);
+        assert_near(sky.radiance(Vec3::X), Vec3::new(2.0, 1.0, 0.0));
+        let digest = "1ac12aad04ffe539158961e10343c4890259a58a56ba06051e566d69e6bc50a3";
+        assert_eq!(sky.hash, digest);
+        write(255);
+        assert_ne!(load(1.0, 0.0).expect("it loads").hash, digest);
+        let refused = |strength: f32, rotation: f32| {
+            let error = load(strength, rotation).expect_err("it must be refused").to_string();
+            error.replace(&path.display().to_string(), "sky.hdr")
+        };
+        for (strength, rotation, expected) in [
+            (-1.0, 0.0, "environment strength -1: is not a number from 0"),
+            (f32::NAN, 0.0, "environment strength NaN: is not a number from 0"),
+            (f32::INFINITY, 0.0, "environment strength inf: is not a number from 0"),
+            (1.0, f32::INFINITY, "environment rotation inf: is not a number of degrees"),
+            (
+                8.0,
+                0.0,
+                "environment strength 8: the brightest pixel of sky.hdr, 8.507059e37, gets \
+                 infinitely bright",
+            ),
+        ] {
+            assert_eq!(refused(strength, rotation), expected);
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{cells::Measured, radii::Counts};
 use crate::{
-    error::Result,
+    error::{Error, Result},
     gpu::Gpu,
     image::Frame,
     layout::Gathered,
@@ -20,6 +20,10 @@ pub(super) fn picture(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<(Frame, Measured)> {
+    if settings.final_gather > 0 {
+        let (name, value) = ("final-gather", settings.final_gather.to_string());
+        return Err(Error::Setting { name, value, problem: "is not studied".to_string() });
+    }
     let mut stats = maps.stats().clone();
     let pass = CameraPass::new(session, settings)?;
     let mut gather = session.gather(settings);
