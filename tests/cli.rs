@@ -148,6 +148,8 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
         ("render empty.gltf -o a.exr", "empty.gltf"),
         ("render scene.gltf -o a.exr --camera none", "none"),
         ("render scene.gltf -o a.exr --device no-such-adapter", "no-such-adapter"),
+        ("render scene.gltf -o a.exr --radius 0.1", "radius 0.1"),
+        ("render scene.gltf -o a.exr --final-gather 4 --mode photons", "hybrid and indirect-photons"),
         ("render scene.gltf -o folder.exr", "folder.exr: is a folder"),
         ("render scene.gltf -o nowhere/a.exr", "the folder nowhere does not exist"),
         ("render scene.gltf -o a.exr -o a.exr", "another output"),
