@@ -8,21 +8,19 @@ use std::{path::Path, process::Command, time::Instant};
 use caustica::image::{difference::rel_mse, read_exr};
 
 const RUNS: usize = 5;
-/// Photons of the global and of the caustic map, neighbours, samples per pixel.
-const SETTINGS: [[&str; 4]; 6] = [
-    ["200k", "200k", "100", "4"],
-    ["200k", "200k", "100", "1"],
-    ["150k", "50k", "100", "1"],
-    ["100k", "100k", "60", "1"],
-    ["50k", "50k", "40", "1"],
-    ["50k", "20k", "60", "1"],
+/// What is asked for, beside the size.
+const SETTINGS: [&str; 7] = [
+    "--photons 200k --spp 4",
+    "--photons 200k --spp 4 --share 0",
+    "--photons 200k --spp 4 --raw-estimate",
+    "--photons 200k --spp 4 --raw-estimate --share 0",
+    "--photons 200k --spp 1 --raw-estimate --share 0",
+    "--photons 100k --spp 4 --raw-estimate -k 60",
+    "--global-photons 50k --caustic-photons 20k --spp 4 --raw-estimate -k 60",
 ];
 
 fn main() {
-    println!(
-        "{:>5} {:>8} {:>8} {:>5} {:>4} {:>10} {:>9} {:>11}",
-        "scene", "global", "caustic", "k", "spp", "relMSE", "seconds", "efficiency"
-    );
+    println!("{:>5} {:>10} {:>9} {:>11}  options", "scene", "relMSE", "seconds", "efficiency");
     for scene in ["S1", "S2"] {
         for setting in SETTINGS {
             measure(scene, setting);
@@ -30,15 +28,16 @@ fn main() {
     }
 }
 
-fn measure(scene: &str, [global, caustic, neighbors, spp]: [&str; 4]) {
+fn measure(scene: &str, setting: &str) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let out = std::env::temp_dir().join(format!("caustica-efficiency-{}-{scene}.exr", std::process::id()));
     let mut seconds: Vec<f64> = (0..=RUNS)
         .map(|_| {
             let start = Instant::now();
             let status = Command::new(env!("CARGO_BIN_EXE_caustica"))
-                .args(["render", "-q", "--size", "256x256", "-k", neighbors, "--spp", spp])
-                .args(["--global-photons", global, "--caustic-photons", caustic, "-o"])
+                .args(["render", "-q", "--size", "256x256"])
+                .args(setting.split_whitespace())
+                .arg("-o")
                 .args([&out, &folder.join(format!("{scene}.glb"))])
                 .status()
                 .expect("the program starts");
@@ -54,9 +53,7 @@ fn measure(scene: &str, [global, caustic, neighbors, spp]: [&str; 4]) {
     let reference = read_exr(&folder.join(format!("{scene}.exr"))).expect("the reference reads");
     let error = rel_mse(&picture.radiance, &reference.radiance, None);
     let efficiency = 1.0 / (error * median);
-    println!(
-        "{scene:>5} {global:>8} {caustic:>8} {neighbors:>5} {spp:>4} {error:>10.5} {median:>9.3} {efficiency:>11.1}"
-    );
+    println!("{scene:>5} {error:>10.5} {median:>9.3} {efficiency:>11.1}  {setting}");
     if let Err(e) = std::fs::remove_file(&out) {
         eprintln!("{}: {e}", out.display());
     }

@@ -24,8 +24,8 @@ pub enum PixelFilter {
 /// Standard deviation of the Gaussian filter, pixels.
 const SIGMA: f64 = 0.5;
 /// Steps of the table of a filter that is no box, and of the integral from which it is made.
-const STEPS: usize = 256;
-const PARTS: usize = 1 << 14;
+const STEPS: usize = 1 << 12;
+const PARTS: usize = 1 << 16;
 
 impl PixelFilter {
     /// Where the filter ends on each side of the centre, pixels.

@@ -138,8 +138,10 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
     fs::create_dir(folder.path().join("folder.exr")).expect("can be made");
     fs::create_dir(folder.path().join("sky")).expect("can be made");
     // Files are known by their content.
-    fs::write(folder.path().join("sky/grid.exr"), b"#?RADIANCE\n\n-Y 1 +X 1\n\x80\x80\x80\x81")
-        .expect("can be written");
+    for name in ["grid.exr", "study.csv"] {
+        let sky = b"#?RADIANCE\n\n-Y 1 +X 1\n\x80\x80\x80\x81";
+        fs::write(folder.path().join("sky").join(name), sky).expect("can be written");
+    }
     for (words, said) in [
         ("render none.gltf -o a.exr", "none.gltf"),
         ("render text.gltf -o a.exr", "text.gltf"),
@@ -163,6 +165,7 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
         ("compare scene.gltf -o . --env none.hdr", "none.hdr: "),
         ("compare scene.gltf -o sky --env sky/grid.exr", "grid.exr: is the environment as well"),
         ("study scene.gltf -o sky --photons 1k -k 1 --env none.hdr", "none.hdr: "),
+        ("study scene.gltf -o sky --photons 1k -k 1 --env sky/study.csv", "study.csv: is the environment as well"),
         ("info none.gltf", "none.gltf"),
         ("info text.gltf", "text.gltf"),
     ] {
@@ -172,7 +175,7 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
     }
     let left = ["dark.gltf", "empty.gltf", "folder.exr", "nan.gltf", "old.exr", "scene.gltf", "sky", "text.gltf"];
     assert_eq!(names(folder.path()), left);
-    assert_eq!(names(&folder.path().join("sky")), ["grid.exr"]);
+    assert_eq!(names(&folder.path().join("sky")), ["grid.exr", "study.csv"]);
 }
 
 #[test]

@@ -14,7 +14,7 @@ use caustica::{
     bvh::Bvh,
     layout::{self, Counters, PhotonBatch},
     passes::SceneBuffers,
-    settings::{Mode, Settings},
+    settings::{Mode, Sampler, Settings},
 };
 use common::*;
 use glam::{Vec3, vec3};
@@ -66,7 +66,8 @@ fn emitted_directions(count: u32) -> Vec<Vec3> {
     scene.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
     scene.lights.push(point_light(Vec3::ZERO, 1.0));
     let bvh = Bvh::build(&scene);
-    let buffers = SceneBuffers::new(gpu, &scene, &bvh, &Settings::default()).expect("the scene fits");
+    let settings = Settings { sampler: Sampler::Random, ..Settings::default() };
+    let buffers = SceneBuffers::new(gpu, &scene, &bvh, &settings).expect("the scene fits");
     let emit = buffers.kernel(gpu, "emit_photons");
     let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns: 1, target_count: 1, ..Default::default() };
     let uniform = gpu.uniform("batch", &batch);

@@ -10,13 +10,14 @@ use std::{
 use caustica::{
     Error, Result,
     gpu::Gpu,
-    image::{check_output, read_exr},
+    image::read_exr,
     scene::Scene,
     settings::{Mode, Settings},
     study::{self, Finer, Look, Plan, Reference, Results, Subject},
 };
 
 use super::{
+    files::Files,
     progress::Display,
     render::log_library,
     say::print,
@@ -49,7 +50,7 @@ pub fn run(args: &StudyArgs) -> Result<()> {
     for warning in plan.subjects.iter().flat_map(|s| &s.scene.warnings).collect::<BTreeSet<_>>() {
         display.note(&format!("warning: {warning}"));
     }
-    prepare(&args.output)?;
+    prepare(args)?;
     let gpu = Gpu::open(options.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
     let watch = StudyDisplay { display: &display, told: Mutex::default() };
@@ -120,9 +121,12 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
 }
 
 /// Makes the folder and finds out before the work that files can be written there.
-fn prepare(folder: &Path) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_path_buf(), source })?;
+fn prepare(args: &StudyArgs) -> Result<()> {
+    let folder = &args.output;
+    std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
+    let environment = args.options.environment.env.as_deref();
+    let mut files = Files::read(environment.map(|path| (path, "the environment")));
     ["study.csv", "study.json", "contact-sheet.png", "report.html"]
         .iter()
-        .try_for_each(|name| check_output(&folder.join(name)))
+        .try_for_each(|name| files.write(&folder.join(name)))
 }

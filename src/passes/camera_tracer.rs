@@ -111,7 +111,9 @@ impl CameraTracer {
     pub fn tiles(&self) -> Vec<Tile> {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
         let pixels = (TILE_POINTS as u32 / (self.view.branches * samples)).max(MIN_TILE_PIXELS);
-        let bits = pixels.ilog2();
+        let side_bits = |side: u32| side.next_power_of_two().ilog2();
+        let needed = 2 * side_bits(self.view.width.max(self.view.height)).max(MIN_TILE_PIXELS.ilog2() / 2);
+        let bits = pixels.ilog2().min(needed);
         let (width, height) = (1_u32 << bits.div_ceil(2), 1_u32 << (bits / 2));
         let mut tiles = Vec::new();
         for first_row in (0..self.view.height).step_by(height as usize) {

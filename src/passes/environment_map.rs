@@ -1,7 +1,8 @@
 //! The environment as the device reads it: pixels, and tables by which directions are drawn.
 //!
-//! A pixel is chosen in proportion to the luminance around it and its solid angle; within it directions are uniform. The
-//! luminance is blurred by a 3 x 3 tent first, so that the density is above 0 wherever the interpolated radiance is.
+//! A cell has the centres of four pixels for its corners; those of the first and the last row reach from a pole to the
+//! centres of the outer pixels. It is chosen in proportion to its corners' mean luminance and its solid angle; within it the
+//! density follows the interpolated luminance (`shaders/lib/environment.wesl`), so that it is above 0 wherever the radiance is.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,9 +14,11 @@ use crate::scene::Environment;
 pub struct EnvironmentMap {
     pub columns: u32,
     pub rows: u32,
-    /// Radiance, W/(m² sr), and the cumulative probability of the pixel in its row.
+    /// Radiance, W/(m² sr), and its mean over the channels.
     pub pixels: Vec<[f32; 4]>,
-    /// Cumulative probability of the rows.
+    /// Cumulative probability of the cells in their row; `rows + 1` rows of `columns`.
+    pub cells: Vec<f32>,
+    /// Cumulative probability of the rows of cells.
     pub marginal: Vec<f32>,
     /// Integral of the radiance over all directions, W/m² in each channel.
     pub integral: [f64; 3],
@@ -34,30 +37,37 @@ impl EnvironmentMap {
             (pixels, size) = halved(&pixels, size);
         }
         let (columns, rows) = size;
-        let weights = blurred_luminance(&pixels, size);
-        let (mut table, mut row_weights, mut integral) = (Vec::with_capacity(pixels.len()), Vec::new(), [0.0; 3]);
-        for (row, (colors, weights)) in pixels.chunks(columns).zip(weights.chunks(columns)).enumerate() {
-            let solid_angle = row_solid_angle(row, rows) / columns as f64;
-            row_weights.push(weights.iter().sum::<f64>() * solid_angle);
-            for (color, in_row) in colors.iter().zip(cumulative(weights)) {
-                (0..3).for_each(|c| integral[c] += f64::from(color[c]) * solid_angle);
-                table.push([color[0], color[1], color[2], in_row]);
+        let at = |x: usize, y: usize| pixels[y * columns + x % columns];
+        let mean = |p: [f32; 3]| p.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
+        let (mut cells, mut row_weights, mut integral) = (Vec::with_capacity(pixels.len()), Vec::new(), [0.0; 3]);
+        for row in 0..=rows {
+            let (above, below) = (row.max(1) - 1, row.min(rows - 1));
+            let solid_angle = cell_solid_angle(row, rows) / columns as f64;
+            let mut weights = Vec::with_capacity(columns);
+            for x in 0..columns {
+                let corners = [at(x, above), at(x + 1, above), at(x, below), at(x + 1, below)];
+                let channel = |c: usize| corners.iter().map(|p| f64::from(p[c])).sum::<f64>() / 4.0;
+                (0..3).for_each(|c| integral[c] += channel(c) * solid_angle);
+                weights.push(corners.map(mean).iter().sum::<f64>() / 4.0);
             }
+            row_weights.push(weights.iter().sum::<f64>() * solid_angle);
+            cells.extend(cumulative(&weights));
         }
         Self {
             columns: columns as u32,
             rows: rows as u32,
-            pixels: table,
+            cells,
             marginal: cumulative(&row_weights),
             integral,
             rotation: environment.rotation,
+            pixels: pixels.iter().map(|&p| [p[0], p[1], p[2], mean(p) as f32]).collect(),
         }
     }
 }
 
-/// Steradians of a row of pixels.
-fn row_solid_angle(row: usize, rows: usize) -> f64 {
-    let edge = |row: usize| (PI * row as f64 / rows as f64).cos();
+/// Steradians of a row of cells.
+fn cell_solid_angle(row: usize, rows: usize) -> f64 {
+    let edge = |row: usize| (PI * (row as f64 - 0.5).clamp(0.0, rows as f64) / rows as f64).cos();
     TAU * (edge(row) - edge(row + 1))
 }
 
@@ -70,26 +80,6 @@ fn halved(pixels: &[[f32; 3]], (columns, rows): (usize, usize)) -> (Vec<[f32; 3]
         (0.25 * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1))).to_array()
     };
     ((0..half.0 * half.1).map(mean).collect(), half)
-}
-
-/// Mean of the channels under the weights 1 2 1 along columns and rows; columns go round, rows end at the poles.
-fn blurred_luminance(pixels: &[[f32; 3]], (columns, rows): (usize, usize)) -> Vec<f64> {
-    let luminance = |i: usize| pixels[i].iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
-    let tent = |before: f64, here: f64, after: f64| 0.25 * before + 0.5 * here + 0.25 * after;
-    let along: Vec<f64> = (0..pixels.len())
-        .map(|i| {
-            let (x, first) = (i % columns, i - i % columns);
-            let (before, after) = (first + (x + columns - 1) % columns, first + (x + 1) % columns);
-            tent(luminance(before), luminance(i), luminance(after))
-        })
-        .collect();
-    (0..pixels.len())
-        .map(|i| {
-            let above = if i < columns { i } else { i - columns };
-            let below = if i + columns < columns * rows { i + columns } else { i };
-            tent(along[above], along[i], along[below])
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -114,19 +104,23 @@ mod tests {
     #[test]
     fn a_map_that_is_too_large_is_averaged_down() {
         let map = map(9, 5, 16 * 15);
-        assert_eq!((map.columns, map.rows, map.pixels.len(), map.marginal.len()), (5, 3, 15, 3));
+        assert_eq!((map.columns, map.rows, map.cells.len(), map.marginal.len()), (5, 3, 20, 4));
         // The bright pixel 5 of row 0 is one of the four of pixel 2.
         assert_eq!(map.pixels[2][..3], [0.0, 1.5, 2.0]);
         assert_eq!(map.pixels[1][..3], [0.0, 0.0, 2.0]);
     }
 
     #[test]
-    fn neighbours_of_a_lonely_pixel_can_be_drawn() {
+    fn the_cells_around_a_lonely_pixel_can_be_drawn_and_no_others() {
         let pixels = (0..8 * 4).map(|i| [if i == 16 { 1.0 } else { 0.0 }; 3]).collect();
         let environment = Environment { width: 8, height: 4, pixels, ..Environment::uniform(glam::Vec3::ZERO) };
         let map = EnvironmentMap::new(&environment, u64::MAX);
-        let in_row: Vec<f32> = map.pixels[16..24].iter().map(|p| p[3]).collect();
-        assert!(in_row[0] > 0.4 && in_row[1] > 0.7 && in_row[6] == in_row[1] && in_row[7] == 1.0, "{in_row:?}");
-        assert!(map.marginal[0] == 0.0 && map.marginal[1] > 0.1 && map.marginal[2] < 1.0 && map.marginal[3] == 1.0);
+        // Pixel 0 of row 2: the last and the first cells of rows 2 and 3.
+        for row in [2, 3] {
+            let cells = &map.cells[8 * row..8 * row + 8];
+            assert!((cells[0] - 0.5).abs() < 1e-6 && cells[6] == cells[0] && cells[7] == 1.0, "{cells:?}");
+        }
+        let marginal = &map.marginal;
+        assert!(marginal[1] == 0.0 && marginal[2] > 0.4 && marginal[2] < 0.6 && marginal[3] == 1.0, "{marginal:?}");
     }
 }

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Points that are searched together; more go in several batches.
-const BATCH: u32 = 65_536;
+const BATCH: u32 = 32_768;
 /// Bits of a point's key: its place on the curve.
 const POINT_KEY_BITS: u32 = 30;
 /// Queries of one invocation.

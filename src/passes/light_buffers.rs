@@ -38,6 +38,7 @@ pub struct LightBuffers {
     targets: Buffer,
     surroundings: Buffer,
     environment: Buffer,
+    environment_cells: Buffer,
     environment_rows: Buffer,
 }
 
@@ -65,7 +66,9 @@ impl LightBuffers {
             rotation_cos: cosine,
             rotation_sin: sine,
         };
-        let (pixels, rows) = map.as_ref().map_or((&[][..], &[][..]), |map| (&map.pixels[..], &map.marginal[..]));
+        let pixels = map.as_ref().map_or(&[][..], |map| &map.pixels);
+        let cells = map.as_ref().map_or(&[][..], |map| &map.cells);
+        let rows = map.as_ref().map_or(&[][..], |map| &map.marginal);
         Ok(Self {
             photons: upload("photon light choices", &table.for_photons(settings))?,
             aimed: upload("aimed light choices", &table.for_aimed_photons(&targets, &around, settings))?,
@@ -77,6 +80,7 @@ impl LightBuffers {
             targets: gpu.storage_with("targets", &spheres)?,
             surroundings: gpu.uniform("surroundings", &surroundings),
             environment: gpu.storage_with("environment", pixels)?,
+            environment_cells: gpu.storage_with("environment cells", cells)?,
             environment_rows: gpu.storage_with("environment rows", rows)?,
             table,
         })
@@ -84,12 +88,13 @@ impl LightBuffers {
 
     /// The variables that all passes share; a pass binds its `choices` besides.
     #[must_use]
-    pub fn bindings(&self) -> [(&'static str, &Buffer); 5] {
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 6] {
         [
             ("lights", &self.lights),
             ("targets", &self.targets),
             ("surroundings", &self.surroundings),
             ("environment", &self.environment),
+            ("environment_cells", &self.environment_cells),
             ("environment_rows", &self.environment_rows),
         ]
     }

@@ -1,0 +1,78 @@
+//! What each option costs and what it gains: seconds of whole processes, and relMSE where the reference shows the same picture.
+//!
+//! `cargo bench --bench options`. Renders S1 at 256 x 256 with one option changed at a time, all in turn, three times round, driver
+//! cache warm; the table gives the median time, and of the pictures the mean relMSE over three seeds.
+
+use std::{path::Path, process::Command, time::Instant};
+
+use caustica::image::{difference::rel_mse, read_exr};
+
+const ROUNDS: u32 = 3;
+/// Options that are changed, and whether the picture is that of the reference.
+const CHANGES: [(&str, bool); 17] = [
+    ("", true),
+    ("--share 0", true),
+    ("--sampler random", true),
+    ("--raw-estimate", true),
+    ("--raw-estimate --share 0", true),
+    ("--emission unaimed", true),
+    ("--kernel constant", true),
+    ("--kernel epanechnikov", true),
+    ("--kernel gaussian", true),
+    ("--kernel silverman", true),
+    ("--search radius --radius 0.06", true),
+    ("--final-gather 4", true),
+    ("--spp 1", true),
+    ("--spp 16", true),
+    ("--pixel-filter gaussian", false),
+    ("--aperture 0.2 --focus 4.5", false),
+    ("--crop 96,96,64,64", false),
+];
+
+fn main() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
+    let reference = read_exr(&folder.join("S1.exr")).expect("the reference reads").radiance;
+    let out = std::env::temp_dir().join(format!("caustica-options-{}.exr", std::process::id()));
+    let run = |options: &str, seed: u32| {
+        let start = Instant::now();
+        let status = Command::new(env!("CARGO_BIN_EXE_caustica"))
+            .args(["render", "-q", "--size", "256x256", "--photons", "200k", "--seed", &seed.to_string()])
+            .args(options.split_whitespace())
+            .arg("-o")
+            .args([&out, &folder.join("S1.glb")])
+            .status()
+            .expect("the program starts");
+        assert!(status.success(), "{options} renders");
+        start.elapsed().as_secs_f64()
+    };
+    let mut seconds = CHANGES.map(|_| Vec::new());
+    let mut errors = [0.0; CHANGES.len()];
+    // Before the first round each once, for the driver's cache.
+    CHANGES.iter().for_each(|(options, _)| {
+        run(options, 0);
+    });
+    for seed in 0..ROUNDS {
+        for (i, (options, compares)) in CHANGES.iter().enumerate() {
+            seconds[i].push(run(options, seed));
+            if *compares {
+                let picture = read_exr(&out).expect("the program wrote a picture").radiance;
+                errors[i] += rel_mse(&picture, &reference, None) / f64::from(ROUNDS);
+            }
+        }
+    }
+    println!("{:<32} {:>8} {:>8} {:>10}", "option", "seconds", "ratio", "relMSE");
+    let median = |times: &mut Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    };
+    let plain = median(&mut seconds[0]);
+    for (i, (options, compares)) in CHANGES.iter().enumerate() {
+        let time = median(&mut seconds[i]);
+        let error = if *compares { format!("{:.5}", errors[i]) } else { "–".to_owned() };
+        let name = if options.is_empty() { "none" } else { options };
+        println!("{name:<32} {time:>8.3} {:>8.2} {error:>10}", time / plain);
+    }
+    if let Err(e) = std::fs::remove_file(&out) {
+        eprintln!("{}: {e}", out.display());
+    }
+}
