@@ -59,10 +59,10 @@ fn hybrid_is_direct_rays_plus_indirect_photons() {
 #[test]
 fn final_gathering_has_the_mean_of_the_estimate() {
     let scene = room();
-    let settings = Settings { max_bounces: 0, ..settings(Mode::Hybrid, 200_000, 32) };
+    let settings = Settings { max_bounces: 0, ..settings(Mode::Hybrid, 100_000, 24) };
     let plain = mean(&render_scene(&scene, &settings));
     for emission in [Emission::Aimed, Emission::Unaimed] {
-        let gathered = mean(&render_scene(&scene, &Settings { final_gather: 8, emission, ..settings.clone() }));
+        let gathered = mean(&render_scene(&scene, &Settings { final_gather: 6, emission, ..settings.clone() }));
         assert!(within(gathered, plain, 0.015), "{emission:?}: {gathered} instead of {plain}");
         assert!(!within(1.03 * gathered, plain, 0.015), "control: a picture 3 % brighter passes");
     }

@@ -1,0 +1,24 @@
+//! Errors of the estimate where surfaces end, meet or curve, against closed forms: `cargo bench --bench estimators`. What its options
+//! cost is in `cargo bench --bench options`.
+
+#[path = "../tests/photons/mod.rs"]
+mod photons;
+#[path = "../tests/surfaces/mod.rs"]
+mod surfaces;
+
+use caustica::gpu::Gpu;
+
+fn main() {
+    let gpu = Gpu::open(None).expect("an adapter");
+    println!("{} ({})", gpu.name, gpu.driver);
+    places(&gpu);
+}
+
+fn places(gpu: &Gpu) {
+    let ways = surfaces::ways().map(|(name, _)| name);
+    println!("\n{:<26} {}", "error of the mean, %", ways.map(|way| format!("{way:>16}")).join(""));
+    for place in surfaces::places(400) {
+        let errors = surfaces::estimates(gpu, &place, 8).map(|found| 100.0 * surfaces::bias(&place, &found));
+        println!("{:<26} {}", place.name, errors.map(|error| format!("{error:>16.1}")).join(""));
+    }
+}
