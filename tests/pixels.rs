@@ -85,7 +85,9 @@ fn every_prefix_is_fair_and_spread() {
     let spread = |points: &[DVec2]| {
         [4_usize, 16, 64, 256].iter().all(|&n| {
             let halves_and_so_on = (0..=n.ilog2()).map(|level| 1 << level);
-            halves_and_so_on.into_iter().all(|parts| shares(&points[..n], parts).iter().flatten().all(|&c| c == n / parts))
+            halves_and_so_on
+                .into_iter()
+                .all(|parts| shares(&points[..n], parts).iter().flatten().all(|&c| c == n / parts))
         })
     };
     assert!(spread(&sobol), "a part of an axis has more than its share");
