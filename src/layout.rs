@@ -453,7 +453,7 @@ pub struct GatherInfo {
     pub stride: u32,
     /// Mean of the kernel over the disc.
     pub kernel_mean: f32,
-    /// Coefficients of the kernel's polynomial, see [`crate::density`]: the first four, and the fifth.
+    /// Coefficients of the kernel's polynomial from the rim, see [`crate::density`]: the first four, and the fifth.
     pub kernel: [f32; 4],
     pub kernel_fifth: f32,
     /// Points take part whose [`VisiblePoint::valid`] is not 0 and at most this.
