@@ -48,9 +48,9 @@ fn main() {
     let mut seconds = CHANGES.map(|_| Vec::new());
     let mut errors = [0.0; CHANGES.len()];
     // Before the first round each once, for the driver's cache.
-    CHANGES.iter().for_each(|(options, _)| {
+    for (options, _) in CHANGES {
         run(options, 0);
-    });
+    }
     for seed in 0..ROUNDS {
         for (i, (options, compares)) in CHANGES.iter().enumerate() {
             seconds[i].push(run(options, seed));

@@ -222,9 +222,9 @@ pub struct Counters {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PhotonBatch {
     pub seed: u32,
-    /// Index of the first path, low and high word.
-    pub first_path: u32,
-    pub first_path_high: u32,
+    /// Round of the first path, low and high word: paths before it over `turns`.
+    pub first_round: u32,
+    pub first_round_high: u32,
     pub paths: u32,
     /// Entries of the table of lights.
     pub light_count: u32,
@@ -453,7 +453,7 @@ pub struct GatherInfo {
     pub stride: u32,
     /// Mean of the kernel over the disc.
     pub kernel_mean: f32,
-    /// Coefficients of the kernel's polynomial, see [`crate::density`]: the first four, and the fifth.
+    /// Coefficients of the kernel's polynomial from the rim, see [`crate::density`]: the first four, and the fifth.
     pub kernel: [f32; 4],
     pub kernel_fifth: f32,
     /// Points take part whose [`VisiblePoint::valid`] is not 0 and at most this.

@@ -208,7 +208,7 @@ impl<'s> Gather<'s> {
         if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
             self.scratch = Some(Scratch::new(gpu, count.min(BATCH), self.options.surveys())?);
         }
-        let [first_four @ .., fifth] = polynomial.coefficients.map(|c| c as f32);
+        let [first_four @ .., fifth] = polynomial.from_rim().map(|c| c as f32);
         let quantile = |i| polynomial.quantile((i as f64 + 0.5) / SURVEY_SAMPLES as f64) as f32;
         let radii = gpu.storage_with("survey radii", &(0..SURVEY_SAMPLES).map(quantile).collect::<Vec<_>>())?;
         let mut stats = GatherStats::default();

@@ -120,9 +120,10 @@ impl PhotonTracer {
             let until_check = growth_window - first_path % growth_window;
             let wanted = plan.maps(traced).map(|(_, map)| map.paths_wanted(first_path)).max().unwrap_or(0);
             let paths = wanted.min(batch_limit).min(max_paths - first_path).min(until_check);
+            let round = first_path / u64::from(plan.choices.turns);
             let batch = PhotonBatch {
-                first_path: first_path as u32,
-                first_path_high: (first_path >> 32) as u32,
+                first_round: round as u32,
+                first_round_high: (round >> 32) as u32,
                 paths: paths as u32,
                 first_turn: (first_path % u64::from(plan.choices.turns)) as u32,
                 staging_capacity: buffers.staging_capacity as u32,

@@ -74,7 +74,8 @@ impl Cluster {
 /// Sphere around all geometry.
 #[must_use]
 pub fn scene_target(scene: &Scene) -> Target {
-    sphere_around(&items(scene, |_| true))
+    let (center, radius) = scene.bounding_sphere();
+    Target { center, radius }
 }
 
 /// Spheres that together hold all delta surfaces, at most [`MAX_TARGETS`]; none where there are none. The largest cluster is
@@ -126,7 +127,7 @@ fn sphere_around(items: &[Item]) -> Target {
     let center = 0.5 * (min + max);
     // Rounding must leave nothing outside.
     let radius = items.iter().map(|item| item.reach(center)).fold(0.0, f32::max);
-    Target { center, radius: radius * 1.0001 + center.abs().max_element() * 1e-6 }
+    Target { center, radius: radius * 1.00001 }
 }
 
 fn items(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Item> {

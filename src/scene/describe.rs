@@ -92,7 +92,7 @@ impl Scene {
                     kind: light.kind,
                     position: (light.kind != LightKind::Directional).then(|| world(light.position)),
                     direction: (light.kind != LightKind::Point).then(|| light.direction.to_array()),
-                    power: light.power(0.5 * bounds.diagonal()).to_array(),
+                    power: light.power(self.bounding_sphere().1).to_array(),
                 })
                 .collect(),
             emitters: self.emitters(),

@@ -69,6 +69,20 @@ impl Scene {
         triangles.chain(self.spheres.iter().map(Bounds::from)).fold(Bounds::EMPTY, Bounds::union)
     }
 
+    /// Sphere around all geometry, about the middle of its box: centre and radius, metres; no more than rounding larger than
+    /// it must be. Zero and zero without geometry.
+    #[must_use]
+    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+        let bounds = self.bounds();
+        if bounds.min.x > bounds.max.x {
+            return (Vec3::ZERO, 0.0);
+        }
+        let center = 0.5 * (bounds.min + bounds.max);
+        let corners = self.triangles.iter().flat_map(|t| t.positions).map(|p| p.distance(center));
+        let balls = self.spheres.iter().map(|s| s.center.distance(center) + s.radius);
+        (center, corners.chain(balls).fold(0.0, f32::max) * 1.00001)
+    }
+
     /// Some surface scatters into single directions only, so that there can be caustics.
     #[must_use]
     pub fn has_delta(&self) -> bool {

@@ -167,7 +167,8 @@ fn balls_vanish_in_a_furnace() {
         scene.spheres.push(sphere(vec3(0.6, 0.0, 0.0), 0.6, 0));
         scene.environment = Some(Environment::uniform(Vec3::ONE));
         scene.cameras.push(camera(vec3(0.0, 0.0, 6.0), Vec3::ZERO, 25.0));
-        let settings = Settings { max_bounces: 60, neighbors: 50, ..settings(mode, 60_000, 32) };
+        let settings =
+            Settings { max_bounces: 60, neighbors: 50, max_paths: Some(300_000), ..settings(mode, 60_000, 32) };
         let render = render_scene(&scene, &settings);
         assert!(render.frame.alpha.contains(&0.0), "the furnace itself has no coverage");
         render

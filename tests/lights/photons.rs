@@ -19,7 +19,7 @@ use caustica::{
 };
 use glam::{Vec3, vec3};
 
-use crate::{common::*, direct_flux, floor, spot};
+use crate::{common::*, direct_flux, floor, flux, spot, traced};
 
 /// A floor with a block and a glass ball, seen away from its edges.
 fn yard() -> Scene {
@@ -75,7 +75,8 @@ fn lit_yards() -> Vec<(&'static str, Scene)> {
 fn photons_agree_with_rays_under_every_kind_of_light() {
     for (name, scene) in lit_yards() {
         let [rays, photons] = [Mode::Hybrid, Mode::Photons].map(|mode| {
-            let settings = Settings { neighbors: 25, light_samples: 8, ..settings(mode, 80_000, 32) };
+            let settings =
+                Settings { neighbors: 25, light_samples: 8, max_paths: Some(300_000), ..settings(mode, 80_000, 32) };
             mean(&render_scene(&scene, &settings))
         });
         eprintln!("{name:24} {rays} {photons} {:+.4}", photons / rays - 1.0);
@@ -181,6 +182,21 @@ fn photons_go_to_lights_as_asked() {
         let measured = share(light_sampling, weights);
         assert!(within(measured, right, 0.03), "{light_sampling:?} {weights:?}: {measured} instead of {right}");
         assert!(!within(measured, wrong, 0.03), "{light_sampling:?} {weights:?}: control {wrong} passes");
+    }
+    // Dealt in turn, each of two unequal lights at the centre still shines up as much as down.
+    let mut pair = scene.clone();
+    pair.lights = [1.0, 0.1].map(|intensity| point_light(Vec3::ZERO, intensity)).into();
+    pair.triangles.clear();
+    let in_turn = Settings { light_sampling: LightSampling::Uniform, ..settings(Mode::DirectPhotons, 40_000, 8) };
+    let map = traced(&pair, &in_turn).global;
+    let photons = map.read(gpu()).expect("photons read back");
+    for axis in 0..3 {
+        let upper = flux(photons.iter().filter(|p| p.position[axis] > 0.0), map.emitted);
+        assert!(within(upper, 2.0 * PI * 1.1, 0.02), "{upper} W on one side of axis {axis}");
+        assert!(
+            !within(upper, 4.0 * PI, 0.02) && !within(upper, 0.4 * PI, 0.02),
+            "control: one light above, one below"
+        );
     }
     // Shares change the noise, not the light.
     let mean_of = |weights: &[(&str, f64)]| mean(&run(LightSampling::Power, weights).expect("the scene renders"));
