@@ -18,7 +18,7 @@ fn places(gpu: &Gpu) {
     let ways = surfaces::ways().map(|(name, _)| name);
     println!("\n{:<26} {}", "error of the mean, %", ways.map(|way| format!("{way:>16}")).join(""));
     for place in surfaces::places(400) {
-        let errors = surfaces::estimates(gpu, &place, 8).map(|found| 100.0 * surfaces::bias(&place, &found));
+        let errors = surfaces::estimates(gpu, &place, 3).map(|found| 100.0 * surfaces::bias(&place, &found));
         println!("{:<26} {}", place.name, errors.map(|error| format!("{error:>16.1}")).join(""));
     }
 }
