@@ -215,7 +215,7 @@ impl Default for Settings {
             max_paths: None,
             neighbors: 100,
             cone_constant: 2.0,
-            share_reach: 1.5,
+            share_reach: 2.0,
             max_radius: None,
             max_bounces: 20,
             spp: 4,

@@ -1,4 +1,4 @@
-//! The references at 128 x 128, made by other renderers; see `tests/references/README.md`.
+//! The references at 256 x 256 and 128 x 128, made by other renderers; see `tests/references/README.md`.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -20,9 +20,8 @@ use common::*;
 fn errors(name: &str, other: &str, most: f64) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
-    let picture = render_scene(&scene, &Settings { spp: 4, ..settings(Mode::Hybrid, 200_000, 128) }).frame.radiance;
-    let reference =
-        |name: &str| read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance;
+    let picture = render_scene(&scene, &Settings { spp: 4, ..settings(Mode::Hybrid, 200_000, 256) }).frame.radiance;
+    let reference = |name: &str| read_exr(&folder.join(format!("{name}.exr"))).expect("the reference reads").radiance;
     let right = rel_mse(&picture, &reference(name), None);
     assert!(right < most, "{name}: relMSE {right}");
     let wrong = rel_mse(&picture, &reference(other), None);

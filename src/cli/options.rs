@@ -94,10 +94,10 @@ pub struct SharedOptions {
     pub max_radius: Option<f32>,
 
     /// Points on one surface share an estimate within this fraction of its radius, 0 to 2; 0 makes one for every sample
-    #[arg(long, value_name = "F", default_value_t = 1.5, value_parser = share_reach, help_heading = "Estimate")]
+    #[arg(long, value_name = "F", default_value_t = 2.0, value_parser = share_reach, help_heading = "Estimate")]
     pub share: f32,
 
-    /// Jittered camera samples per pixel, averaged over the pixel's square; 1 is the pixel's centre [default: 4]
+    /// Camera samples per pixel, spread over the pixel filter; 1 is the pixel's centre [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
     pub spp: Option<u32>,
 
