@@ -153,8 +153,8 @@ fn a_full_map_is_normalised_by_its_own_paths() {
         assert!(global.stored > 9_900, "the global map holds only {} photons", global.stored);
         assert!(caustic.emitted > 20 * global.emitted, "the global map was full after {} paths", global.emitted);
         let (a, b) = (mean(&full), mean(&open));
-        assert!(within(a, b, 0.02), "{light_sampling:?}: mean {a} with a full map, {b} with an open one");
+        assert!(within(a, b, 0.03), "{light_sampling:?}: mean {a} with a full map, {b} with an open one");
         let wrong = a * global.emitted as f64 / caustic.emitted as f64;
-        assert!(!within(wrong, b, 0.02), "control: normalised by the caustic map's paths, {wrong} passes");
+        assert!(!within(wrong, b, 0.03), "control: normalised by the caustic map's paths, {wrong} passes");
     }
 }

@@ -27,7 +27,7 @@ fn room() -> Scene {
 }
 
 fn settings() -> Settings {
-    Settings { size: Some((24, 16)), spp: 1, ..Settings::default() }
+    Settings { size: Some((24, 16)), spp: 1, share_reach: 0.0, ..Settings::default() }
 }
 
 fn plan(reference: Reference, modes: &[Mode], repeats: u32) -> Plan {

@@ -98,7 +98,8 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
         let folder = args.scene.clone().unwrap_or_else(|| PathBuf::from(SCENES));
         let size = Some(options.size.unwrap_or(PRESET_SIZE));
         // The report's estimate, whatever became of it since.
-        let settings = Settings { size, spp: options.spp.unwrap_or(PRESET_SPP), raw_estimate: true, ..settings };
+        let spp = options.spp.unwrap_or(PRESET_SPP);
+        let settings = Settings { size, spp, raw_estimate: true, share_reach: 0.0, ..settings };
         return study::report(&folder, &settings, args.repeat.unwrap_or(PRESET_REPEATS), args.preset_scale, look);
     }
     // clap has seen to it that all three are there.

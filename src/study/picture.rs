@@ -12,7 +12,7 @@ use crate::{
     stats::timed,
 };
 
-/// One picture of the maps, as [`Session::picture`] makes it, and the radii of its estimates.
+/// One picture of the maps, as [`Session::picture`] makes it where no estimates are shared, and the radii of its estimates.
 pub(super) fn picture(
     gpu: &Gpu,
     session: &Session,
