@@ -1,13 +1,12 @@
 //! What each option costs and what it gains: seconds of whole processes, and relMSE where the reference shows the same picture.
 //!
-//! `cargo bench --bench options`. Renders S1 at 256 x 256 with one option changed at a time, all in turn, three times round, driver
-//! cache warm; the table gives the median time, and of the pictures the mean relMSE over three seeds.
+//! `cargo bench --bench options [-- ROUNDS]`. Renders S1 at 256 x 256 with one option changed at a time, all in turn, three times round
+//! unless given, driver cache warm; the table gives the median time, and of the pictures the mean relMSE over a seed a round.
 
 use std::{path::Path, process::Command, time::Instant};
 
 use caustica::image::{difference::rel_mse, read_exr};
 
-const ROUNDS: u32 = 3;
 /// Options that are changed, and whether the picture is that of the reference.
 const CHANGES: [(&str, bool); 17] = [
     ("", true),
@@ -26,17 +25,18 @@ const CHANGES: [(&str, bool); 17] = [
     ("--spp 16", true),
     ("--pixel-filter gaussian", false),
     ("--aperture 0.2 --focus 4.5", false),
-    ("--crop 96,96,64,64", false),
+    ("--crop 0,0,16,16", false),
 ];
 
 fn main() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let reference = read_exr(&folder.join("S1.exr")).expect("the reference reads").radiance;
     let out = std::env::temp_dir().join(format!("caustica-options-{}.exr", std::process::id()));
-    let run = |options: &str, seed: u32| {
+    let rounds: u32 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(3);
+    let run = |options: &str, size: &str, seed: u32| {
         let start = Instant::now();
         let status = Command::new(env!("CARGO_BIN_EXE_caustica"))
-            .args(["render", "-q", "--size", "256x256", "--photons", "200k", "--seed", &seed.to_string()])
+            .args(["render", "-q", "--size", size, "--photons", "200k", "--seed", &seed.to_string()])
             .args(options.split_whitespace())
             .arg("-o")
             .args([&out, &folder.join("S1.glb")])
@@ -49,14 +49,14 @@ fn main() {
     let mut errors = [0.0; CHANGES.len()];
     // Before the first round each once, for the driver's cache.
     for (options, _) in CHANGES {
-        run(options, 0);
+        run(options, "16x16", 0);
     }
-    for seed in 0..ROUNDS {
+    for seed in 0..rounds {
         for (i, (options, compares)) in CHANGES.iter().enumerate() {
-            seconds[i].push(run(options, seed));
+            seconds[i].push(run(options, "256x256", seed));
             if *compares {
                 let picture = read_exr(&out).expect("the program wrote a picture").radiance;
-                errors[i] += rel_mse(&picture, &reference, None) / f64::from(ROUNDS);
+                errors[i] += rel_mse(&picture, &reference, None) / f64::from(rounds);
             }
         }
     }
