@@ -22,7 +22,8 @@ fn errors(name: &str, other: &str, size: u32, most: f64) {
     let suffix = if size == 256 { "" } else { "_128" };
     let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
     let picture = render_scene(&scene, &Settings { spp: 4, ..settings(Mode::Hybrid, 200_000, size) }).frame.radiance;
-    let reference = |name: &str| read_exr(&folder.join(format!("{name}{suffix}.exr"))).expect("the reference reads").radiance;
+    let reference =
+        |name: &str| read_exr(&folder.join(format!("{name}{suffix}.exr"))).expect("the reference reads").radiance;
     let right = rel_mse(&picture, &reference(name), None);
     assert!(right < most, "{name}: relMSE {right}");
     let wrong = rel_mse(&picture, &reference(other), None);
