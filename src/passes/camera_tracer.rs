@@ -3,6 +3,7 @@
 
 use super::{SceneBuffers, SharedPoints, direct_light::DirectLighting};
 use crate::{
+    bvh::Media,
     error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
     layout::{CameraTile, Counters, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
@@ -65,15 +66,19 @@ pub struct StepCount {
     pub rays: u64,
     pub media_overflows: u64,
     pub unfinished: u64,
+    pub non_finite: u64,
 }
 
 impl CameraTracer {
+    /// All rays start inside of `media`, those around the middle of the camera.
+    ///
     /// # Errors
     /// Limits of the adapter; a lens before an orthographic camera.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
         camera: &Camera,
+        media: Media,
         size: (u32, u32),
         settings: &Settings,
     ) -> Result<Self> {
@@ -100,7 +105,12 @@ impl CameraTracer {
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
-            view: CameraTile { branches, filter_steps: offsets.len() as u32 - 1, ..view(camera, size, settings)? },
+            view: CameraTile {
+                branches,
+                filter_steps: offsets.len() as u32 - 1,
+                media,
+                ..view(camera, size, settings)?
+            },
             window: settings.window(size),
         })
     }
@@ -273,6 +283,7 @@ impl std::ops::AddAssign for StepCount {
         self.rays += other.rays;
         self.media_overflows += other.media_overflows;
         self.unfinished += other.unfinished;
+        self.non_finite += other.non_finite;
     }
 }
 
@@ -282,6 +293,7 @@ impl From<Counters> for StepCount {
             rays: u64::from(counters.rays) | (u64::from(counters.rays_high) << 32),
             media_overflows: u64::from(counters.media_overflows),
             unfinished: u64::from(counters.unfinished),
+            non_finite: u64::from(counters.non_finite),
         }
     }
 }
