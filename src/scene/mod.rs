@@ -17,6 +17,7 @@ mod describe;
 mod environment;
 mod gltf;
 mod light;
+mod load_options;
 mod material;
 mod shape;
 
@@ -24,6 +25,7 @@ pub use camera::{Camera, Projection};
 pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};
 pub use environment::Environment;
 pub use light::{LEAST_FALLOFF, LUMENS_PER_WATT, Light, LightKind};
+pub use load_options::LoadOptions;
 pub use material::{Material, Surface};
 pub use shape::{Bounds, Sphere, Triangle};
 
@@ -59,7 +61,24 @@ impl Scene {
     /// # Errors
     /// [`Error::Io`] where the file cannot be read; [`Error::Scene`] with the JSON path of what is wrong in it.
     pub fn load(path: &Path) -> Result<Self> {
-        gltf::load(path)
+        Self::load_with(path, &LoadOptions::default())
+    }
+
+    /// [`Scene::load`] with a choice of scene and of what is allowed.
+    ///
+    /// # Errors
+    /// As [`Scene::load`]; [`Error::Setting`] that lists the file's scenes where the one asked for is not among them.
+    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
+        gltf::load(path, options)
+    }
+
+    /// Reads the bytes of a `.gltf` or `.glb` file as if they were those of the file at `path`, which need not be there:
+    /// the buffers that they name are looked for beside it.
+    ///
+    /// # Errors
+    /// As [`Scene::load_with`].
+    pub fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Self> {
+        gltf::read(bytes, path, options)
     }
 
     /// Smallest box around all geometry, in scene coordinates; [`Bounds::EMPTY`] without any.

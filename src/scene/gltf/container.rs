@@ -76,7 +76,7 @@ struct Asset {
 }
 
 /// Parses the JSON text; refuses versions and required extensions that are not read, by name.
-pub(super) fn parse(text: &[u8], notes: &mut Notes) -> Read<json::Root> {
+pub(super) fn parse(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<json::Root> {
     let head: Head = serde_json::from_slice(text).or_else(|error| fault("JSON", error.to_string()))?;
     if head.asset.version.split('.').next() != Some("2") {
         return fault("asset.version", format!("glTF {} is not read, only 2.0", head.asset.version));
@@ -85,13 +85,21 @@ pub(super) fn parse(text: &[u8], notes: &mut Notes) -> Read<json::Root> {
         return fault("asset.minVersion", format!("the file needs glTF {version}, only 2.0 is read"));
     }
     for (i, name) in head.required.iter().enumerate() {
-        if !SUPPORTED.contains(&name.as_str()) {
-            return fault(format!("extensionsRequired[{i}]"), format!("{name} is not supported"));
+        if SUPPORTED.contains(&name.as_str()) {
+            continue;
         }
+        if !ignored.contains(name) {
+            let problem = format!("{name} is not supported; --ignore-required {name} reads the file without it");
+            return fault(format!("extensionsRequired[{i}]"), problem);
+        }
+        notes.add(format!("extension {name} is required, but not read"));
     }
     let document = gltf::Gltf::from_slice_without_validation(text).or_else(|error| fault("JSON", error.to_string()))?;
     let root = document.document.into_json();
     for name in root.extensions_used.iter().filter(|name| !SUPPORTED.contains(&name.as_str())) {
+        if head.required.contains(name) {
+            continue;
+        }
         notes.add(format!("extension {name} is not read"));
     }
     Ok(root)

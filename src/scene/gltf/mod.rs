@@ -3,14 +3,13 @@
 //! The crate parses the JSON and validates nothing. What is read from it is checked here before it indexes anything,
 //! in this order: container, buffers, graph, accessors, meshes; then the nodes of the scene are placed.
 
-use std::io;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
 use gltf::json;
 use sha2::{Digest as _, Sha256};
 
-use super::{Bounds, Camera, Light, Scene, Sphere};
+use super::{Bounds, Camera, Light, LoadOptions, Scene, Sphere};
 use crate::{Error, Result};
 
 mod accessor;
@@ -18,6 +17,7 @@ mod buffers;
 mod cameras;
 mod container;
 mod fault;
+mod files;
 mod lights;
 mod materials;
 mod meshes;
@@ -27,36 +27,59 @@ mod spheres;
 
 use accessor::Document;
 use fault::{Notes, Read, fault};
+use files::Resources;
 use lights::PlacedLight;
 use placing::{Shown, TOO_FAR, WorldBounds};
 use spheres::PlacedSphere;
 
 /// Reads a file into a scene.
-pub(super) fn load(path: &Path) -> Result<Scene> {
-    let io_error = |source: io::Error| Error::Io { path: path.to_owned(), source };
-    let bytes = std::fs::read(path).map_err(io_error)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut scene = read(&bytes, folder).map_err(|fault| fault.of(path))?;
-    scene.path = path.to_owned();
-    scene.file_name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
-    Ok(scene)
+pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    let bytes = files::read_regular(path, u64::MAX);
+    let bytes = bytes.map_err(|source| Error::Io { path: path.to_owned(), source })?;
+    read(&bytes, path, options)
 }
 
-/// Reads the bytes of a file whose other files lie in `folder`.
-fn read(bytes: &[u8], folder: &Path) -> Read<Scene> {
+/// Reads the bytes of the file at `path`.
+pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let file_name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
     let mut notes = Notes::default();
+    let root = parse(bytes, options, &mut notes);
+    let (root, bin) = root.map_err(|fault| fault.of(path))?;
+    let chosen = nodes::choose_scene(&root, options.scene.as_deref(), &file_name)?;
     let mut hash = Sha256::new();
     hash.update(bytes);
+    if options.scene.is_some() {
+        hash.update(format!("scene {chosen}"));
+    }
+    let resources = Resources { bin, folder, allow_outside: options.allow_outside };
+    let scene = assemble(&root, chosen, &resources, hash, notes).map_err(|fault| fault.of(path))?;
+    Ok(Scene { path: path.to_owned(), file_name, ..scene })
+}
+
+/// The JSON part, with its graph of nodes checked, and the binary chunk.
+fn parse<'a>(bytes: &'a [u8], options: &LoadOptions, notes: &mut Notes) -> Read<(json::Root, Option<&'a [u8]>)> {
     let (text, bin) = container::split(bytes)?;
-    let root = container::parse(text, &mut notes)?;
+    let root = container::parse(text, &options.ignore_required, notes)?;
     nodes::check(&root)?;
-    let document = Document { root: &root, buffers: buffers::read(&root, bin, folder, &mut hash)? };
+    Ok((root, bin))
+}
+
+/// Reads all that the chosen scene shows. `hash` has taken the file's own bytes.
+fn assemble(
+    root: &json::Root,
+    chosen: usize,
+    resources: &Resources<'_>,
+    mut hash: Sha256,
+    mut notes: Notes,
+) -> Read<Scene> {
+    let document = Document { root, buffers: buffers::read(root, resources, &mut hash)? };
     let meshes = meshes::read(&document, &mut notes)?;
     document.check()?;
     drop(document);
-    note_unread(&root, &mut notes);
+    note_unread(root, &mut notes);
 
-    let placed = nodes::flatten(&root)?;
+    let placed = nodes::flatten(root, chosen)?;
     let shown: Vec<Shown<'_>> = placed
         .iter()
         .filter_map(|placed| {
@@ -64,7 +87,7 @@ fn read(bytes: &[u8], folder: &Path) -> Read<Scene> {
             Some(Shown { placed: *placed, parts: &meshes[mesh] })
         })
         .collect();
-    let carried = Carried::read(&root, &placed, &mut notes)?;
+    let carried = Carried::read(root, &placed, &mut notes)?;
     let mut bounds = WorldBounds::EMPTY;
     placing::measure(&shown, &mut bounds)?;
     carried.spheres.iter().for_each(|sphere| bounds.add(sphere.center, sphere.radius));
@@ -81,7 +104,7 @@ fn read(bytes: &[u8], folder: &Path) -> Read<Scene> {
     }
 
     let mut scene = Scene { center, mesh_count: root.meshes.len(), ..Scene::default() };
-    let slots = read_materials(&root, &shown, &carried.spheres, &mut scene, &mut notes)?;
+    let slots = read_materials(root, &shown, &carried.spheres, &mut scene, &mut notes)?;
     let slot = |material: Option<usize>| slots[material.unwrap_or(root.materials.len())];
     scene.triangles = placing::place(&shown, center, slot, &mut notes)?;
     scene.spheres = carried.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();

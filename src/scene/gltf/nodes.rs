@@ -5,6 +5,7 @@ use gltf::json;
 use json::scene::Node;
 
 use super::fault::{Read, fault};
+use crate::{Error, Result};
 
 /// A node with its place in the world.
 #[derive(Clone, Copy, Debug)]
@@ -55,9 +56,23 @@ pub(super) fn check(root: &json::Root) -> Read<()> {
     }
 }
 
-/// Nodes of the default scene (else the first, else all roots), parents first. Needs [`check`].
-pub(super) fn flatten(root: &json::Root) -> Read<Vec<Placed>> {
-    let scene = root.scene.map_or(0, |scene| scene.value());
+/// Index of the scene to show: the one of that name, else of that number; the default one, else the first, if none is
+/// asked for. Needs [`check`]. A file without scenes has 0, which [`flatten`] reads as all of its nodes.
+pub(super) fn choose_scene(root: &json::Root, wanted: Option<&str>, file_name: &str) -> Result<usize> {
+    let Some(wanted) = wanted else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
+    let named = root.scenes.iter().position(|scene| scene.name.as_deref() == Some(wanted));
+    let numbered = || wanted.parse::<usize>().ok().filter(|index| *index < root.scenes.len());
+    named.or_else(numbered).ok_or_else(|| {
+        let name = |scene: &json::Scene| scene.name.as_ref().map_or(String::new(), |name| format!(" {name:?}"));
+        let list: Vec<String> =
+            root.scenes.iter().enumerate().map(|(i, scene)| format!("{i}{}", name(scene))).collect();
+        let list = if list.is_empty() { "no scenes".to_owned() } else { format!("the scenes {}", list.join(", ")) };
+        Error::Setting { name: "scene", value: wanted.to_owned(), problem: format!("{file_name} has {list}") }
+    })
+}
+
+/// Nodes of a scene (all of them where the file has no scenes), parents first. Needs [`check`].
+pub(super) fn flatten(root: &json::Root, scene: usize) -> Read<Vec<Placed>> {
     let roots: Vec<usize> = match root.scenes.get(scene) {
         Some(scene) => scene.nodes.iter().map(|node| node.value()).collect(),
         None => {
