@@ -11,6 +11,8 @@ mod any_words;
 mod args;
 #[path = "../../src/cli/environment.rs"]
 mod environment;
+#[path = "../../src/cli/loading.rs"]
+mod loading;
 #[path = "../../src/cli/options.rs"]
 mod options;
 #[path = "../../src/cli/study_args.rs"]

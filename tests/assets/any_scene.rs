@@ -1,8 +1,10 @@
 //! What holds for any bytes given as a scene: shared by the fuzz target `scene` and the replay of its corpus.
 
+use std::path::Path;
+
 use caustica::{
     bvh::Bvh,
-    scene::{Camera, Projection, Scene, Surface},
+    scene::{Camera, LoadOptions, Projection, Scene, Surface},
 };
 
 /// Triangles up to which the tree is built too.
@@ -10,7 +12,7 @@ const MAX_BUILT: usize = 10_000;
 
 /// Reads the bytes. What comes out is sound, or a refusal in one line, which is returned.
 pub fn check(bytes: &[u8]) -> Result<Scene, String> {
-    match load(bytes) {
+    match Scene::read(bytes, Path::new("no-such-folder/any.gltf"), &LoadOptions::default()) {
         Ok(scene) => {
             sound(&scene);
             Ok(scene)
@@ -79,11 +81,4 @@ fn sound_camera(camera: &Camera) {
         }
         Projection::Orthographic { ymag } => assert!(*ymag > 0.0 && ymag.is_finite(), "camera {name}: ymag {ymag}"),
     }
-}
-
-/// As a file of its own, for readers that want a path.
-fn load(bytes: &[u8]) -> caustica::Result<Scene> {
-    let path = std::env::temp_dir().join(format!("caustica-any-{}.gltf", std::process::id()));
-    std::fs::write(&path, bytes).expect("a temporary file");
-    Scene::load(&path)
 }
