@@ -11,7 +11,8 @@ use super::say::print;
 
 /// Says what a scene holds and how it will be read.
 pub fn info(path: &Path, options: &LoadOptions) -> Result<()> {
-    let scene = Scene::load_with(path, options)?;
+    let mut scene = Scene::load_with(path, options)?;
+    scene.add_default_light();
     let text = scene.describe().to_string();
     print(&format!("{}\n", text.trim_end()));
     Ok(())

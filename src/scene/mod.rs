@@ -122,6 +122,16 @@ impl Scene {
             || self.spheres.iter().any(|sphere| is_such(sphere.material))
     }
 
+    /// Lights a scene that has no light of its own by a soft uniform sky, radiance 1 from everywhere, and notes it. A scene
+    /// with an environment keeps it, dark or not.
+    pub fn add_default_light(&mut self) {
+        if self.lights.is_empty() && !self.has_emission() && self.environment.is_none() {
+            let sky = Environment::uniform(Vec3::ONE);
+            self.environment = Some(Environment { name: "default sky".to_owned(), ..sky });
+            self.warnings.push("no light: lit by a uniform sky of radiance 1".to_owned());
+        }
+    }
+
     /// What a picture's file is to tell of where it comes from.
     #[must_use]
     pub fn origin<'a>(&'a self, settings: &'a Settings, stats: &'a Stats) -> Origin<'a> {
@@ -173,7 +183,7 @@ impl Scene {
         if self.lights.is_empty() && !self.has_emission() && self.environment.as_ref().is_none_or(Environment::is_dark)
         {
             let problem = "no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give \
-                           --env or --background";
+                           --env, --background or --default-light sky";
             return Err(error("scene", problem.to_owned()));
         }
         Ok(())

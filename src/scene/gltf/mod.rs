@@ -1,7 +1,8 @@
 //! glTF reader, the only user of the gltf crate.
 //!
 //! The crate parses the JSON and validates nothing. What is read from it is checked here before it indexes anything,
-//! in this order: container, buffers, graph, accessors, meshes; then the nodes of the scene are placed.
+//! in this order: container, JSON, graph, buffers, accessors, skins, meshes; then what the nodes of the scene show is decoded
+//! and placed.
 
 use std::path::Path;
 
@@ -16,20 +17,30 @@ mod accessor;
 mod buffers;
 mod cameras;
 mod container;
+mod extensions;
 mod fault;
 mod files;
+mod instances;
 mod lights;
 mod materials;
+mod memory;
 mod meshes;
 mod nodes;
 mod placing;
+mod primitives;
+mod root;
+mod shown;
+mod skins;
 mod spheres;
+mod strict_json;
+mod topology;
 
 use accessor::Document;
 use fault::{Notes, Read, fault};
 use files::Resources;
 use lights::PlacedLight;
-use placing::{Shown, TOO_FAR, WorldBounds};
+use placing::{TOO_FAR, WorldBounds};
+use shown::{Gallery, Shown};
 use spheres::PlacedSphere;
 
 /// Reads a file into a scene.
@@ -60,7 +71,7 @@ pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<S
 /// The JSON part, with its graph of nodes checked, and the binary chunk.
 fn parse<'a>(bytes: &'a [u8], options: &LoadOptions, notes: &mut Notes) -> Read<(json::Root, Option<&'a [u8]>)> {
     let (text, bin) = container::split(bytes)?;
-    let root = container::parse(text, &options.ignore_required, notes)?;
+    let root = root::read(text, &options.ignore_required, notes)?;
     nodes::check(&root)?;
     Ok((root, bin))
 }
@@ -74,19 +85,14 @@ fn assemble(
     mut notes: Notes,
 ) -> Read<Scene> {
     let document = Document { root, buffers: buffers::read(root, resources, &mut hash)? };
-    let meshes = meshes::read(&document, &mut notes)?;
     document.check()?;
-    drop(document);
-    note_unread(root, &mut notes);
+    skins::check(&document)?;
+    let shapes = meshes::check(&document, &mut notes)?;
 
-    let placed = nodes::flatten(root, chosen)?;
-    let shown: Vec<Shown<'_>> = placed
-        .iter()
-        .filter_map(|placed| {
-            let mesh = root.nodes[placed.node].mesh?.value();
-            Some(Shown { placed: *placed, parts: &meshes[mesh] })
-        })
-        .collect();
+    let worlds = nodes::worlds(root)?;
+    let placed = nodes::flatten(root, chosen, &worlds)?;
+    let gallery = Gallery::read(&document, &placed, &shapes, &worlds, &mut notes)?;
+    let shown = gallery.shown();
     let carried = Carried::read(root, &placed, &mut notes)?;
     let mut bounds = WorldBounds::EMPTY;
     placing::measure(&shown, &mut bounds)?;
@@ -180,15 +186,5 @@ impl Carried {
 impl PlacedSphere {
     fn relative_to(&self, center: DVec3, slot: &impl Fn(Option<usize>) -> u32) -> Sphere {
         Sphere { center: (self.center - center).as_vec3(), radius: self.radius as f32, material: slot(self.material) }
-    }
-}
-
-/// Names what the file has beyond what is read.
-fn note_unread(root: &json::Root, notes: &mut Notes) {
-    if !root.animations.is_empty() {
-        notes.add("animations are not read: nodes stand as in the file");
-    }
-    if root.nodes.iter().any(|node| node.skin.is_some()) {
-        notes.add("skins are not read: meshes are drawn as they stand");
     }
 }
