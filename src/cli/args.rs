@@ -9,6 +9,7 @@ use clap::{
 };
 
 use super::{
+    loading::LoadingOptions,
     options::{RenderOptions, SearchArg},
     study_args::StudyArgs,
     values::{output, radius, share_reach, tolerance},
@@ -39,6 +40,9 @@ pub enum Command {
     Info {
         /// glTF 2.0 file, .gltf or .glb
         scene: PathBuf,
+
+        #[command(flatten)]
+        loading: LoadingOptions,
     },
 }
 

@@ -9,6 +9,7 @@ use caustica::{
 use clap::ValueEnum;
 
 use super::environment::EnvironmentOptions;
+use super::loading::LoadingOptions;
 use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, size};
 
 /// Options of commands that make one picture.
@@ -66,6 +67,9 @@ pub struct SharedOptions {
 
     #[command(flatten)]
     pub environment: EnvironmentOptions,
+
+    #[command(flatten)]
+    pub loading: LoadingOptions,
 
     /// Photon paths emitted at most [default: 100 times the capacity]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]

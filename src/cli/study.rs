@@ -103,7 +103,7 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
         return study::report(&folder, &settings, args.repeat.unwrap_or(PRESET_REPEATS), args.preset_scale, look);
     }
     // clap has seen to it that all three are there.
-    let scene = Scene::load(args.scene.as_deref().unwrap_or(Path::new("")))?;
+    let scene = Scene::load_with(args.scene.as_deref().unwrap_or(Path::new("")), &options.loading.options())?;
     let modes: Vec<Mode> = args.modes.iter().map(|&mode| mode.into()).collect();
     let most = args.photons.iter().copied().max().unwrap_or(1);
     let (reference, size) = match &args.reference {
