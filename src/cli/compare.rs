@@ -27,7 +27,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     let display = Display::new(options.shared.quiet, options.shared.verbose);
     display.report(Stage::Load, 0, 0);
-    let mut scene = Scene::load(&args.scene)?;
+    let mut scene = Scene::load_with(&args.scene, &options.shared.loading.options())?;
     options.shared.environment.light([&mut scene])?;
     display.check()?;
     prepare(args)?;

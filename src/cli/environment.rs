@@ -7,6 +7,8 @@ use caustica::{
     scene::{Environment, Scene},
 };
 
+use clap::ValueEnum;
+
 use super::values::{color, rotation, strength};
 
 /// Light from infinitely far away, which no glTF file holds.
@@ -29,6 +31,18 @@ pub struct EnvironmentOptions {
     /// The same light from all around: radiance in W/(m² sr)
     #[arg(long, value_name = "R,G,B", value_parser = color, help_heading = "Light", conflicts_with = "env")]
     pub background: Option<[f32; 3]>,
+
+    /// What lights a scene that has no light and is given none
+    #[arg(long, value_name = "LIGHT", value_enum, default_value = "sky", help_heading = "Light")]
+    pub default_light: DefaultLightArg,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DefaultLightArg {
+    /// A uniform sky of radiance 1
+    Sky,
+    /// Nothing: such a scene is an error
+    None,
 }
 
 impl EnvironmentOptions {
@@ -36,10 +50,15 @@ impl EnvironmentOptions {
     pub fn light<'a>(&self, scenes: impl IntoIterator<Item = &'a mut Scene>) -> Result<()> {
         let file = self.env.as_deref().map(|path| Environment::load(path, self.env_strength, self.env_rotation));
         let uniform = self.background.map(|radiance| Environment::uniform(radiance.into()));
-        let Some(environment) = file.transpose()?.or(uniform) else { return Ok(()) };
+        let environment = file.transpose()?.or(uniform);
         for scene in scenes {
-            scene.warnings.extend(environment.warnings.iter().cloned());
-            scene.environment = Some(environment.clone());
+            if let Some(environment) = &environment {
+                scene.warnings.extend(environment.warnings.iter().cloned());
+                scene.environment = Some(environment.clone());
+            }
+            if self.default_light == DefaultLightArg::Sky {
+                scene.add_default_light();
+            }
         }
         Ok(())
     }

@@ -2,13 +2,17 @@
 
 use std::path::Path;
 
-use caustica::{Result, scene::Scene};
+use caustica::{
+    Result,
+    scene::{LoadOptions, Scene},
+};
 
 use super::say::print;
 
 /// Says what a scene holds and how it will be read.
-pub fn info(path: &Path) -> Result<()> {
-    let scene = Scene::load(path)?;
+pub fn info(path: &Path, options: &LoadOptions) -> Result<()> {
+    let mut scene = Scene::load_with(path, options)?;
+    scene.add_default_light();
     let text = scene.describe().to_string();
     print(&format!("{}\n", text.trim_end()));
     Ok(())

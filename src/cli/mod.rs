@@ -6,6 +6,7 @@ mod devices;
 mod environment;
 mod files;
 mod info;
+mod loading;
 mod options;
 mod progress;
 mod render;
@@ -45,6 +46,6 @@ fn work(command: Command) -> Result<()> {
         Command::Compare(args) => compare::run(&args),
         Command::Study(args) => study::run(&args),
         Command::Devices => devices::devices(),
-        Command::Info { scene } => info::info(&scene),
+        Command::Info { scene, loading } => info::info(&scene, &loading.options()),
     }
 }

@@ -9,7 +9,8 @@ use caustica::{
 use clap::ValueEnum;
 
 use super::environment::EnvironmentOptions;
-use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, share_reach, size};
+use super::loading::LoadingOptions;
+use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, size};
 
 /// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
@@ -67,6 +68,9 @@ pub struct SharedOptions {
     #[command(flatten)]
     pub environment: EnvironmentOptions,
 
+    #[command(flatten)]
+    pub loading: LoadingOptions,
+
     /// Photon paths emitted at most [default: 100 times the capacity]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
     pub max_paths: Option<u64>,
@@ -92,10 +96,6 @@ pub struct SharedOptions {
     /// Bound of the search radius in metres [default: none]
     #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
     pub max_radius: Option<f32>,
-
-    /// Points on one surface share an estimate within this fraction of its radius, 0 to 2; 0 makes one for every sample
-    #[arg(long, value_name = "F", default_value_t = 2.0, value_parser = share_reach, help_heading = "Estimate")]
-    pub share: f32,
 
     /// Camera samples per pixel, spread over the pixel filter; 1 is the pixel's centre [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
@@ -181,7 +181,6 @@ impl SharedOptions {
             raw_estimate: self.raw_estimate,
             cone_constant: self.cone_constant,
             max_radius: self.max_radius,
-            share_reach: self.share,
             max_bounces: self.max_bounces,
             spp: self.spp.unwrap_or(defaults.spp),
             size: self.size,

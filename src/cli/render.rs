@@ -32,7 +32,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     let mut load_seconds = 0.0;
     display.report(Stage::Load, 0, 0);
     let scene = timed(&mut load_seconds, || -> Result<Scene> {
-        let mut scene = Scene::load(&args.scene)?;
+        let mut scene = Scene::load_with(&args.scene, &options.shared.loading.options())?;
         options.shared.environment.light([&mut scene])?;
         Ok(scene)
     })?;

@@ -17,6 +17,8 @@ const TILE_POINTS: u64 = 1 << 16;
 const BRANCHES: u32 = 4;
 /// Samples of one pixel that a tile holds at most.
 const PIXEL_SAMPLES: u32 = 256;
+/// Dispatches of direct light whose shadow rays are counted together: with one ray of each point they stay far below 2^32.
+const DIRECT_STEPS_PER_READ: u32 = 1024;
 /// Bounces handed to the device at once.
 const BOUNCES_PER_SUBMISSION: u32 = 32;
 /// Pixels of a tile at least.
@@ -211,13 +213,14 @@ impl CameraTracer {
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
         start.dispatch(&mut encoder, &start.bind(gpu, &named(1, started)), invocations.into());
+        let most = (u64::from(invocations) * u64::from(self.view.branches)).min(TILE_POINTS);
         // The surface that ends the chain comes after max_bounces delta surfaces.
         let mut surfaces = 0;
         loop {
             for _ in 0..BOUNCES_PER_SUBMISSION.min(self.view.max_bounces + 1 - surfaces) {
                 self.advance.dispatch(&mut encoder, &advance, 1);
                 let bindings = &bindings[(surfaces % 2) as usize];
-                trace.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, 0);
+                trace.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most);
                 surfaces += 1;
             }
             gpu.submit(encoder);
@@ -237,12 +240,19 @@ impl CameraTracer {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
         let buffers =
             [("tile", &uniform), ("points", &self.points), ("radiance", &self.radiance), ("counters", &self.counters)];
-        let mut encoder = gpu.encoder();
-        encoder.clear_buffer(&self.counters, 0, None);
-        self.direct.add(gpu, scene, &mut encoder, self.point_count(tile), &buffers);
-        gpu.submit(encoder);
-        let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
-        Ok(StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) })
+        let (steps, points) = (self.direct.steps(scene), self.point_count(tile));
+        let mut count = StepCount::default();
+        for first in (0..steps).step_by(DIRECT_STEPS_PER_READ as usize) {
+            let mut encoder = gpu.encoder();
+            encoder.clear_buffer(&self.counters, 0, None);
+            for step in first..steps.min(first + DIRECT_STEPS_PER_READ) {
+                self.direct.add(gpu, scene, &mut encoder, (step, points), &buffers);
+            }
+            gpu.submit(encoder);
+            let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
+            count += StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) };
+        }
+        Ok(count)
     }
 
     /// Sums over the tile's samples of each of its pixels.

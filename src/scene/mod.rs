@@ -17,6 +17,7 @@ mod describe;
 mod environment;
 mod gltf;
 mod light;
+mod load_options;
 mod material;
 mod shape;
 
@@ -24,6 +25,7 @@ pub use camera::{Camera, Projection};
 pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};
 pub use environment::Environment;
 pub use light::{LEAST_FALLOFF, LUMENS_PER_WATT, Light, LightKind};
+pub use load_options::LoadOptions;
 pub use material::{Material, Surface};
 pub use shape::{Bounds, Sphere, Triangle};
 
@@ -59,7 +61,24 @@ impl Scene {
     /// # Errors
     /// [`Error::Io`] where the file cannot be read; [`Error::Scene`] with the JSON path of what is wrong in it.
     pub fn load(path: &Path) -> Result<Self> {
-        gltf::load(path)
+        Self::load_with(path, &LoadOptions::default())
+    }
+
+    /// [`Scene::load`] with a choice of scene and of what is allowed.
+    ///
+    /// # Errors
+    /// As [`Scene::load`]; [`Error::Setting`] that lists the file's scenes where the one asked for is not among them.
+    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
+        gltf::load(path, options)
+    }
+
+    /// Reads the bytes of a `.gltf` or `.glb` file as if they were those of the file at `path`, which need not be there:
+    /// the buffers that they name are looked for beside it.
+    ///
+    /// # Errors
+    /// As [`Scene::load_with`].
+    pub fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Self> {
+        gltf::read(bytes, path, options)
     }
 
     /// Smallest box around all geometry, in scene coordinates; [`Bounds::EMPTY`] without any.
@@ -101,6 +120,16 @@ impl Scene {
         let is_such = |material: u32| such.get(material as usize) == Some(&true);
         self.triangles.iter().any(|triangle| is_such(triangle.material))
             || self.spheres.iter().any(|sphere| is_such(sphere.material))
+    }
+
+    /// Lights a scene that has no light of its own by a soft uniform sky, radiance 1 from everywhere, and notes it. A scene
+    /// with an environment keeps it, dark or not.
+    pub fn add_default_light(&mut self) {
+        if self.lights.is_empty() && !self.has_emission() && self.environment.is_none() {
+            let sky = Environment::uniform(Vec3::ONE);
+            self.environment = Some(Environment { name: "default sky".to_owned(), ..sky });
+            self.warnings.push("no light: lit by a uniform sky of radiance 1".to_owned());
+        }
     }
 
     /// What a picture's file is to tell of where it comes from.
@@ -163,7 +192,7 @@ impl Scene {
         if self.lights.is_empty() && !self.has_emission() && self.environment.as_ref().is_none_or(Environment::is_dark)
         {
             let problem = "no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give \
-                           --env or --background";
+                           --env, --background or --default-light sky";
             return Err(error("scene", problem.to_owned()));
         }
         Ok(())

@@ -1,5 +1,6 @@
 //! Accessors: every offset, stride, count and index is checked against the bytes that are there before any is used.
 
+use glam::{DMat4, Vec3};
 use gltf::json;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
@@ -7,7 +8,7 @@ use gltf::json::validation::Checked;
 use super::buffers::Buffers;
 use super::fault::{Read, fault};
 
-/// Elements that an accessor without a bufferView (all zeros) may have.
+/// Elements that an accessor without a bufferView (all zeros but for sparse ones) may have.
 const MAX_ZEROS: u64 = 1 << 24;
 
 /// A parsed file with its bytes.
@@ -32,7 +33,7 @@ impl Format {
         Ok(Self { kind, component: component.0, normalized: accessor.normalized })
     }
 
-    /// Bytes of one element; matrices are read by nobody, so their padding does not matter.
+    /// Bytes of one element. Matrices of small integers, whose columns are padded, are read by nobody.
     fn size(self) -> usize {
         self.component.size() * self.kind.multiplicity()
     }
@@ -46,6 +47,7 @@ impl std::fmt::Display for Format {
 }
 
 /// Elements that lie within their buffer.
+#[derive(Clone, Copy, Debug)]
 struct Elements<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -54,60 +56,194 @@ struct Elements<'a> {
 }
 
 impl<'a> Elements<'a> {
-    fn iter(&self) -> impl Iterator<Item = &'a [u8]> {
-        let (bytes, stride, size) = (self.bytes, self.stride, self.size);
-        (0..self.count).map(move |i| &bytes[i * stride..i * stride + size])
+    fn get(&self, i: usize) -> &'a [u8] {
+        &self.bytes[i * self.stride..][..self.size]
+    }
+
+    /// All bytes, where there are none between the elements.
+    fn tight(&self) -> Option<&'a [u8]> {
+        (self.stride == self.size).then(|| &self.bytes[..self.count * self.size])
+    }
+
+    /// The first element that holds a float that is none.
+    fn first_not_finite(&self) -> Option<usize> {
+        // Without a branch per float this is as quick as memory, for a file may have many accessors over the same bytes.
+        let largest = |bytes: &[u8]| bytes.chunks_exact(4).fold(0, |max, x| float32(x).abs().to_bits().max(max));
+        if self.tight().is_some_and(|bytes| largest(bytes) <= f32::MAX.to_bits()) {
+            return None;
+        }
+        (0..self.count).find(|i| self.get(*i).chunks_exact(4).any(|chunk| !float32(chunk).is_finite()))
+    }
+}
+
+/// Elements that replace others.
+#[derive(Clone, Copy, Debug)]
+struct Sparse<'a> {
+    /// Ascending, once [`Document::check`] has seen them.
+    indices: Elements<'a>,
+    component: ComponentType,
+    values: Elements<'a>,
+}
+
+impl<'a> Sparse<'a> {
+    fn index(&self, i: usize) -> u32 {
+        unsigned(self.indices.get(i), self.component)
+    }
+
+    /// The element that replaces element `i`.
+    fn get(&self, i: usize) -> Option<&'a [u8]> {
+        let (mut low, mut high) = (0, self.indices.count);
+        while low < high {
+            let middle = (low + high) / 2;
+            match (self.index(middle) as usize).cmp(&i) {
+                std::cmp::Ordering::Less => low = middle + 1,
+                std::cmp::Ordering::Greater => high = middle,
+                std::cmp::Ordering::Equal => return Some(self.values.get(middle)),
+            }
+        }
+        None
+    }
+}
+
+/// The elements of one accessor, decoded one by one when they are asked for. Needs [`Document::check`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Column<'a> {
+    pub(super) format: Format,
+    pub(super) count: usize,
+    /// Zeros where there are none.
+    dense: Option<Elements<'a>>,
+    sparse: Option<Sparse<'a>>,
+}
+
+impl Column<'_> {
+    /// Component `c` of element `i` as a number; floats are finite.
+    pub(super) fn number(&self, i: usize, c: usize) -> f32 {
+        let at = c * self.format.component.size();
+        self.bytes(i).map_or(0.0, |bytes| number(&bytes[at..], self.format))
+    }
+
+    /// Three numbers of element `i`.
+    pub(super) fn vector(&self, i: usize) -> Vec3 {
+        let size = self.format.component.size();
+        self.bytes(i).map_or(Vec3::ZERO, |bytes| {
+            let [x, y, z] = [0, 1, 2].map(|c| number(&bytes[c * size..], self.format));
+            Vec3::new(x, y, z)
+        })
+    }
+
+    /// Component `c` of element `i` as an unsigned integer.
+    pub(super) fn unsigned(&self, i: usize, c: usize) -> u32 {
+        let at = c * self.format.component.size();
+        self.bytes(i).map_or(0, |bytes| unsigned(&bytes[at..], self.format.component))
+    }
+
+    /// The largest first component, as an unsigned integer; none of no elements.
+    pub(super) fn max_unsigned(&self) -> Option<u32> {
+        let component = self.format.component;
+        match (self.dense, self.sparse) {
+            (Some(dense), None) if dense.tight().is_some() => {
+                let bytes = dense.tight().unwrap_or_default();
+                match component {
+                    ComponentType::U8 => bytes.iter().map(|byte| u32::from(*byte)).max(),
+                    ComponentType::U16 => bytes.chunks_exact(2).map(|x| unsigned(x, ComponentType::U16)).max(),
+                    _ => bytes.chunks_exact(4).map(|x| unsigned(x, ComponentType::U32)).max(),
+                }
+            }
+            (Some(_), _) => (0..self.count).map(|i| self.unsigned(i, 0)).max(),
+            (None, Some(sparse)) => {
+                let replaced = (0..sparse.values.count).map(|i| unsigned(sparse.values.get(i), component));
+                replaced.chain((self.count > 0).then_some(0)).max()
+            }
+            (None, None) => (self.count > 0).then_some(0),
+        }
+    }
+
+    /// All elements are zero, whatever their number.
+    pub(super) fn is_zero(&self) -> bool {
+        self.dense.is_none() && self.sparse.is_none()
+    }
+
+    /// Element `i` as a matrix of 4 x 4 floats.
+    pub(super) fn matrix(&self, i: usize) -> DMat4 {
+        DMat4::from_cols_array(&std::array::from_fn(|c| f64::from(self.number(i, c))))
+    }
+
+    fn bytes(&self, i: usize) -> Option<&[u8]> {
+        let replaced = self.sparse.and_then(|sparse| sparse.get(i));
+        replaced.or_else(|| self.dense.map(|dense| dense.get(i)))
     }
 }
 
 impl<'a> Document<'a> {
-    /// Number of elements and their format.
-    pub(super) fn shape(&self, index: usize, place: &str) -> Read<(usize, Format)> {
-        let accessor = self.accessor(index, place)?;
-        Ok((accessor.count.0 as usize, Format::of(accessor, place)?))
-    }
-
-    /// All elements, through `element`; sparse ones replaced.
-    pub(super) fn decode<T: Copy + Default>(&self, index: usize, element: impl Fn(&[u8]) -> T) -> Read<Vec<T>> {
-        let place = format!("accessors[{index}]");
-        let accessor = self.accessor(index, &place)?;
-        let size = Format::of(accessor, &place)?.size();
-        let count = accessor.count.0;
-        let mut values = match accessor.buffer_view {
-            Some(view) => {
-                let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
-                self.elements(view.value(), offset, count, size, &place)?.iter().map(&element).collect()
-            }
-            None if count <= MAX_ZEROS => vec![T::default(); count as usize],
-            None => return fault(place, format!("{count} elements without a bufferView")),
-        };
-        if let Some(sparse) = &accessor.sparse {
-            self.replace_sparse(sparse, size, &mut values, element, &place)?;
-        }
-        Ok(values)
-    }
-
-    /// Scalars of any unsigned type.
-    pub(super) fn decode_unsigned(&self, index: usize, component: ComponentType) -> Read<Vec<u32>> {
-        self.decode(index, |bytes| unsigned(bytes, component))
-    }
-
     /// Checks all views and accessors, also those that nothing uses: ranges, references, and that floats are finite.
     pub(super) fn check(&self) -> Read<()> {
         let plain = |view: &json::buffer::View| view.extensions.as_ref().is_none_or(|e| e.others.is_empty());
         for (i, _) in self.root.buffer_views.iter().enumerate().filter(|(_, view)| plain(view)) {
             self.view(i, "")?;
         }
-        for (i, accessor) in self.root.accessors.iter().enumerate() {
+        for i in 0..self.root.accessors.len() {
             let place = format!("accessors[{i}]");
-            let float =
-                matches!(accessor.component_type, Checked::Valid(component) if component.0 == ComponentType::F32);
-            let is_finite = |bytes: &[u8]| !float || bytes.chunks_exact(4).all(|chunk| float32(chunk).is_finite());
-            if let Some(at) = self.decode(i, |bytes| !is_finite(bytes))?.iter().position(|bad| *bad) {
+            let column = self.column(i, &place)?;
+            if let Some(sparse) = column.sparse {
+                check_sparse(&sparse, column.count, &place)?;
+            }
+            if column.format.component != ComponentType::F32 {
+                continue;
+            }
+            let values =
+                column.sparse.and_then(|sparse| Some(sparse.index(sparse.values.first_not_finite()?) as usize));
+            if let Some(at) = column.dense.and_then(|dense| dense.first_not_finite()).or(values) {
                 return fault(place, format!("element {at} is not finite"));
             }
         }
         Ok(())
+    }
+
+    /// Number of elements and their format.
+    pub(super) fn shape(&self, index: usize, place: &str) -> Read<(usize, Format)> {
+        let accessor = self.accessor(index, place)?;
+        Ok((accessor.count.0 as usize, Format::of(accessor, place)?))
+    }
+
+    /// The elements of an accessor that `place` names.
+    pub(super) fn column(&self, index: usize, place: &str) -> Read<Column<'_>> {
+        let accessor = self.accessor(index, place)?;
+        let place = format!("accessors[{index}]");
+        let format = Format::of(accessor, &place)?;
+        let count = accessor.count.0;
+        let dense = match accessor.buffer_view {
+            Some(view) => {
+                let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
+                Some(self.elements(view.value(), offset, count, format.size(), &place)?)
+            }
+            None if count <= MAX_ZEROS => None,
+            None => {
+                let problem = format!("{count} elements without a bufferView, at most {MAX_ZEROS} are read");
+                return fault(place, problem);
+            }
+        };
+        let sparse = accessor.sparse.as_ref().map(|sparse| self.sparse(sparse, format, &place)).transpose()?;
+        Ok(Column { format, count: count as usize, dense, sparse })
+    }
+
+    fn sparse(&self, sparse: &json::accessor::sparse::Sparse, format: Format, place: &str) -> Read<Sparse<'_>> {
+        let at = format!("{place}.sparse.indices");
+        let Checked::Valid(component) = sparse.indices.component_type else {
+            return fault(at, "componentType is not an unsigned integer");
+        };
+        let (component, count) = (component.0, sparse.count.0);
+        let (indices, values) = (&sparse.indices, &sparse.values);
+        Ok(Sparse {
+            indices: self.elements(indices.buffer_view.value(), indices.byte_offset.0, count, component.size(), &at)?,
+            component,
+            values: self.elements(
+                values.buffer_view.value(),
+                values.byte_offset.0,
+                count,
+                format.size(),
+                &format!("{place}.sparse.values"),
+            )?,
+        })
     }
 
     fn accessor(&self, index: usize, place: &str) -> Read<&'a Accessor> {
@@ -161,38 +297,21 @@ impl<'a> Document<'a> {
             _ => fault(place, format!("{length} bytes at {offset} run past buffers[{buffer}], which has {size}")),
         }
     }
+}
 
-    /// Overwrites the elements that a sparse accessor lists.
-    fn replace_sparse<T>(
-        &self,
-        sparse: &json::accessor::sparse::Sparse,
-        size: usize,
-        values: &mut [T],
-        element: impl Fn(&[u8]) -> T,
-        place: &str,
-    ) -> Read<()> {
-        let at = format!("{place}.sparse.indices");
-        let Checked::Valid(component) = sparse.indices.component_type else {
-            return fault(at, "componentType is not an unsigned integer");
-        };
-        let (list, new) = (&sparse.indices, &sparse.values);
-        let count = sparse.count.0;
-        let list = self.elements(list.buffer_view.value(), list.byte_offset.0, count, component.0.size(), &at)?;
-        let new =
-            self.elements(new.buffer_view.value(), new.byte_offset.0, count, size, &format!("{place}.sparse.values"))?;
-        let known = values.len();
-        let mut previous = None;
-        for (index, bytes) in list.iter().map(|bytes| unsigned(bytes, component.0)).zip(new.iter()) {
-            if previous.replace(index).is_some_and(|previous| previous >= index) {
-                return fault(at, format!("index {index} does not come after the one before it"));
-            }
-            match values.get_mut(index as usize) {
-                Some(value) => *value = element(bytes),
-                None => return fault(at, format!("index {index} of {known} elements")),
-            }
+/// The indices of a sparse accessor ascend and lie within its elements.
+fn check_sparse(sparse: &Sparse<'_>, known: usize, place: &str) -> Read<()> {
+    let place = format!("{place}.sparse.indices");
+    let mut previous = None;
+    for index in (0..sparse.indices.count).map(|i| sparse.index(i)) {
+        if previous.replace(index).is_some_and(|previous| previous >= index) {
+            return fault(place, format!("index {index} does not come after the one before it"));
         }
-        Ok(())
+        if index as usize >= known {
+            return fault(place, format!("index {index} of {known} elements"));
+        }
     }
+    Ok(())
 }
 
 fn unsigned(bytes: &[u8], component: ComponentType) -> u32 {
@@ -208,7 +327,7 @@ fn float32(bytes: &[u8]) -> f32 {
 }
 
 /// A number of any type; normalised integers are spread over 0..1 or -1..1 (glTF 2.0, 3.11).
-pub(super) fn number(bytes: &[u8], format: Format) -> f32 {
+fn number(bytes: &[u8], format: Format) -> f32 {
     let (value, max) = match format.component {
         ComponentType::F32 => return float32(bytes),
         ComponentType::I8 => (f32::from(bytes[0] as i8), 127.0),

@@ -1,23 +1,6 @@
-//! The container: a GLB's chunks or plain JSON, the glTF version, and the extensions that a file may require.
+//! The container: a GLB's chunks, or plain JSON.
 
-use gltf::json;
-use serde::Deserialize;
-
-use super::fault::{Notes, Read, fault};
-
-/// Extensions that are read, or that change nothing which is read.
-const SUPPORTED: [&str; 10] = [
-    "KHR_implicit_shapes",
-    "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-];
+use super::fault::{Read, fault};
 
 /// JSON text and binary chunk of a file.
 pub(super) fn split(bytes: &[u8]) -> Read<(&[u8], Option<&[u8]>)> {
@@ -58,41 +41,4 @@ fn split_glb(bytes: &[u8]) -> Read<(&[u8], Option<&[u8]>)> {
         at += 8 + size as usize;
     }
     json.map_or_else(|| fault("GLB chunk", "the first chunk is not JSON"), |json| Ok((json, bin)))
-}
-
-/// What is looked at before the rest: other versions may be shaped differently.
-#[derive(Deserialize)]
-struct Head {
-    asset: Asset,
-    #[serde(default, rename = "extensionsRequired")]
-    required: Vec<String>,
-}
-
-#[derive(Deserialize)]
-struct Asset {
-    version: String,
-    #[serde(rename = "minVersion")]
-    min_version: Option<String>,
-}
-
-/// Parses the JSON text; refuses versions and required extensions that are not read, by name.
-pub(super) fn parse(text: &[u8], notes: &mut Notes) -> Read<json::Root> {
-    let head: Head = serde_json::from_slice(text).or_else(|error| fault("JSON", error.to_string()))?;
-    if head.asset.version.split('.').next() != Some("2") {
-        return fault("asset.version", format!("glTF {} is not read, only 2.0", head.asset.version));
-    }
-    if let Some(version) = head.asset.min_version.filter(|version| version != "2.0") {
-        return fault("asset.minVersion", format!("the file needs glTF {version}, only 2.0 is read"));
-    }
-    for (i, name) in head.required.iter().enumerate() {
-        if !SUPPORTED.contains(&name.as_str()) {
-            return fault(format!("extensionsRequired[{i}]"), format!("{name} is not supported"));
-        }
-    }
-    let document = gltf::Gltf::from_slice_without_validation(text).or_else(|error| fault("JSON", error.to_string()))?;
-    let root = document.document.into_json();
-    for name in root.extensions_used.iter().filter(|name| !SUPPORTED.contains(&name.as_str())) {
-        notes.add(format!("extension {name} is not read"));
-    }
-    Ok(root)
 }

@@ -1,156 +1,218 @@
-//! Meshes in their own coordinates: triangles out of lists, strips and fans.
+//! Meshes in their own coordinates: the triangles that a node shows, with its morph targets applied.
 
 use glam::Vec3;
 use gltf::json;
-use json::accessor::{ComponentType, Type};
-use json::mesh::{Mode, Primitive, Semantic};
-use json::validation::Checked;
+use json::mesh::{Primitive, Semantic};
 
-use super::accessor::{Document, Format, number};
+use super::accessor::{Column, Document};
 use super::fault::{Notes, Read, fault};
+use super::primitives::{Checker, Shape, attribute, joint_sets};
+use super::topology::corners;
 
 /// Triangles that share vertices and a material.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Part {
-    /// All finite.
+    /// Those that a corner is at; all finite.
     pub(super) positions: Vec<Vec3>,
     /// One for each position, of any length; `None` where the file has none.
     pub(super) normals: Option<Vec<Vec3>>,
     /// Indices into the positions, all valid.
     pub(super) corners: Vec<[u32; 3]>,
+    /// Triangles that the file has, also those left out because two of their corners are at one place.
+    pub(super) claimed: usize,
     /// Index into the file's materials, valid; `None` for the default one.
     pub(super) material: Option<usize>,
+    /// What moves each position, where a skin does; else empty.
+    pub(super) influences: Vec<Vec<Influence>>,
 }
 
-/// All meshes of the file; those that no node shows are checked too.
-pub(super) fn read(document: &Document<'_>, notes: &mut Notes) -> Read<Vec<Vec<Part>>> {
+/// A joint's hold on a vertex.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Influence {
+    /// Index into the joints of the skin, valid.
+    pub(super) joint: u32,
+    /// > 0; those of a vertex sum to 1.
+    pub(super) weight: f64,
+}
+
+/// What a node makes of a mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Shaping<'a> {
+    /// A factor for each morph target; all 0 if empty.
+    pub(super) weights: &'a [f32],
+    /// Number of joints, where a skin moves it.
+    pub(super) joints: Option<usize>,
+}
+
+/// The primitives of all meshes that have triangles, by mesh and primitive; those that no node shows are checked too.
+pub(super) fn check(document: &Document<'_>, notes: &mut Notes) -> Read<Vec<Vec<Option<Shape>>>> {
+    let mut checker = Checker::new(document);
     let mut meshes = Vec::with_capacity(document.root.meshes.len());
     for (i, mesh) in document.root.meshes.iter().enumerate() {
-        let mut parts = Vec::with_capacity(mesh.primitives.len());
+        let mut shapes = Vec::with_capacity(mesh.primitives.len());
         for (j, primitive) in mesh.primitives.iter().enumerate() {
-            parts.extend(read_part(document, primitive, &format!("meshes[{i}].primitives[{j}]"), notes)?);
+            shapes.push(checker.check(primitive, &format!("meshes[{i}].primitives[{j}]"), notes)?);
+            check_weights(primitive, mesh.weights.as_deref(), &format!("meshes[{i}].weights"))?;
         }
-        meshes.push(parts);
+        meshes.push(shapes);
     }
     Ok(meshes)
 }
 
-/// One primitive of the file; `None` if it has no triangles.
-fn read_part(document: &Document<'_>, primitive: &Primitive, place: &str, notes: &mut Notes) -> Read<Option<Part>> {
-    let root = document.root;
+/// As many weights as morph targets, where there are any.
+pub(super) fn check_weights(primitive: &Primitive, weights: Option<&[f32]>, place: &str) -> Read<()> {
+    let targets = primitive.targets.as_ref().map_or(0, Vec::len);
+    match weights {
+        Some(weights) if weights.len() != targets => {
+            fault(place, format!("{} of them for {targets} morph targets", weights.len()))
+        }
+        Some(weights) if weights.iter().any(|weight| !weight.is_finite()) => fault(place, "one is not finite"),
+        _ => Ok(()),
+    }
+}
+
+/// The triangles of a mesh. Needs [`check`], whose `shapes` are the mesh's.
+pub(super) fn read(
+    document: &Document<'_>,
+    mesh: usize,
+    shapes: &[Option<Shape>],
+    shaping: Shaping<'_>,
+) -> Read<Vec<Part>> {
+    let mut parts = Vec::new();
+    for (j, (primitive, shape)) in document.root.meshes[mesh].primitives.iter().zip(shapes).enumerate() {
+        if let Some(shape) = shape {
+            parts.push(read_part(document, primitive, *shape, shaping, &format!("meshes[{mesh}].primitives[{j}]"))?);
+        }
+    }
+    Ok(parts)
+}
+
+fn read_part(
+    document: &Document<'_>,
+    primitive: &Primitive,
+    shape: Shape,
+    shaping: Shaping<'_>,
+    place: &str,
+) -> Read<Part> {
+    let column = |accessor: Option<usize>| accessor.map(|accessor| document.column(accessor, place)).transpose();
     let material = primitive.material.map(|material| material.value());
-    if let Some(material) = material.filter(|material| *material >= root.materials.len()) {
-        return fault(format!("{place}.material"), format!("{material} of {}", root.materials.len()));
+    let nothing = Part { claimed: shape.triangles, material, ..Part::default() };
+    let Some(positions) = column(attribute(primitive, Semantic::Positions))? else { return Ok(nothing) };
+    let morphs = morphs(document, primitive, shaping.weights, place)?;
+    let indices = column(primitive.indices.map(|indices| indices.value()))?;
+    let still = positions.is_zero() && morphs.is_empty();
+    if still || indices.is_some_and(|indices| indices.is_zero()) {
+        return Ok(nothing);
     }
-    let Checked::Valid(mode) = primitive.mode else {
-        return fault(format!("{place}.mode"), "is not one of glTF's");
-    };
-    note_unread(primitive, notes);
-    check_counts(document, primitive, place)?;
-    let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|accessor| accessor.value());
-    let Some(positions) = attribute(Semantic::Positions) else {
-        notes.add("primitives without positions are not drawn");
-        return Ok(None);
-    };
-    let at = format!("{place}.attributes.POSITION");
-    let positions = read_vectors(document, positions, &at)?;
-    if let Some(vertex) = positions.iter().position(|position| !position.is_finite()) {
-        return fault(at, format!("vertex {vertex} is not finite: {}", positions[vertex]));
+    let normals = column(attribute(primitive, Semantic::Normals))?;
+    let position = |vertex: u32| morphed(&positions, &morphs, vertex, |morph| morph.positions.as_ref());
+    let index = |i: usize| indices.map_or(i as u32, |indices| indices.unsigned(i, 0));
+    let mut vertices = Vertices { slots: vec![0; positions.count], used: Vec::new() };
+    let mut part = nothing;
+    for triangle in 0..shape.triangles {
+        let corners = corners(shape.mode, triangle).map(index);
+        let [a, b, c] = corners.map(position);
+        if a != b && b != c && c != a {
+            part.corners.push(corners.map(|corner| vertices.slot(corner)));
+        }
     }
-    let normals = attribute(Semantic::Normals)
-        .map(|normals| read_vectors(document, normals, &format!("{place}.attributes.NORMAL")))
-        .transpose()?;
-    let indices = match primitive.indices {
-        Some(indices) => Some(read_indices(document, indices.value(), positions.len(), &format!("{place}.indices"))?),
-        None => None,
-    };
-    let count = indices.as_ref().map_or(positions.len(), Vec::len);
-    let vertex = |i: usize| indices.as_ref().map_or(i as u32, |indices| indices[i]);
-    let corners = triangles(mode, count, vertex, notes);
-    Ok(corners.map(|corners| Part { positions, normals, corners, material }))
+    part.positions = vertices.used.iter().map(|vertex| position(*vertex)).collect();
+    if let Some(at) = part.positions.iter().position(|position| !position.is_finite()) {
+        return fault(place, format!("its morph targets move vertex {} beyond all numbers", vertices.used[at]));
+    }
+    part.normals = normals.map(|normals| {
+        let normal = |vertex: &u32| morphed(&normals, &morphs, *vertex, |morph| morph.normals.as_ref());
+        vertices.used.iter().map(normal).collect()
+    });
+    if let Some(joints) = shaping.joints {
+        part.influences = influences(document, primitive, &vertices.used, joints, place)?;
+    }
+    Ok(part)
 }
 
-/// All attributes of a primitive have as many elements as there are positions.
-fn check_counts(document: &Document<'_>, primitive: &Primitive, place: &str) -> Read<()> {
-    let mut vertices = None;
-    for (semantic, accessor) in &primitive.attributes {
-        let name = match semantic {
-            Checked::Valid(semantic) => semantic.to_string(),
-            Checked::Invalid => continue,
+/// The vertices that some corner is at, in the order of their first appearance.
+struct Vertices {
+    /// For each vertex its number among the used ones plus one; 0 for the others. A list of zeros costs no memory where it
+    /// is not written, however many vertices the file claims.
+    slots: Vec<u32>,
+    used: Vec<u32>,
+}
+
+impl Vertices {
+    fn slot(&mut self, vertex: u32) -> u32 {
+        let slot = &mut self.slots[vertex as usize];
+        if *slot == 0 {
+            self.used.push(vertex);
+            *slot = self.used.len() as u32;
+        }
+        *slot - 1
+    }
+}
+
+/// A morph target and its factor.
+struct Morph<'a> {
+    weight: f32,
+    positions: Option<Column<'a>>,
+    normals: Option<Column<'a>>,
+}
+
+/// The targets that move something.
+fn morphs<'d>(document: &'d Document<'_>, primitive: &Primitive, weights: &[f32], place: &str) -> Read<Vec<Morph<'d>>> {
+    let mut morphs = Vec::new();
+    for (target, weight) in primitive.targets.iter().flatten().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+        let column = |accessor: Option<json::Index<json::Accessor>>| {
+            accessor.map(|accessor| document.column(accessor.value(), place)).transpose()
         };
-        let at = format!("{place}.attributes.{name}");
-        let (count, _) = document.shape(accessor.value(), &at)?;
-        match vertices {
-            Some(expected) if expected != count => {
-                return fault(at, format!("has {count} elements, other attributes have {expected}"));
-            }
-            _ => vertices = Some(count),
-        }
+        morphs.push(Morph { weight: *weight, positions: column(target.positions)?, normals: column(target.normals)? });
     }
-    Ok(())
+    Ok(morphs)
 }
 
-/// Three numbers a vertex: floats, or integers where KHR_mesh_quantization is in use.
-fn read_vectors(document: &Document<'_>, accessor: usize, place: &str) -> Read<Vec<Vec3>> {
-    let (_, format) = document.shape(accessor, place)?;
-    let quantized = document.root.extensions_used.iter().any(|name| name == "KHR_mesh_quantization");
-    let component = match format.component {
-        ComponentType::F32 => true,
-        ComponentType::U32 => false,
-        _ => quantized,
-    };
-    if format.kind != Type::Vec3 || !component {
-        let hint = if quantized { "" } else { " of F32" };
-        return fault(place, format!("is {format}, not Vec3{hint}"));
-    }
-    let size = format.component.size();
-    document.decode(accessor, |bytes| {
-        Vec3::new(number(bytes, format), number(&bytes[size..], format), number(&bytes[2 * size..], format))
-    })
+/// A vector of a vertex plus what the morph targets add to it (glTF 2.0, 3.7.2.2).
+fn morphed<'d>(
+    base: &Column<'_>,
+    morphs: &'d [Morph<'d>],
+    vertex: u32,
+    of: impl Fn(&'d Morph<'d>) -> Option<&'d Column<'d>>,
+) -> Vec3 {
+    let vertex = vertex as usize;
+    morphs
+        .iter()
+        .filter_map(|morph| Some(morph.weight * of(morph)?.vector(vertex)))
+        .fold(base.vector(vertex), |sum, added| sum + added)
 }
 
-/// Indices of vertices, all below `vertices`.
-fn read_indices(document: &Document<'_>, accessor: usize, vertices: usize, place: &str) -> Read<Vec<u32>> {
-    let (_, format) = document.shape(accessor, place)?;
-    let component = matches!(format.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
-    if format != (Format { kind: Type::Scalar, normalized: false, ..format }) || !component {
-        return fault(place, format!("is {format}, not Scalar of U8, U16 or U32"));
+/// The joints that move each of the vertices, with weights that sum to 1.
+fn influences(
+    document: &Document<'_>,
+    primitive: &Primitive,
+    vertices: &[u32],
+    joints: usize,
+    place: &str,
+) -> Read<Vec<Vec<Influence>>> {
+    let sets = joint_sets(document, primitive, place)?;
+    if sets.is_empty() {
+        return fault(format!("{place}.attributes"), "has no JOINTS_0 and WEIGHTS_0, but a skin is to move it");
     }
-    let indices = document.decode_unsigned(accessor, format.component)?;
-    match indices.iter().position(|index| *index as usize >= vertices) {
-        Some(at) => fault(place, format!("index {} at {at}, but there are {vertices} vertices", indices[at])),
-        None => Ok(indices),
-    }
-}
-
-/// Triangles of a list, strip or fan of `count` vertices, in the winding of glTF 2.0, 3.7.2.1; `None` for points and
-/// lines.
-fn triangles(mode: Mode, count: usize, vertex: impl Fn(usize) -> u32, notes: &mut Notes) -> Option<Vec<[u32; 3]>> {
-    let by = |[a, b, c]: [usize; 3]| [vertex(a), vertex(b), vertex(c)];
-    match mode {
-        Mode::Triangles => {
-            if !count.is_multiple_of(3) {
-                notes.add("vertices beyond the last whole triangle of a list are ignored");
-            }
-            Some((0..count / 3).map(|i| by([3 * i, 3 * i + 1, 3 * i + 2])).collect())
+    let mut all = Vec::with_capacity(vertices.len());
+    for vertex in vertices {
+        let pairs = sets.iter().flat_map(|(joints, weights)| {
+            let vertex = *vertex as usize;
+            (0..4).map(move |c| (joints.unsigned(vertex, c), f64::from(weights.number(vertex, c))))
+        });
+        let mut influences: Vec<Influence> =
+            pairs.filter(|(_, weight)| *weight > 0.0).map(|(joint, weight)| Influence { joint, weight }).collect();
+        if influences.is_empty() {
+            // Illegal, but common: such a vertex goes with its first joint, as in other renderers.
+            influences.push(Influence { joint: sets[0].0.unsigned(*vertex as usize, 0), weight: 1.0 });
         }
-        Mode::TriangleStrip => {
-            Some((0..count.saturating_sub(2)).map(|i| by([i, i + 1 + i % 2, i + 2 - i % 2])).collect())
+        if let Some(beyond) = influences.iter().find(|influence| influence.joint as usize >= joints) {
+            let problem = format!("joint {} of {joints} at vertex {vertex}", beyond.joint);
+            return fault(format!("{place}.attributes.JOINTS_0"), problem);
         }
-        Mode::TriangleFan => Some((0..count.saturating_sub(2)).map(|i| by([i + 1, i + 2, 0])).collect()),
-        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => {
-            notes.add("points and lines are not drawn");
-            None
-        }
+        let sum: f64 = influences.iter().map(|influence| influence.weight).sum();
+        influences.iter_mut().for_each(|influence| influence.weight /= sum);
+        all.push(influences);
     }
-}
-
-/// Names what a primitive has beyond its triangles.
-fn note_unread(primitive: &Primitive, notes: &mut Notes) {
-    if primitive.attributes.keys().any(|semantic| matches!(semantic, Checked::Valid(Semantic::Colors(_)))) {
-        notes.add("vertex colours are not read yet");
-    }
-    if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
-        notes.add("morph targets are not read: meshes are drawn as they stand");
-    }
+    Ok(all)
 }

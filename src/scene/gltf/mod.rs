@@ -1,70 +1,99 @@
 //! glTF reader, the only user of the gltf crate.
 //!
 //! The crate parses the JSON and validates nothing. What is read from it is checked here before it indexes anything,
-//! in this order: container, buffers, graph, accessors, meshes; then the nodes of the scene are placed.
+//! in this order: container, JSON, graph, buffers, accessors, skins, meshes; then what the nodes of the scene show is decoded
+//! and placed.
 
-use std::io;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
 use gltf::json;
 use sha2::{Digest as _, Sha256};
 
-use super::{Bounds, Camera, Light, Scene, Sphere};
+use super::{Bounds, Camera, Light, LoadOptions, Scene, Sphere};
 use crate::{Error, Result};
 
 mod accessor;
 mod buffers;
 mod cameras;
 mod container;
+mod extensions;
 mod fault;
+mod files;
+mod instances;
 mod lights;
 mod materials;
+mod memory;
 mod meshes;
 mod nodes;
 mod placing;
+mod primitives;
+mod root;
+mod shown;
+mod skins;
 mod spheres;
+mod strict_json;
+mod topology;
 
 use accessor::Document;
 use fault::{Notes, Read, fault};
+use files::Resources;
 use lights::PlacedLight;
-use placing::{Shown, TOO_FAR, WorldBounds};
+use placing::{TOO_FAR, WorldBounds};
+use shown::{Gallery, Shown};
 use spheres::PlacedSphere;
 
 /// Reads a file into a scene.
-pub(super) fn load(path: &Path) -> Result<Scene> {
-    let io_error = |source: io::Error| Error::Io { path: path.to_owned(), source };
-    let bytes = std::fs::read(path).map_err(io_error)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut scene = read(&bytes, folder).map_err(|fault| fault.of(path))?;
-    scene.path = path.to_owned();
-    scene.file_name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
-    Ok(scene)
+pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    let bytes = files::read_regular(path, u64::MAX);
+    let bytes = bytes.map_err(|source| Error::Io { path: path.to_owned(), source })?;
+    read(&bytes, path, options)
 }
 
-/// Reads the bytes of a file whose other files lie in `folder`.
-fn read(bytes: &[u8], folder: &Path) -> Read<Scene> {
+/// Reads the bytes of the file at `path`.
+pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let file_name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
     let mut notes = Notes::default();
+    let root = parse(bytes, options, &mut notes);
+    let (root, bin) = root.map_err(|fault| fault.of(path))?;
+    let chosen = nodes::choose_scene(&root, options.scene.as_deref(), &file_name)?;
     let mut hash = Sha256::new();
     hash.update(bytes);
-    let (text, bin) = container::split(bytes)?;
-    let root = container::parse(text, &mut notes)?;
-    nodes::check(&root)?;
-    let document = Document { root: &root, buffers: buffers::read(&root, bin, folder, &mut hash)? };
-    let meshes = meshes::read(&document, &mut notes)?;
-    document.check()?;
-    drop(document);
-    note_unread(&root, &mut notes);
+    if options.scene.is_some() {
+        hash.update(format!("scene {chosen}"));
+    }
+    let resources = Resources { bin, folder, allow_outside: options.allow_outside };
+    let scene = assemble(&root, chosen, &resources, hash, notes).map_err(|fault| fault.of(path))?;
+    Ok(Scene { path: path.to_owned(), file_name, ..scene })
+}
 
-    let placed = nodes::flatten(&root)?;
-    let shown: Vec<Shown<'_>> = placed
-        .iter()
-        .filter_map(|placed| {
-            let mesh = root.nodes[placed.node].mesh?.value();
-            Some(Shown { placed: *placed, parts: &meshes[mesh] })
-        })
-        .collect();
-    let carried = Carried::read(&root, &placed, &mut notes)?;
+/// The JSON part, with its graph of nodes checked, and the binary chunk.
+fn parse<'a>(bytes: &'a [u8], options: &LoadOptions, notes: &mut Notes) -> Read<(json::Root, Option<&'a [u8]>)> {
+    let (text, bin) = container::split(bytes)?;
+    let root = root::read(text, &options.ignore_required, notes)?;
+    nodes::check(&root)?;
+    Ok((root, bin))
+}
+
+/// Reads all that the chosen scene shows. `hash` has taken the file's own bytes.
+fn assemble(
+    root: &json::Root,
+    chosen: usize,
+    resources: &Resources<'_>,
+    mut hash: Sha256,
+    mut notes: Notes,
+) -> Read<Scene> {
+    let document = Document { root, buffers: buffers::read(root, resources, &mut hash)? };
+    document.check()?;
+    skins::check(&document)?;
+    let shapes = meshes::check(&document, &mut notes)?;
+
+    let worlds = nodes::worlds(root)?;
+    let placed = nodes::flatten(root, chosen, &worlds)?;
+    let gallery = Gallery::read(&document, &placed, &shapes, &worlds, &mut notes)?;
+    let shown = gallery.shown();
+    let carried = Carried::read(root, &placed, &mut notes)?;
     let mut bounds = WorldBounds::EMPTY;
     placing::measure(&shown, &mut bounds)?;
     carried.spheres.iter().for_each(|sphere| bounds.add(sphere.center, sphere.radius));
@@ -81,7 +110,7 @@ fn read(bytes: &[u8], folder: &Path) -> Read<Scene> {
     }
 
     let mut scene = Scene { center, mesh_count: root.meshes.len(), ..Scene::default() };
-    let slots = read_materials(&root, &shown, &carried.spheres, &mut scene, &mut notes)?;
+    let slots = read_materials(root, &shown, &carried.spheres, &mut scene, &mut notes)?;
     let slot = |material: Option<usize>| slots[material.unwrap_or(root.materials.len())];
     scene.triangles = placing::place(&shown, center, slot, &mut notes)?;
     scene.spheres = carried.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
@@ -157,15 +186,5 @@ impl Carried {
 impl PlacedSphere {
     fn relative_to(&self, center: DVec3, slot: &impl Fn(Option<usize>) -> u32) -> Sphere {
         Sphere { center: (self.center - center).as_vec3(), radius: self.radius as f32, material: slot(self.material) }
-    }
-}
-
-/// Names what the file has beyond what is read.
-fn note_unread(root: &json::Root, notes: &mut Notes) {
-    if !root.animations.is_empty() {
-        notes.add("animations are not read: nodes stand as in the file");
-    }
-    if root.nodes.iter().any(|node| node.skin.is_some()) {
-        notes.add("skins are not read: meshes are drawn as they stand");
     }
 }

@@ -5,6 +5,7 @@ use gltf::json;
 use json::scene::Node;
 
 use super::fault::{Read, fault};
+use crate::{Error, Result};
 
 /// A node with its place in the world.
 #[derive(Clone, Copy, Debug)]
@@ -55,31 +56,65 @@ pub(super) fn check(root: &json::Root) -> Read<()> {
     }
 }
 
-/// Nodes of the default scene (else the first, else all roots), parents first. Needs [`check`].
-pub(super) fn flatten(root: &json::Root) -> Read<Vec<Placed>> {
-    let scene = root.scene.map_or(0, |scene| scene.value());
-    let roots: Vec<usize> = match root.scenes.get(scene) {
-        Some(scene) => scene.nodes.iter().map(|node| node.value()).collect(),
-        None => {
-            let mut is_root = vec![true; root.nodes.len()];
-            let children = root.nodes.iter().filter_map(|node| node.children.as_ref()).flatten();
-            children.for_each(|child| is_root[child.value()] = false);
-            (0..root.nodes.len()).filter(|i| is_root[*i]).collect()
+/// Index of the scene to show: the one of that name, else of that number; the default one, else the first, if none is
+/// asked for. Needs [`check`]. A file without scenes has 0, which [`flatten`] reads as all of its nodes.
+pub(super) fn choose_scene(root: &json::Root, wanted: Option<&str>, file_name: &str) -> Result<usize> {
+    let Some(wanted) = wanted else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
+    let named = root.scenes.iter().position(|scene| scene.name.as_deref() == Some(wanted));
+    let numbered = || wanted.parse::<usize>().ok().filter(|index| *index < root.scenes.len());
+    named.or_else(numbered).ok_or_else(|| {
+        let name = |scene: &json::Scene| scene.name.as_ref().map_or(String::new(), |name| format!(" {name:?}"));
+        let list: Vec<String> =
+            root.scenes.iter().enumerate().map(|(i, scene)| format!("{i}{}", name(scene))).collect();
+        let list = if list.is_empty() { "no scenes".to_owned() } else { format!("the scenes {}", list.join(", ")) };
+        Error::Setting { name: "scene", value: wanted.to_owned(), problem: format!("{file_name} has {list}") }
+    })
+}
+
+/// The transform of every node in the world, whether a scene shows it or not. Needs [`check`].
+pub(super) fn worlds(root: &json::Root) -> Read<Vec<DMat4>> {
+    let mut worlds = vec![DMat4::IDENTITY; root.nodes.len()];
+    let mut open = roots(root);
+    for i in &open {
+        worlds[*i] = local(&root.nodes[*i], *i)?;
+    }
+    while let Some(node) = open.pop() {
+        for child in root.nodes[node].children.iter().flatten().map(|child| child.value()) {
+            worlds[child] = worlds[node] * local(&root.nodes[child], child)?;
+            open.push(child);
         }
+    }
+    Ok(worlds)
+}
+
+/// Nodes without a parent.
+fn roots(root: &json::Root) -> Vec<usize> {
+    let mut is_root = vec![true; root.nodes.len()];
+    let children = root.nodes.iter().filter_map(|node| node.children.as_ref()).flatten();
+    children.for_each(|child| is_root[child.value()] = false);
+    (0..root.nodes.len()).filter(|i| is_root[*i]).collect()
+}
+
+/// Nodes of a scene (all of them where the file has no scenes) that carry something, parents first. Needs [`check`].
+pub(super) fn flatten(root: &json::Root, scene: usize, worlds: &[DMat4]) -> Read<Vec<Placed>> {
+    let mut open: Vec<usize> = match root.scenes.get(scene) {
+        Some(scene) => scene.nodes.iter().rev().map(|node| node.value()).collect(),
+        None => roots(root).into_iter().rev().collect(),
     };
     let mut seen = vec![false; root.nodes.len()];
     let mut placed = Vec::new();
-    let mut open: Vec<(usize, DMat4)> = roots.iter().rev().map(|node| (*node, DMat4::IDENTITY)).collect();
-    while let Some((node, parent)) = open.pop() {
-        if std::mem::replace(&mut seen[node], true) {
-            return fault(format!("scenes[{scene}].nodes"), format!("reach node {node} twice"));
+    while let Some(index) = open.pop() {
+        if std::mem::replace(&mut seen[index], true) {
+            return fault(format!("scenes[{scene}].nodes"), format!("reach node {index} twice"));
         }
-        let world = parent * local(&root.nodes[node], node)?;
+        let (node, world) = (&root.nodes[index], worlds[index]);
         if !world.is_finite() {
-            return fault(format!("nodes[{node}]"), "its transform in the world is not finite");
+            return fault(format!("nodes[{index}]"), "its transform in the world is not finite");
         }
-        placed.push(Placed { node, world });
-        open.extend(root.nodes[node].children.iter().flatten().rev().map(|child| (child.value(), world)));
+        if node.mesh.is_some() || node.camera.is_some() || node.extensions.is_some() {
+            placed.push(Placed { node: index, world });
+        }
+        open.extend(node.children.iter().flatten().rev().map(|child| child.value()));
     }
     Ok(placed)
 }

@@ -4,23 +4,14 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::fault::{Notes, Read, fault};
 use super::meshes::Part;
-use super::nodes::Placed;
+use super::shown::Shown;
 use crate::scene::Triangle;
-
-/// Triangles that a scene may hold: 7.6 GB of memory.
-const MAX_TRIANGLES: usize = 100_000_000;
 
 /// Size that a scene may have, metres.
 pub(super) const MAX_EXTENT: f64 = 1e18;
 
 /// What is said of a larger one.
 pub(super) const TOO_FAR: &str = "lies too far away to compute with: more than 1e18 m from the rest";
-
-/// A mesh shown by a node.
-pub(super) struct Shown<'a> {
-    pub(super) placed: Placed,
-    pub(super) parts: &'a [Part],
-}
 
 /// Box in the world around points.
 #[derive(Clone, Copy, Debug)]
@@ -52,15 +43,17 @@ impl WorldBounds {
 
 /// Adds the vertices of all shown triangles to `bounds`.
 pub(super) fn measure(shown: &[Shown<'_>], bounds: &mut WorldBounds) -> Read<()> {
-    for Shown { placed, parts } in shown {
-        for part in *parts {
-            let mut used = vec![false; part.positions.len()];
-            part.corners.iter().flatten().for_each(|vertex| used[*vertex as usize] = true);
-            let used = part.positions.iter().zip(used).filter(|(_, used)| *used);
-            used.for_each(|(position, _)| bounds.add(placed.world.transform_point3(position.as_dvec3()), 0.0));
-        }
-        if !bounds.fits() {
-            return fault(format!("nodes[{}]", placed.node), TOO_FAR);
+    for shown in shown {
+        for i in 0..shown.copies() {
+            let to_world = shown.world(i)?;
+            for part in shown.parts {
+                (0..part.positions.len()).for_each(|v| {
+                    bounds.add(shown.matrix(part, v, to_world).transform_point3(part.positions[v].as_dvec3()), 0.0)
+                });
+            }
+            if !bounds.fits() {
+                return fault(format!("nodes[{}]", shown.node), TOO_FAR);
+            }
         }
     }
     Ok(())
@@ -73,24 +66,31 @@ pub(super) fn place(
     material: impl Fn(Option<usize>) -> u32,
     notes: &mut Notes,
 ) -> Read<Vec<Triangle>> {
-    let parts = || shown.iter().flat_map(|shown| shown.parts);
-    let total: usize = parts().map(|part| part.corners.len()).sum();
-    if total > MAX_TRIANGLES {
-        return fault("scene", format!("{total} triangles, at most {MAX_TRIANGLES} are read"));
-    }
-    let mut triangles = Vec::with_capacity(total);
-    for Shown { placed, parts } in shown {
-        let to_world = placed.world;
-        let to_scene = DMat4::from_translation(-center) * to_world;
-        for part in *parts {
-            place_part(part, to_scene, material(part.material), &mut triangles);
+    let claimed: usize = shown.iter().map(|shown| shown.copies() * total(shown.parts, |part| part.claimed)).sum();
+    let kept = shown.iter().map(|shown| shown.copies() * total(shown.parts, |part| part.corners.len())).sum();
+    let mut triangles = Vec::with_capacity(kept);
+    for shown in shown {
+        for i in 0..shown.copies() {
+            let to_scene = DMat4::from_translation(-center) * shown.world(i)?;
+            for part in shown.parts {
+                let material = material(part.material);
+                if part.influences.is_empty() {
+                    place_part(part, to_scene, material, &mut triangles);
+                } else {
+                    place_skinned(shown, part, center, material, &mut triangles);
+                }
+            }
         }
     }
-    let dropped = total - triangles.len();
+    let dropped = claimed - triangles.len();
     if dropped > 0 {
-        notes.add(format!("{dropped} of {total} triangles have no area and are not drawn"));
+        notes.add(format!("{dropped} of {claimed} triangles have no area and are not drawn"));
     }
     Ok(triangles)
+}
+
+fn total(parts: &[Part], of: impl Fn(&Part) -> usize) -> usize {
+    parts.iter().map(of).sum()
 }
 
 /// The triangles of one part that have an area.
@@ -103,17 +103,50 @@ fn place_part(part: &Part, to_scene: DMat4, material: u32, triangles: &mut Vec<T
     let normals: Option<Vec<Vec3>> = part.normals.as_ref().map(|normals| {
         normals.iter().map(|normal| (to_normal * normal.as_dvec3()).normalize_or_zero().as_vec3()).collect()
     });
+    let of = |corners: [usize; 3]| {
+        let normals = normals.as_ref();
+        (corners.map(|corner| positions[corner]), normals.map(|normals| corners.map(|corner| normals[corner])))
+    };
+    add_triangles(part, |_| mirrored, of, material, triangles);
+}
+
+/// The same where joints move each vertex in its own way.
+fn place_skinned(shown: &Shown<'_>, part: &Part, center: DVec3, material: u32, triangles: &mut Vec<Triangle>) {
+    let vertices = 0..part.positions.len();
+    let moves: Vec<DMat4> =
+        vertices.map(|v| DMat4::from_translation(-center) * shown.matrix(part, v, DMat4::IDENTITY)).collect();
+    let mirrored = |v: usize| DMat3::from_mat4(moves[v]).determinant() < 0.0;
+    let position = |v: usize| moves[v].transform_point3(part.positions[v].as_dvec3()).as_vec3();
+    let normal = |normals: &[Vec3], v: usize| {
+        let to_normal = cofactors(DMat3::from_mat4(moves[v]), mirrored(v));
+        (to_normal * normals[v].as_dvec3()).normalize_or_zero().as_vec3()
+    };
+    let of = |corners: [usize; 3]| {
+        let normals = part.normals.as_deref();
+        (corners.map(position), normals.map(|normals| corners.map(|v| normal(normals, v))))
+    };
+    add_triangles(part, mirrored, of, material, triangles);
+}
+
+/// Adds the triangles of a part that have an area. `of` gives their corners' positions and normals.
+fn add_triangles(
+    part: &Part,
+    mirrored: impl Fn(usize) -> bool,
+    of: impl Fn([usize; 3]) -> ([Vec3; 3], Option<[Vec3; 3]>),
+    material: u32,
+    triangles: &mut Vec<Triangle>,
+) {
     for &[a, b, c] in &part.corners {
         // A mirroring transform turns the winding round; swapping two corners keeps the outside outside.
-        let corners = if mirrored { [a, c, b] } else { [a, b, c] }.map(|corner| corner as usize);
-        let mut triangle =
-            Triangle { positions: corners.map(|corner| positions[corner]), normals: [Vec3::ZERO; 3], material };
+        let corners = if mirrored(a as usize) { [a, c, b] } else { [a, b, c] }.map(|corner| corner as usize);
+        let (positions, normals) = of(corners);
+        let mut triangle = Triangle { positions, normals: [Vec3::ZERO; 3], material };
         let flat = triangle.geometric_normal();
         if flat == Vec3::ZERO {
             continue;
         }
-        let normal = |corner: usize| normals.as_ref().map_or(Vec3::ZERO, |normals| normals[corner]);
-        triangle.normals = corners.map(|corner| Some(normal(corner)).filter(|n| *n != Vec3::ZERO).unwrap_or(flat));
+        let normals = normals.unwrap_or([Vec3::ZERO; 3]);
+        triangle.normals = normals.map(|normal| if normal == Vec3::ZERO { flat } else { normal });
         triangles.push(triangle);
     }
 }

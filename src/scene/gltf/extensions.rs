@@ -1,0 +1,34 @@
+//! The extensions that a file may use or require.
+
+use super::fault::{Notes, Read, fault};
+
+/// Extensions that are read, or that change nothing which is read.
+const SUPPORTED: [&str; 11] = [
+    "EXT_mesh_gpu_instancing",
+    "KHR_implicit_shapes",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Refuses by name what is required and not supported, unless it is among the `ignored`, and names what else is not read.
+pub(super) fn check(used: &[String], required: &[String], ignored: &[String], notes: &mut Notes) -> Read<()> {
+    let unsupported = |name: &&String| !SUPPORTED.contains(&name.as_str());
+    for (i, name) in required.iter().enumerate().filter(|(_, name)| unsupported(name)) {
+        if !ignored.contains(name) {
+            let problem = format!("{name} is not supported; --ignore-required {name} reads the file without it");
+            return fault(format!("extensionsRequired[{i}]"), problem);
+        }
+        notes.add(format!("extension {name} is required, but not read"));
+    }
+    for name in used.iter().filter(unsupported).filter(|name| !required.contains(name)) {
+        notes.add(format!("extension {name} is not read"));
+    }
+    Ok(())
+}

@@ -1,0 +1,31 @@
+//! How large a scene may be: known before any of it is allocated.
+
+use super::fault::{Read, fault};
+
+/// Triangles that a scene may have, so that all counts of nodes and corners fit into 32 bits with room to spare.
+const MAX_TRIANGLES: usize = 100_000_000;
+
+/// Memory that a triangle takes from mesh to hierarchy, bytes.
+const BYTES_PER_TRIANGLE: u64 = 400;
+
+/// Refuses more triangles than can be held.
+pub(super) fn check(triangles: usize) -> Read<()> {
+    if triangles > MAX_TRIANGLES {
+        return fault("scene", format!("{triangles} triangles, at most {MAX_TRIANGLES} are read"));
+    }
+    let needed = triangles as u64 * BYTES_PER_TRIANGLE;
+    match available() {
+        Some(bytes) if needed > bytes => {
+            let (needed, bytes) = (needed >> 20, bytes >> 20);
+            fault("scene", format!("{triangles} triangles need about {needed} MiB of memory, {bytes} MiB are free"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Memory that is free, bytes, where the system tells: on Linux.
+fn available() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
+}

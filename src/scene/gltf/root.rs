@@ -1,0 +1,65 @@
+//! The JSON part of a file, read element by element, so that what is wrong is named with its place.
+
+use gltf::json;
+use serde_json::{Map, Value};
+
+use super::extensions;
+use super::fault::{Notes, Read, fault};
+use super::strict_json::{elements, member, objects, parse};
+
+/// Parses the JSON text; refuses versions and required extensions that are not read, by name. What is never used (images,
+/// textures, samplers, animations) is left out.
+pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<json::Root> {
+    let Value::Object(mut file) = parse(text)? else { return fault("JSON", "is not an object") };
+    let asset = read_asset(&mut file)?;
+    let used = member::<Vec<String>>(&mut file, "extensionsUsed")?.unwrap_or_default();
+    let required = member::<Vec<String>>(&mut file, "extensionsRequired")?.unwrap_or_default();
+    extensions::check(&used, &required, ignored, notes)?;
+    for unused in ["images", "textures", "samplers"] {
+        objects(&mut file, unused)?;
+    }
+    if !objects(&mut file, "animations")?.is_empty() {
+        notes.add("animations are not read: nodes stand as in the file");
+    }
+    Ok(json::Root {
+        asset,
+        scene: member(&mut file, "scene")?,
+        scenes: read_scenes(&mut file)?,
+        nodes: elements(&mut file, "nodes")?,
+        meshes: elements(&mut file, "meshes")?,
+        skins: elements(&mut file, "skins")?,
+        cameras: elements(&mut file, "cameras")?,
+        materials: elements(&mut file, "materials")?,
+        accessors: elements(&mut file, "accessors")?,
+        buffer_views: elements(&mut file, "bufferViews")?,
+        buffers: elements(&mut file, "buffers")?,
+        extensions: member(&mut file, "extensions")?,
+        extensions_used: used,
+        extensions_required: required,
+        ..json::Root::default()
+    })
+}
+
+/// The head of a file, looked at before the rest: other versions may be shaped differently.
+fn read_asset(file: &mut Map<String, Value>) -> Read<json::Asset> {
+    let Some(asset) = member::<json::Asset>(file, "asset")? else { return fault("asset", "is missing") };
+    if asset.version.split('.').next() != Some("2") {
+        return fault("asset.version", format!("glTF {} is not read, only 2.0", asset.version));
+    }
+    match &asset.min_version {
+        Some(version) if version != "2.0" => {
+            fault("asset.minVersion", format!("the file needs glTF {version}, only 2.0 is read"))
+        }
+        _ => Ok(asset),
+    }
+}
+
+/// The scenes. One without nodes is legal, but the crate wants the list.
+fn read_scenes(file: &mut Map<String, Value>) -> Read<Vec<json::Scene>> {
+    for scene in file.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(scene) = scene.as_object_mut() {
+            scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+        }
+    }
+    elements(file, "scenes")
+}

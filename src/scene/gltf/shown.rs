@@ -1,0 +1,131 @@
+//! Meshes shown by nodes: each read once for all nodes that make the same of it.
+
+use std::collections::HashMap;
+
+use glam::DMat4;
+
+use super::accessor::Document;
+use super::fault::{Notes, Read};
+use super::instances::{self, Instances};
+use super::memory;
+use super::meshes::{self, Part, Shaping};
+use super::nodes::Placed;
+use super::primitives::Shape;
+use super::skins;
+
+/// A mesh shown by a node.
+#[derive(Debug)]
+pub(super) struct Shown<'a> {
+    pub(super) node: usize,
+    pub(super) parts: &'a [Part],
+    world: DMat4,
+    instances: Option<&'a Instances<'a>>,
+    /// For each joint of the node's skin the transform from the mesh to the world.
+    pose: &'a [DMat4],
+}
+
+impl Shown<'_> {
+    /// How many times the mesh is there.
+    pub(super) fn copies(&self) -> usize {
+        self.instances.map_or(1, |instances| instances.count)
+    }
+
+    /// The transform of copy `i` into the world, unless a skin moves it.
+    pub(super) fn world(&self, i: usize) -> Read<DMat4> {
+        self.instances.map_or(Ok(self.world), |instances| Ok(self.world * instances.local(i)?))
+    }
+
+    /// The transform of a vertex of a part into the world: `otherwise` where no skin moves it.
+    pub(super) fn matrix(&self, part: &Part, vertex: usize, otherwise: DMat4) -> DMat4 {
+        let Some(influences) = part.influences.get(vertex) else { return otherwise };
+        influences.iter().fold(DMat4::ZERO, |sum, held| sum + self.pose[held.joint as usize] * held.weight)
+    }
+}
+
+/// What all nodes of a scene show.
+#[derive(Debug, Default)]
+pub(super) struct Gallery<'d> {
+    entries: Vec<Entry<'d>>,
+    meshes: Vec<Vec<Part>>,
+    poses: HashMap<usize, Vec<DMat4>>,
+}
+
+#[derive(Debug)]
+struct Entry<'d> {
+    placed: Placed,
+    /// Index into the meshes.
+    mesh: usize,
+    instances: Option<Instances<'d>>,
+    skin: Option<usize>,
+}
+
+/// How a mesh is read: its number, the node whose own weights it has, and the joints of its skin.
+type Reading = (usize, Option<usize>, Option<usize>);
+
+impl<'d> Gallery<'d> {
+    /// Reads the meshes of the nodes. Needs [`meshes::check`], whose `shapes` these are, and [`skins::check`].
+    pub(super) fn read(
+        document: &'d Document<'_>,
+        placed: &[Placed],
+        shapes: &[Vec<Option<Shape>>],
+        worlds: &[DMat4],
+        notes: &mut Notes,
+    ) -> Read<Self> {
+        let mut gallery = Self::default();
+        let mut known: HashMap<Reading, usize> = HashMap::new();
+        let mut readings: Vec<Reading> = Vec::new();
+        let mut triangles = 0_usize;
+        for placed in placed {
+            let node = &document.root.nodes[placed.node];
+            let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
+            for primitive in &document.root.meshes[mesh].primitives {
+                meshes::check_weights(primitive, node.weights.as_deref(), &format!("nodes[{}].weights", placed.node))?;
+            }
+            let skin = node.skin.map(|skin| skin.value());
+            let mut instances = instances::read(document, placed.node)?;
+            if skin.is_some() && instances.take().is_some() {
+                notes.add("instances of meshes that a skin moves are not drawn, but for one");
+            }
+            let copies = instances.as_ref().map_or(1, |instances| instances.count);
+            let claimed: usize = shapes[mesh].iter().flatten().map(|shape| shape.triangles).sum();
+            triangles = triangles.saturating_add(copies.saturating_mul(claimed));
+            if claimed == 0 || copies == 0 {
+                continue;
+            }
+            let joints = skin.map(|skin| document.root.skins[skin].joints.len());
+            let reading = (mesh, node.weights.as_ref().map(|_| placed.node), joints);
+            let mesh = *known.entry(reading).or_insert_with(|| {
+                readings.push(reading);
+                readings.len() - 1
+            });
+            gallery.entries.push(Entry { placed: *placed, mesh, instances, skin });
+        }
+        memory::check(triangles)?;
+        for (mesh, weighted, joints) in readings {
+            let weights = match weighted {
+                Some(node) => document.root.nodes[node].weights.as_deref(),
+                None => document.root.meshes[mesh].weights.as_deref(),
+            };
+            let shaping = Shaping { weights: weights.unwrap_or_default(), joints };
+            gallery.meshes.push(meshes::read(document, mesh, &shapes[mesh], shaping)?);
+        }
+        for skin in gallery.entries.iter().filter_map(|entry| entry.skin) {
+            if !gallery.poses.contains_key(&skin) {
+                gallery.poses.insert(skin, skins::pose(document, skin, worlds)?);
+            }
+        }
+        Ok(gallery)
+    }
+
+    /// All that is shown, in the order of the nodes.
+    pub(super) fn shown(&self) -> Vec<Shown<'_>> {
+        let shown = self.entries.iter().map(|entry| Shown {
+            node: entry.placed.node,
+            parts: &self.meshes[entry.mesh],
+            world: entry.placed.world,
+            instances: entry.instances.as_ref(),
+            pose: entry.skin.and_then(|skin| self.poses.get(&skin)).map_or(&[], Vec::as_slice),
+        });
+        shown.collect()
+    }
+}
