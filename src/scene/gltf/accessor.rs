@@ -5,8 +5,9 @@ use gltf::json;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 
-use super::buffers::Buffers;
+use super::buffers::{Buffers, slice};
 use super::fault::{Read, fault};
+use super::meshopt;
 
 /// Elements that an accessor without a bufferView (all zeros but for sparse ones) may have.
 const MAX_ZEROS: u64 = 1 << 24;
@@ -14,7 +15,9 @@ const MAX_ZEROS: u64 = 1 << 24;
 /// A parsed file with its bytes.
 pub(super) struct Document<'a> {
     pub(super) root: &'a json::Root,
-    pub(super) buffers: Buffers<'a>,
+    buffers: Buffers<'a>,
+    /// What compressed bufferViews hold.
+    views: Vec<Option<Vec<u8>>>,
 }
 
 /// Shape of an accessor's elements.
@@ -175,10 +178,15 @@ impl Column<'_> {
 }
 
 impl<'a> Document<'a> {
+    /// Decodes what is compressed in the buffers.
+    pub(super) fn new(root: &'a json::Root, buffers: Buffers<'a>) -> Read<Self> {
+        let views = meshopt::decode(root, &buffers)?;
+        Ok(Self { root, buffers, views })
+    }
+
     /// Checks all views and accessors, also those that nothing uses: ranges, references, and that floats are finite.
     pub(super) fn check(&self) -> Read<()> {
-        let plain = |view: &json::buffer::View| view.extensions.as_ref().is_none_or(|e| e.others.is_empty());
-        for (i, _) in self.root.buffer_views.iter().enumerate().filter(|(_, view)| plain(view)) {
+        for i in 0..self.root.buffer_views.len() {
             self.view(i, "")?;
         }
         for i in 0..self.root.accessors.len() {
@@ -282,20 +290,11 @@ impl<'a> Document<'a> {
         let Some(view) = self.root.buffer_views.get(index) else {
             return fault(format!("{place}.bufferView"), format!("{index} of {}", self.root.buffer_views.len()));
         };
-        let place = format!("bufferViews[{index}]");
-        let buffer = view.buffer.value();
-        let Some(data) = self.buffers.get(buffer) else {
-            return fault(format!("{place}.buffer"), format!("{buffer} of {}", self.buffers.len()));
-        };
-        let Some(data) = data else {
-            return fault(format!("buffers[{buffer}]"), "has no uri, and there is no binary chunk for it");
-        };
-        let (offset, length) = (view.byte_offset.map_or(0, |offset| offset.0), view.byte_length.0);
-        let size = self.root.buffers[buffer].byte_length.0.min(data.len() as u64);
-        match offset.checked_add(length) {
-            Some(end) if end <= size => Ok(&data[offset as usize..end as usize]),
-            _ => fault(place, format!("{length} bytes at {offset} run past buffers[{buffer}], which has {size}")),
+        if let Some(decoded) = &self.views[index] {
+            return Ok(decoded);
         }
+        let (offset, length) = (view.byte_offset.map_or(0, |offset| offset.0), view.byte_length.0);
+        slice(&self.buffers, view.buffer.value(), offset, length, &format!("bufferViews[{index}]"))
     }
 }
 

@@ -25,6 +25,7 @@ mod lights;
 mod materials;
 mod memory;
 mod meshes;
+mod meshopt;
 mod nodes;
 mod placing;
 mod primitives;
@@ -84,7 +85,7 @@ fn assemble(
     mut hash: Sha256,
     mut notes: Notes,
 ) -> Read<Scene> {
-    let document = Document { root, buffers: buffers::read(root, resources, &mut hash)? };
+    let document = Document::new(root, buffers::read(root, resources, &mut hash)?)?;
     document.check()?;
     skins::check(&document)?;
     let shapes = meshes::check(&document, &mut notes)?;
