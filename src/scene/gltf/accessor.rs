@@ -1,16 +1,19 @@
 //! Accessors: every offset, stride, count and index is checked against the bytes that are there before any is used.
 
+use std::collections::HashMap;
+
 use glam::{DMat4, Vec3};
 use gltf::json;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 
 use super::buffers::{Buffers, slice};
+use super::draco;
 use super::fault::{Read, fault};
 use super::meshopt;
 
 /// Elements that an accessor without a bufferView (all zeros but for sparse ones) may have.
-const MAX_ZEROS: u64 = 1 << 24;
+pub(super) const MAX_ZEROS: u64 = 1 << 24;
 
 /// A parsed file with its bytes.
 pub(super) struct Document<'a> {
@@ -18,6 +21,15 @@ pub(super) struct Document<'a> {
     buffers: Buffers<'a>,
     /// What compressed bufferViews hold.
     views: Vec<Option<Vec<u8>>>,
+    /// What compressed primitives hold, by accessor.
+    unpacked: HashMap<usize, Unpacked>,
+}
+
+/// Elements of an accessor that come out of a compressed primitive, one after the other.
+#[derive(Debug)]
+pub(super) struct Unpacked {
+    pub(super) bytes: Vec<u8>,
+    pub(super) format: Format,
 }
 
 /// Shape of an accessor's elements.
@@ -37,7 +49,7 @@ impl Format {
     }
 
     /// Bytes of one element. Matrices of small integers, whose columns are padded, are read by nobody.
-    fn size(self) -> usize {
+    pub(super) fn size(self) -> usize {
         self.component.size() * self.kind.multiplicity()
     }
 }
@@ -181,7 +193,9 @@ impl<'a> Document<'a> {
     /// Decodes what is compressed in the buffers.
     pub(super) fn new(root: &'a json::Root, buffers: Buffers<'a>) -> Read<Self> {
         let views = meshopt::decode(root, &buffers)?;
-        Ok(Self { root, buffers, views })
+        let mut document = Self { root, buffers, views, unpacked: HashMap::new() };
+        document.unpacked = draco::decode(&document)?;
+        Ok(document)
     }
 
     /// Checks all views and accessors, also those that nothing uses: ranges, references, and that floats are finite.
@@ -207,10 +221,19 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
+    /// Bytes of all buffers.
+    pub(super) fn held(&self) -> u64 {
+        self.buffers.iter().flatten().map(|bytes| bytes.len() as u64).sum()
+    }
+
     /// Number of elements and their format.
     pub(super) fn shape(&self, index: usize, place: &str) -> Read<(usize, Format)> {
         let accessor = self.accessor(index, place)?;
-        Ok((accessor.count.0 as usize, Format::of(accessor, place)?))
+        let format = match self.unpacked.get(&index) {
+            Some(unpacked) => unpacked.format,
+            None => Format::of(accessor, place)?,
+        };
+        Ok((accessor.count.0 as usize, format))
     }
 
     /// The elements of an accessor that `place` names.
@@ -219,6 +242,11 @@ impl<'a> Document<'a> {
         let place = format!("accessors[{index}]");
         let format = Format::of(accessor, &place)?;
         let count = accessor.count.0;
+        if let Some(Unpacked { bytes, format }) = self.unpacked.get(&index) {
+            let size = format.size();
+            let dense = Some(Elements { bytes, stride: size, size, count: count as usize });
+            return Ok(Column { format: *format, count: count as usize, dense, sparse: None });
+        }
         let dense = match accessor.buffer_view {
             Some(view) => {
                 let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
@@ -254,7 +282,7 @@ impl<'a> Document<'a> {
         })
     }
 
-    fn accessor(&self, index: usize, place: &str) -> Read<&'a Accessor> {
+    pub(super) fn accessor(&self, index: usize, place: &str) -> Read<&'a Accessor> {
         let known = self.root.accessors.len();
         self.root.accessors.get(index).map_or_else(|| fault(place, format!("accessor {index} of {known}")), Ok)
     }
@@ -286,7 +314,7 @@ impl<'a> Document<'a> {
     }
 
     /// Bytes of a bufferView.
-    fn view(&self, index: usize, place: &str) -> Read<&[u8]> {
+    pub(super) fn view(&self, index: usize, place: &str) -> Read<&[u8]> {
         let Some(view) = self.root.buffer_views.get(index) else {
             return fault(format!("{place}.bufferView"), format!("{index} of {}", self.root.buffer_views.len()));
         };

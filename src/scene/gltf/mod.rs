@@ -17,6 +17,7 @@ mod accessor;
 mod buffers;
 mod cameras;
 mod container;
+mod draco;
 mod extensions;
 mod fault;
 mod files;

@@ -131,7 +131,7 @@ pub(super) fn decode_triangles(bytes: &[u8], count: usize) -> Option<Vec<u32>> {
             }
         }
         let [a, b, c] = triangle;
-        [[b, a], [c, b], [a, c]].map(|edge| state.edges.push(edge));
+        [[b, a], [c, b], [a, c]].into_iter().for_each(|edge| state.edges.push(edge));
         out.extend(triangle);
     }
     state.data.0.is_empty().then_some(out)
