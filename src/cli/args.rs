@@ -12,7 +12,7 @@ use super::{
     loading::LoadingOptions,
     options::{RenderOptions, SearchArg},
     study_args::StudyArgs,
-    values::{output, radius, tolerance},
+    values::{output, radius, share_reach, tolerance},
 };
 
 /// Caustica renders glTF scenes by photon mapping on the GPU, without a screen.
@@ -81,6 +81,10 @@ pub struct RenderArgs {
     #[arg(help_heading = "Estimate")]
     pub final_gather: u32,
 
+    /// Points on one surface share an estimate within this fraction of its radius, 0 to 2; 0 makes one for every sample
+    #[arg(long, value_name = "F", default_value_t = 2.0, value_parser = share_reach, help_heading = "Estimate")]
+    pub share: f32,
+
     /// Write what happened as JSON: device, seconds by stage, photons, rays, peak device memory, warnings
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     pub stats: Option<PathBuf>,
@@ -120,7 +124,7 @@ impl RenderArgs {
     /// The library's settings that these arguments ask for.
     pub fn settings(&self) -> Settings {
         let (search, radius, final_gather) = (self.search.into(), self.radius, self.final_gather);
-        Settings { search, radius, final_gather, ..self.options.settings() }
+        Settings { search, radius, final_gather, share_reach: self.share, ..self.options.settings() }
     }
 }
 
@@ -170,7 +174,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_settings() {
         let s = settings(
-            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
+            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --share 0.5 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
              --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
              --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
@@ -180,6 +184,7 @@ mod tests {
             kernel: DensityKernel::Gaussian,
             raw_estimate: true,
             final_gather: 16,
+            share_reach: 0.5,
             cone_constant: 1.5,
             max_radius: Some(0.25),
             max_bounces: 0,

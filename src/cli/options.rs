@@ -10,7 +10,7 @@ use clap::ValueEnum;
 
 use super::environment::EnvironmentOptions;
 use super::loading::LoadingOptions;
-use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, share_reach, size};
+use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, size};
 
 /// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
@@ -97,10 +97,6 @@ pub struct SharedOptions {
     #[arg(long, value_name = "R", value_parser = radius, help_heading = "Estimate")]
     pub max_radius: Option<f32>,
 
-    /// Points on one surface share an estimate within this fraction of its radius, 0 to 2; 0 makes one for every sample
-    #[arg(long, value_name = "F", default_value_t = 2.0, value_parser = share_reach, help_heading = "Estimate")]
-    pub share: f32,
-
     /// Camera samples per pixel, spread over the pixel filter; 1 is the pixel's centre [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
     pub spp: Option<u32>,
@@ -185,7 +181,6 @@ impl SharedOptions {
             raw_estimate: self.raw_estimate,
             cone_constant: self.cone_constant,
             max_radius: self.max_radius,
-            share_reach: self.share,
             max_bounces: self.max_bounces,
             spp: self.spp.unwrap_or(defaults.spp),
             size: self.size,

@@ -99,7 +99,7 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
         let size = Some(options.size.unwrap_or(PRESET_SIZE));
         // The report's estimate, whatever became of it since.
         let spp = options.spp.unwrap_or(PRESET_SPP);
-        let settings = Settings { size, spp, raw_estimate: true, share_reach: 0.0, ..settings };
+        let settings = Settings { size, spp, raw_estimate: true, ..settings };
         return study::report(&folder, &settings, args.repeat.unwrap_or(PRESET_REPEATS), args.preset_scale, look);
     }
     // clap has seen to it that all three are there.

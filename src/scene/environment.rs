@@ -39,19 +39,17 @@ impl Environment {
     /// [`Error::Io`] if the file cannot be read, is damaged, or has more than 2²⁷ pixels; [`Error::Setting`] for a
     /// strength or rotation that is no such number, or a strength that takes the brightest pixel beyond all numbers.
     pub fn load(path: &Path, strength: f32, rotation: f32) -> Result<Self> {
-        let wrong = |name, value: f32, problem: &str| Error::Setting {
-            name,
-            value: value.to_string(),
-            problem: problem.to_owned(),
-        };
-        if !(strength.is_finite() && strength >= 0.0) {
-            return Err(wrong("environment strength", strength, "is not a number from 0"));
-        }
-        if !rotation.is_finite() {
-            return Err(wrong("environment rotation", rotation, "is not a number of degrees"));
-        }
-        let bytes = read_radiance_bytes(path)?;
-        let picture = decode_radiance(path, &bytes)?;
+        check_turn(strength, rotation)?;
+        Self::from_bytes(&read_radiance_bytes(path)?, path, strength, rotation)
+    }
+
+    /// As [`Environment::load`], of a file's bytes; `path` is what messages call it.
+    ///
+    /// # Errors
+    /// As [`Environment::load`].
+    pub fn from_bytes(bytes: &[u8], path: &Path, strength: f32, rotation: f32) -> Result<Self> {
+        check_turn(strength, rotation)?;
+        let picture = decode_radiance(path, bytes)?;
         let brightest = picture.pixels.as_flattened().iter().copied().fold(0.0, f32::max);
         if !(brightest * strength).is_finite() {
             let problem = format!("the brightest pixel of {}, {brightest:e}, gets infinitely bright", path.display());
@@ -61,7 +59,7 @@ impl Environment {
         let warnings = picture.notes.into_iter().map(|note| format!("{name}: {note}")).collect();
         Ok(Self {
             name,
-            hash: hash(&bytes),
+            hash: hash(bytes),
             width: picture.width,
             height: picture.height,
             pixels: picture.pixels,
@@ -112,6 +110,20 @@ impl Environment {
         let below = pixel(0, 1).lerp(pixel(1, 1), across);
         self.strength * above.lerp(below, down)
     }
+}
+
+fn wrong(name: &'static str, value: f32, problem: &str) -> Error {
+    Error::Setting { name, value: value.to_string(), problem: problem.to_owned() }
+}
+
+fn check_turn(strength: f32, rotation: f32) -> Result<()> {
+    if !(strength.is_finite() && strength >= 0.0) {
+        return Err(wrong("environment strength", strength, "is not a number from 0"));
+    }
+    if !rotation.is_finite() {
+        return Err(wrong("environment rotation", rotation, "is not a number of degrees"));
+    }
+    Ok(())
 }
 
 /// SHA-256 in hexadecimal.

@@ -17,8 +17,7 @@ pub fn grid(
     let title = format!("Study of {}", subject.scene.file_name);
     let mut plan = Plan { title, subjects: vec![subject], combinations: Vec::new(), figures: Vec::new(), look };
     for &mode in modes {
-        // A study is of estimates: each point has its own.
-        let base = Settings { mode, share_reach: 0.0, ..settings.clone() };
+        let base = Settings { mode, ..settings.clone() };
         let title = format!("Mode {}", mode.name());
         add_plane(&mut plan, 0, &base, photons, neighbors, repeats, title);
     }

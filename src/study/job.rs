@@ -31,6 +31,7 @@ pub(super) fn photon_part(settings: &Settings) -> Settings {
         size: free.size,
         camera: free.camera,
         share_reach: free.share_reach,
+        light_samples: free.light_samples,
         pixel_filter: free.pixel_filter,
         aperture: free.aperture,
         focus: free.focus,

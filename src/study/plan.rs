@@ -107,8 +107,9 @@ pub struct Look {
 
 impl Plan {
     /// Adds a combination, or finds it; the larger number of repeats stays. Where no photons are traced, n and k make no
-    /// difference and are the defaults.
+    /// difference and are the defaults. A study is of estimates: each point has its own.
     pub fn add(&mut self, mut new: Combination) -> usize {
+        new.settings.share_reach = 0.0;
         if !new.settings.mode.traces_photons() {
             let Settings { global_photons, caustic_photons, neighbors, .. } = Settings::default();
             new.settings = Settings { global_photons, caustic_photons, neighbors, ..new.settings };

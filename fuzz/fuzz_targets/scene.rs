@@ -1,0 +1,18 @@
+//! The bytes of a .gltf or .glb file: read, or refused in one line. Mutations keep the JSON whole, else hardly an input
+//! would get beyond its parser.
+#![no_main]
+
+use libfuzzer_sys::{fuzz_mutator, fuzz_target};
+
+#[path = "../src/gltf_mutator.rs"]
+mod gltf_mutator;
+#[path = "../../tests/assets/any_scene.rs"]
+mod any_scene;
+
+fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
+    gltf_mutator::mutate(data, size, max_size, seed)
+});
+
+fuzz_target!(|bytes: &[u8]| {
+    let _ = any_scene::check(bytes);
+});

@@ -1,0 +1,37 @@
+//! What holds for any words given to the command: shared by the fuzz target `options` and the replay of its corpus.
+
+use caustica::settings::Settings;
+use clap::Parser as _;
+
+use super::args::{Args, Command};
+
+/// Understands the words, one a line, as those after `caustica`. Wrong ones are refused with exit code 2 and a text,
+/// which is returned; what right ones ask for is in range, or refused in one line.
+pub fn check(bytes: &[u8]) -> Result<(), String> {
+    let text = String::from_utf8_lossy(bytes);
+    match Args::try_parse_from(["caustica"].into_iter().chain(text.lines())) {
+        Ok(args) => settings(&args.command).map_or(Ok(()), |settings| check_settings(&settings)),
+        Err(error) => {
+            let (code, text) = (error.exit_code(), error.render().to_string());
+            assert!(!text.is_empty() && code == if error.use_stderr() { 2 } else { 0 }, "{code}: {text}");
+            Err(text)
+        }
+    }
+}
+
+fn settings(command: &Command) -> Option<Settings> {
+    match command {
+        Command::Render(args) => Some(args.settings()),
+        Command::Compare(args) => Some(args.options.settings()),
+        Command::Study(args) => Some(args.options.settings()),
+        Command::Devices | Command::Info { .. } => None,
+    }
+}
+
+fn check_settings(settings: &Settings) -> Result<(), String> {
+    let checked = settings.check().map_err(|error| error.to_string());
+    if let Err(text) = &checked {
+        assert!(!text.is_empty() && !text.contains('\n'), "one line: {text}");
+    }
+    checked
+}
