@@ -118,7 +118,7 @@ fn assemble(
     scene.spheres = carried.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
     carried.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    scene.warnings = notes.0;
+    scene.warnings = notes.into_lines();
     Ok(scene)
 }
 
