@@ -3,8 +3,10 @@
 use super::fault::{Notes, Read, fault};
 
 /// Extensions that are read, or that change nothing which is read.
-const SUPPORTED: [&str; 11] = [
+const SUPPORTED: [&str; 13] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "KHR_draco_mesh_compression",
     "KHR_implicit_shapes",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
