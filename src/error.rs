@@ -26,6 +26,27 @@ pub enum Error {
         allowed: u64,
         advice: String,
     },
+    /// No memory of the device is left for something.
+    #[error(
+        "no device memory is left for {what}{}; {adapter} has given {} MiB; ask for fewer --photons, for a smaller scene, or \
+        use another --device",
+        needed.map_or(String::new(), |bytes| format!(" of {bytes} bytes")),
+        used >> 20
+    )]
+    Memory {
+        what: String,
+        /// Bytes; `None` where only the driver knows.
+        needed: Option<u64>,
+        adapter: String,
+        /// Bytes of the buffers that were there.
+        used: u64,
+    },
+    /// The device is gone in the middle of the work.
+    #[error(
+        "the device was lost: {adapter}: {why}; run it again, with fewer --photons or a smaller -k if work took too long, or \
+        with another --device"
+    )]
+    Lost { adapter: String, why: String },
     /// The driver reported an error in the middle of the work.
     #[error("{0}")]
     Gpu(String),

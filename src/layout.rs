@@ -116,6 +116,10 @@ pub struct Light {
     pub emission: [f32; 3],
     /// Area of a surface, m²; 1 without one.
     pub area: f32,
+    /// Media in which paths start on the front, and on the back of a surface: materials, each plus one, outermost first; 0 for
+    /// none. See [`crate::bvh::MediaProbe`].
+    pub media: [u32; MEDIA_DEPTH],
+    pub back_media: [u32; MEDIA_DEPTH],
 }
 
 /// One entry of a table by which lights are chosen.
@@ -215,6 +219,8 @@ pub struct Counters {
     pub media_overflows: u32,
     /// Rays given up after the loop budget.
     pub unfinished: u32,
+    /// Infinite or undefined numbers that were left out, each with the path or sample that it belonged to.
+    pub non_finite: u32,
 }
 
 /// Settings of one batch of photon paths; see `shaders/lib/photon_batch.wesl`.
@@ -322,6 +328,8 @@ pub struct CameraTile {
     /// Entries of the pixel filter's table, less 1.
     pub filter_steps: u32,
     pub pad: u32,
+    /// Media around the lens, as in [`Light::media`].
+    pub media: [u32; MEDIA_DEPTH],
 }
 
 /// What the first ray of a camera sample hit.
@@ -346,7 +354,8 @@ pub struct TilePixel {
     pub normal: [f32; 3],
     pub depth: f32,
     pub albedo: [f32; 3],
-    pub pad: u32,
+    /// Samples that are not in the sums, as these would not be finite with them.
+    pub non_finite: u32,
 }
 
 /// Which light `light_directly` takes; one without extent.

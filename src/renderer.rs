@@ -11,7 +11,7 @@ pub(crate) use camera_pass::CameraPass;
 use searcher::Searcher;
 
 use crate::{
-    bvh::Bvh,
+    bvh::{Bvh, Media, MediaProbe, packed, too_deep},
     error::{Error, Result},
     gpu::Gpu,
     image::Frame,
@@ -19,7 +19,7 @@ use crate::{
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::{Crop, Settings},
-    stats::{DeviceStats, LightStats, MapStats, Stats, timed},
+    stats::{DeviceStats, LightStats, MapStats, NonFinite, Stats, timed},
 };
 
 /// Height of a picture whose size was not asked for.
@@ -55,6 +55,8 @@ pub struct Session<'a> {
     gpu: &'a Gpu,
     scene: &'a Scene,
     buffers: SceneBuffers,
+    /// What the scene's cameras are inside of.
+    camera_media: Vec<Media>,
     stats: Stats,
 }
 
@@ -101,7 +103,11 @@ impl<'a> Session<'a> {
         let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
         let buffers = SceneBuffers::new(gpu, scene, &bvh, settings)?;
         stats.warnings.extend(buffers.lights.warnings.iter().cloned());
-        Ok(Self { gpu, scene, buffers, stats })
+        let probe = MediaProbe::new(scene, &bvh);
+        let around = scene.cameras.iter().map(|camera| packed(&probe.at(camera.position.as_dvec3())));
+        let (camera_media, fits): (Vec<Media>, Vec<bool>) = around.unzip();
+        stats.warnings.extend(too_deep("cameras", fits.iter().filter(|fits| !**fits).count()));
+        Ok(Self { gpu, scene, buffers, camera_media, stats })
     }
 
     /// First pass: photons leave the lights and are stored in a global and a caustic map, as `mode`, the photon
@@ -125,6 +131,7 @@ impl<'a> Session<'a> {
         stats.photons.lost_to_bounce_limit = traced.lost;
         stats.photons.lights = light_stats(&self.buffers, &traced.of_lights);
         count_faults(&mut stats, traced.media_overflows, traced.unfinished);
+        stats.non_finite.photons += traced.non_finite;
         stats.warnings.extend(traced.warnings);
         progress.report(Stage::Grid, 0, 1);
         let global = usize::from(traced.global.stored > 0);
@@ -155,10 +162,12 @@ impl<'a> Session<'a> {
             progress.report(Stage::Camera, done as u64, tiles.len() as u64);
             pass.trace(tile, &mut stats)?;
             let count = timed(&mut stats.seconds.gather, || searcher.gather(&pass, maps, tile, progress))?;
+            stats.non_finite.gather += count.non_finite;
             camera_pass::add_step(&mut stats, count);
             pass.resolve(tile, &mut film)?;
         }
         progress.report(Stage::Camera, tiles.len() as u64, tiles.len() as u64);
+        stats.non_finite.film += film.non_finite;
         self.close(&mut stats);
         Ok(Render { frame: film.finish(settings.spp), stats })
     }
@@ -232,6 +241,14 @@ fn warn_of_faults(stats: &mut Stats) {
         stats
             .warnings
             .push(format!("{} rays were given up after their loop budget; their light is lost", stats.unfinished_rays));
+    }
+    if stats.non_finite.total() > 0 {
+        let NonFinite { photons, camera, direct, gather, film } = stats.non_finite;
+        stats.warnings.push(format!(
+            "numbers came out infinite or undefined and were left out: {photons} photon paths, {camera} camera paths, \
+             {direct} samples of direct light, {gather} rays of final gathering, {film} samples of the picture; lights \
+             or sizes are beyond the range of 32-bit numbers"
+        ));
     }
     if stats.media_overflows > 0 {
         stats.warnings.push(format!(

@@ -50,6 +50,29 @@ pub struct PhotonStats {
     pub lights: Vec<LightStats>,
 }
 
+/// Infinite or undefined numbers that a stage made. What they belonged to was left out of the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NonFinite {
+    /// Photon paths.
+    pub photons: u64,
+    /// Camera paths.
+    pub camera: u64,
+    /// Samples of direct light.
+    pub direct: u64,
+    /// Rays of final gathering.
+    pub gather: u64,
+    /// Samples of the picture whose estimate, or whose pixel's sum with them, was not finite.
+    pub film: u64,
+}
+
+impl NonFinite {
+    /// Of all stages.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.photons + self.camera + self.direct + self.gather + self.film
+    }
+}
+
 /// Adapter and driver.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DeviceStats {
@@ -69,6 +92,8 @@ pub struct Stats {
     pub media_overflows: u64,
     /// Rays given up after the loop budget; their light is lost.
     pub unfinished_rays: u64,
+    #[serde(default)]
+    pub non_finite: NonFinite,
     /// The most device memory that buffers took at once, bytes.
     pub peak_device_bytes: u64,
     pub warnings: Vec<String>,

@@ -43,19 +43,19 @@ fn twins() -> Vec<Twin> {
         Primitive { v0, material, e1, id, e2, emitter }
         Normals { n0, n1, n2, flat_shaded }
         Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }
-        Light { position, kind, e1, group, e2, solid_angle, emission, area }
+        Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
         LightChoice { cdf, probability }
         Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
         Path { origin, flags, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
         VisiblePoint { position, valid, weight, offset, ng, pad0, ns, pad1 }
-        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished }
+        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
         Store { staged, first_photon, photons, map_bit }
-        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, pad }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, pad, media }
         FinalStep { ray, rays, points, pad }
         FirstHit { normal, depth, albedo, alpha }
-        TilePixel { radiance, alpha, normal, depth, albedo, pad }
+        TilePixel { radiance, alpha, normal, depth, albedo, non_finite }
         DirectLight { light, points, pad0, pad1 }
         EmitterSample { points, sample, samples, light_count }
         Cell { lo, wi_lo, hi, wi_hi }

@@ -11,12 +11,14 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 
+pub use media::{Media, MediaProbe, packed, too_deep};
 pub use node::BvhChild;
 
 use crate::layout::{BVH_STACK, BvhNode, Normals, Primitive, SPHERE_BIT, octahedral};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
 mod convert;
+mod media;
 mod node;
 #[cfg(test)]
 mod tests;

@@ -9,10 +9,17 @@ use std::{
 };
 
 /// Bytes of all live buffers, now and at most.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct MemoryCount {
     now: AtomicU64,
     peak: AtomicU64,
+    limit: AtomicU64,
+}
+
+impl Default for MemoryCount {
+    fn default() -> Self {
+        Self { now: AtomicU64::new(0), peak: AtomicU64::new(0), limit: AtomicU64::new(u64::MAX) }
+    }
 }
 
 impl MemoryCount {
@@ -31,6 +38,17 @@ impl MemoryCount {
     #[must_use]
     pub fn peak(&self) -> u64 {
         self.peak.load(Ordering::Relaxed)
+    }
+
+    /// Bytes that all buffers together may take: all that the driver gives, unless [`Self::set_limit`] was called.
+    #[must_use]
+    pub fn limit(&self) -> u64 {
+        self.limit.load(Ordering::Relaxed)
+    }
+
+    /// Leaves the rest of the device's memory to others.
+    pub fn set_limit(&self, bytes: u64) {
+        self.limit.store(bytes, Ordering::Relaxed);
     }
 
     /// Measures the peak anew from here.

@@ -1,16 +1,22 @@
 //! A compiled kernel, its bindings by name, and dispatches.
 
 use super::{
-    Buffer, Gpu,
+    Buffer, Commands, Gpu,
     shaders::{BindingKind, Shader, shader},
 };
+
+/// The bind group that says which part of a dispatch runs: owned here, filled for each dispatch (`shaders/lib/dispatch.wesl`).
+const PART_GROUP: u32 = 3;
 
 /// A compiled compute kernel.
 #[derive(Debug)]
 pub struct Kernel {
     shader: &'static Shader,
     pipeline: wgpu::ComputePipeline,
+    /// Of the groups that the caller fills.
     layouts: Vec<Option<wgpu::BindGroupLayout>>,
+    /// The kernel finds its index with `invocation_index`, so that its dispatches can be cut.
+    can_be_cut: bool,
 }
 
 /// The buffers of one dispatch, one bind group per group that the kernel uses.
@@ -31,11 +37,12 @@ impl Kernel {
             source: wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
         });
         let constants: Vec<_> = overrides.iter().copied().filter(|(name, _)| shader.overrides.contains(name)).collect();
-        let groups = shader.bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
-        let layouts: Vec<_> = (0..groups).map(|g| group_layout(gpu, shader, g)).collect();
+        let layouts: Vec<_> = (0..PART_GROUP).map(|g| group_layout(gpu, shader, g)).collect();
+        let can_be_cut = shader.bindings.iter().any(|b| b.group == PART_GROUP);
+        let part = can_be_cut.then_some(&gpu.parts.layout);
         let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(stem),
-            bind_group_layouts: &layouts.iter().map(Option::as_ref).collect::<Vec<_>>(),
+            bind_group_layouts: &layouts.iter().map(Option::as_ref).chain([part]).collect::<Vec<_>>(),
             immediate_size: 0,
         });
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -49,7 +56,7 @@ impl Kernel {
             },
             cache: None,
         });
-        Self { shader, pipeline, layouts }
+        Self { shader, pipeline, layouts, can_be_cut }
     }
 
     /// Binds buffers by the names of the shader's variables. Names that this kernel does not use are passed over, so
@@ -85,34 +92,89 @@ impl Kernel {
     }
 
     /// Runs `invocations` invocations, in workgroups of [`crate::layout::WORKGROUP_SIZE`] folded to two dimensions
-    /// where one is too short; the kernel finds its index with `invocation_index` and must check it.
-    pub fn dispatch(&self, encoder: &mut wgpu::CommandEncoder, bindings: &Bindings, invocations: u64) {
-        let (x, y) = fold(invocations.div_ceil(u64::from(crate::layout::WORKGROUP_SIZE)));
-        if x > 0 {
-            self.pass(encoder, bindings).dispatch_workgroups(x, y, 1);
-        }
+    /// where one is too short, and in several dispatches where one would take too long ([`super::Pacing`]); the kernel finds its
+    /// index with `invocation_index` and must check it.
+    pub fn dispatch(&self, commands: &mut Commands, bindings: &Bindings, invocations: u64) {
+        self.record(commands, bindings, invocations, None);
     }
 
-    /// Runs as many workgroups as the three `u32` at `offset` of `arguments` say.
-    pub fn dispatch_indirect(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        bindings: &Bindings,
-        arguments: &Buffer,
-        offset: u64,
-    ) {
-        self.pass(encoder, bindings).dispatch_workgroups_indirect(arguments, offset);
+    /// Runs as many workgroups as the first three `u32` of `arguments` say, which the device has written: at most those of
+    /// `most` invocations.
+    pub fn dispatch_indirect(&self, commands: &mut Commands, bindings: &Bindings, arguments: &Buffer, most: u64) {
+        self.record(commands, bindings, most, Some(arguments));
     }
 
-    fn pass<'e>(&self, encoder: &'e mut wgpu::CommandEncoder, bindings: &Bindings) -> wgpu::ComputePass<'e> {
-        let mut pass = encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(self.shader.stem), timestamp_writes: None });
-        pass.set_pipeline(&self.pipeline);
-        for (group, bind_group) in &bindings.0 {
-            pass.set_bind_group(*group, bind_group, &[]);
+    fn record(&self, commands: &mut Commands, bindings: &Bindings, most: u64, arguments: Option<&Buffer>) {
+        let gpu = commands.gpu;
+        let stem = self.shader.stem;
+        let record = |pass: &mut wgpu::ComputePass<'_>, first: u64, invocations: u64| {
+            pass.set_pipeline(&self.pipeline);
+            for (group, bind_group) in &bindings.0 {
+                pass.set_bind_group(*group, bind_group, &[]);
+            }
+            if self.can_be_cut {
+                pass.set_bind_group(PART_GROUP, &gpu.parts.from(gpu, first), &[]);
+            }
+            match arguments {
+                Some(arguments) if invocations == most => pass.dispatch_workgroups_indirect(arguments, 0),
+                // How many there are in truth is known to the device alone: those beyond the end find nothing to do.
+                _ => {
+                    let (x, y) = fold(invocations.div_ceil(u64::from(crate::layout::WORKGROUP_SIZE)));
+                    pass.dispatch_workgroups(x, y, 1);
+                }
+            }
+        };
+        match self.can_be_cut {
+            true => commands.dispatch(stem, most, record),
+            false => {
+                assert_eq!(most, 1, "{stem}: a kernel without invocation_index is a single invocation");
+                commands.dispatch(stem, 1, record);
+            }
         }
-        pass
     }
+}
+
+/// Says where a part of a dispatch begins.
+#[derive(Debug)]
+pub(super) struct Parts {
+    layout: wgpu::BindGroupLayout,
+    /// That of all dispatches that are not cut.
+    whole: wgpu::BindGroup,
+}
+
+impl Parts {
+    pub fn new(device: &wgpu::Device) -> Self {
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("part of a dispatch"),
+            entries: &[layout_entry(0, BindingKind::Uniform)],
+        });
+        Self { whole: starting_at(device, &layout, 0), layout }
+    }
+
+    /// The bind group of a part.
+    fn from(&self, gpu: &Gpu, first: u64) -> wgpu::BindGroup {
+        if first == 0 { self.whole.clone() } else { starting_at(&gpu.device, &self.layout, first) }
+    }
+}
+
+fn starting_at(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, first: u64) -> wgpu::BindGroup {
+    let first = u32::try_from(first).expect("invocations are counted in 32 bits");
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("first invocation"),
+        size: 16,
+        usage: wgpu::BufferUsages::UNIFORM,
+        mapped_at_creation: true,
+    });
+    // Fails only where the device is lost, which is told elsewhere.
+    if let Ok(mut bytes) = buffer.slice(..).get_mapped_range_mut() {
+        bytes.slice(..4).copy_from_slice(&first.to_le_bytes());
+    }
+    buffer.unmap();
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("part of a dispatch"),
+        layout,
+        entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
+    })
 }
 
 /// Workgroups per dimension that every adapter can dispatch.
@@ -128,29 +190,29 @@ fn fold(workgroups: u64) -> (u32, u32) {
 
 /// Layout of one group of a kernel; `None` if the kernel does not use the group.
 fn group_layout(gpu: &Gpu, shader: &Shader, group: u32) -> Option<wgpu::BindGroupLayout> {
-    let entries: Vec<_> = shader
-        .bindings
-        .iter()
-        .filter(|b| b.group == group)
-        .map(|b| wgpu::BindGroupLayoutEntry {
-            binding: b.index,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: match b.kind {
-                    BindingKind::Uniform => wgpu::BufferBindingType::Uniform,
-                    BindingKind::ReadOnly => wgpu::BufferBindingType::Storage { read_only: true },
-                    BindingKind::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
-                },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        })
-        .collect();
+    let entries: Vec<_> =
+        shader.bindings.iter().filter(|b| b.group == group).map(|b| layout_entry(b.index, b.kind)).collect();
     let describe = |entries| {
         gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(shader.stem), entries })
     };
     (!entries.is_empty()).then(|| describe(&entries))
+}
+
+fn layout_entry(binding: u32, kind: BindingKind) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Buffer {
+            ty: match kind {
+                BindingKind::Uniform => wgpu::BufferBindingType::Uniform,
+                BindingKind::ReadOnly => wgpu::BufferBindingType::Storage { read_only: true },
+                BindingKind::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
+            },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        count: None,
+    }
 }
 
 #[cfg(test)]

@@ -2,16 +2,32 @@
 
 mod adapter;
 mod buffer;
+mod commands;
+mod fault;
 mod kernel;
+mod pace;
 pub mod shaders;
+mod timer;
 
-use std::sync::{Arc, Mutex};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    time::Duration,
+};
 
 pub use adapter::{AdapterReport, NO_ADAPTER, adapters};
 pub use buffer::{Buffer, MemoryCount};
+pub use commands::Commands;
 pub use kernel::{Bindings, Kernel};
+pub use pace::{MOST_PER_DISPATCH, Pacing};
 
 use crate::error::{Error, Result};
+use fault::Faults;
+use kernel::Parts;
+use pace::Pace;
+use timer::Timer;
 
 /// An open device.
 #[derive(Debug)]
@@ -24,9 +40,16 @@ pub struct Gpu {
     /// Driver and its version.
     pub driver: String,
     pub memory: Arc<MemoryCount>,
-    /// What the driver reported outside of any call.
-    fault: Arc<Mutex<Option<String>>>,
+    faults: Faults,
+    pace: Pace,
+    timer: Option<Timer>,
+    parts: Parts,
+    dispatches: AtomicU64,
 }
+
+/// How long the device may work on what was submitted before it counts as hung. Submissions are kept far shorter than
+/// that on GPUs; software works through all of them at the pace of its processor, and cannot hang.
+const HUNG_AFTER: Duration = Duration::from_secs(300);
 
 impl Gpu {
     /// Opens the adapter of that name or index, or the best one.
@@ -34,24 +57,51 @@ impl Gpu {
     /// # Errors
     /// [`Error::Device`] if there is none or it cannot be opened.
     pub fn open(wanted: Option<&str>) -> Result<Self> {
+        Self::open_paced(wanted, None)
+    }
+
+    /// As [`Self::open`], with dispatches cut that way; `None`: by measured time, but for software not at all.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_paced(wanted: Option<&str>, pacing: Option<Pacing>) -> Result<Self> {
         let chosen = adapter::choose(wanted)?;
+        let usual = if chosen.kind == "software" { Pacing::Whole } else { Pacing::Measured };
+        let pacing = pacing.unwrap_or(usual);
+        let clock = match pacing {
+            Pacing::Measured => chosen.adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            Pacing::Whole | Pacing::Parts(_) => wgpu::Features::empty(),
+        };
         let (device, queue) = pollster::block_on(chosen.adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("caustica"),
-            required_features: wgpu::Features::SUBGROUP,
+            required_features: wgpu::Features::SUBGROUP | clock,
             required_limits: chosen.limits.clone(),
             ..Default::default()
         }))
         .map_err(|e| Error::Device(format!("adapter {} cannot be opened: {e}", chosen.name)))?;
-        let fault = Arc::new(Mutex::new(None));
-        let (on_error, on_loss) = (Arc::clone(&fault), Arc::clone(&fault));
-        device.on_uncaptured_error(Arc::new(move |e| note_fault(&on_error, &e.to_string())));
-        device.set_device_lost_callback(move |reason, message| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                note_fault(&on_loss, &format!("the device was lost: {message}"));
-            }
-        });
+        let faults = Faults::of(&device);
+        let (timer, parts) = (Timer::new(&device, &queue), Parts::new(&device));
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);
-        Ok(Self { device, queue, limits, name, driver, memory: Arc::default(), fault })
+        let (memory, dispatches) = (Arc::default(), AtomicU64::new(0));
+        Ok(Self {
+            device,
+            queue,
+            limits,
+            name,
+            driver,
+            memory,
+            faults,
+            pace: Pace::new(pacing),
+            timer,
+            parts,
+            dispatches,
+        })
+    }
+
+    /// Dispatches recorded so far: parts count one by one.
+    #[must_use]
+    pub fn dispatches(&self) -> u64 {
+        self.dispatches.load(Ordering::Relaxed)
     }
 
     /// The most bytes that one storage binding can hold.
@@ -64,7 +114,7 @@ impl Gpu {
     /// copied from and to and hold indirect arguments.
     ///
     /// # Errors
-    /// [`Error::Limit`] if one binding cannot hold it.
+    /// [`Error::Limit`] if one binding cannot hold it, [`Error::Memory`] if none is left.
     pub fn storage<T>(&self, label: &str, count: u64) -> Result<Buffer> {
         let bytes = (count.max(1) * size_of::<T>() as u64).next_multiple_of(4);
         if bytes > self.max_binding() {
@@ -79,29 +129,41 @@ impl Gpu {
             });
         }
         use wgpu::BufferUsages as U;
-        Ok(self.buffer(label, bytes, U::STORAGE | U::COPY_SRC | U::COPY_DST | U::INDIRECT))
+        self.buffer(label, bytes, U::STORAGE | U::COPY_SRC | U::COPY_DST | U::INDIRECT)
     }
 
     /// A storage buffer filled with `data`.
     ///
     /// # Errors
-    /// [`Error::Limit`] if one binding cannot hold it.
+    /// As [`Self::storage`].
     pub fn storage_with<T: bytemuck::Pod>(&self, label: &str, data: &[T]) -> Result<Buffer> {
         let buffer = self.storage::<T>(label, data.len() as u64)?;
         self.write(&buffer, 0, data);
         Ok(buffer)
     }
 
-    /// A uniform buffer that holds `value`.
+    /// A uniform buffer that holds `value`. One that finds no memory left shows in the next [`Self::wait`].
     #[must_use]
     pub fn uniform<T: bytemuck::Pod>(&self, label: &str, value: &T) -> Buffer {
         let bytes = (size_of::<T>() as u64).next_multiple_of(16);
-        let buffer = self.buffer(label, bytes, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
+        let buffer = self.create(label, bytes, wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST);
         self.write(&buffer, 0, std::slice::from_ref(value));
         buffer
     }
 
-    fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Buffer {
+    /// A buffer, or what hinders it.
+    fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Result<Buffer> {
+        let used = self.memory.now();
+        let missing =
+            || Error::Memory { what: label.to_string(), needed: Some(size), adapter: self.name.clone(), used };
+        if size > self.memory.limit().saturating_sub(used) {
+            return Err(missing());
+        }
+        let buffer = self.create(label, size, usage);
+        if self.faults.take_missing_memory() { Err(missing()) } else { Ok(buffer) }
+    }
+
+    fn create(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Buffer {
         let inner = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size,
@@ -117,32 +179,49 @@ impl Gpu {
         self.queue.write_buffer(buffer, offset, bytemuck::cast_slice(data));
     }
 
+    /// Records commands, to be handed over with [`Self::submit`].
     #[must_use]
-    pub fn encoder(&self) -> wgpu::CommandEncoder {
-        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    pub fn encoder(&self) -> Commands<'_> {
+        Commands::new(self)
     }
 
     /// Hands the commands to the device without waiting for them.
-    pub fn submit(&self, encoder: wgpu::CommandEncoder) {
-        self.queue.submit([encoder.finish()]);
+    pub fn submit(&self, commands: Commands) {
+        commands.finish();
     }
 
     /// Waits until the device has done all that was submitted.
     ///
     /// # Errors
-    /// [`Error::Gpu`] with what the driver reported.
+    /// [`Error::Lost`], [`Error::Memory`] or [`Error::Gpu`]: what went wrong since the last wait.
     pub fn wait(&self) -> Result<()> {
-        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
-        if let Some(message) = self.fault.lock().expect("no holder of this lock panics").take() {
-            return Err(Error::Gpu(format!("{} ({}): {message}", self.name, self.driver)));
+        let polled = self.poll();
+        if let Some(fault) = self.faults.take() {
+            return Err(fault.into_error(&self.name, &self.driver, self.memory.now()));
         }
-        polled.map(|_| ()).map_err(|e| Error::Gpu(format!("{} ({}): {e}", self.name, self.driver)))
+        polled.map_err(|e| match e {
+            wgpu::PollError::Timeout => Error::Lost {
+                adapter: format!("{} ({})", self.name, self.driver),
+                why: format!("it has not answered for {} minutes", HUNG_AFTER.as_secs() / 60),
+            },
+            other => Error::Gpu(format!("{} ({}): {other}", self.name, self.driver)),
+        })
+    }
+
+    /// Waits as [`Self::wait`] does, and leaves faults for that.
+    fn poll(&self) -> std::result::Result<(), wgpu::PollError> {
+        let timeout = (self.pace.pacing == Pacing::Measured).then_some(HUNG_AFTER);
+        let polled = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout });
+        if let Some(timer) = &self.timer {
+            timer.collect(&self.pace);
+        }
+        polled.map(drop)
     }
 
     /// Reads `count` elements from element `first` on, after all that was submitted.
     ///
     /// # Errors
-    /// [`Error::Gpu`] with what the driver reported.
+    /// As [`Self::wait`], and [`Error::Memory`] if no room is left for the copy.
     pub fn read<T: bytemuck::Pod>(&self, buffer: &Buffer, first: u64, count: u64) -> Result<Vec<T>> {
         let (offset, bytes) = (first * size_of::<T>() as u64, count * size_of::<T>() as u64);
         if bytes == 0 {
@@ -150,22 +229,20 @@ impl Gpu {
             return Ok(Vec::new());
         }
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        let staging = self.buffer("readback", bytes, usage);
+        let staging = self.buffer("data to read back", bytes, usage)?;
         let mut encoder = self.encoder();
         encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
         self.submit(encoder);
-        staging.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+        let is_there = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&is_there);
+        staging.slice(..).map_async(wgpu::MapMode::Read, move |r| told.store(r.is_ok(), Ordering::Release));
         self.wait()?;
-        let mapped = staging
-            .slice(..)
-            .get_mapped_range()
-            .map_err(|e| Error::Gpu(format!("{} ({}): reading back failed: {e}", self.name, self.driver)))?;
-        Ok(bytemuck::pod_collect_to_vec(&mapped))
+        let mapped = is_there.load(Ordering::Acquire).then(|| staging.slice(..).get_mapped_range().ok()).flatten();
+        // Without a fault there is one reason left.
+        let lost = || Error::Lost {
+            adapter: format!("{} ({})", self.name, self.driver),
+            why: "it gave nothing back".to_string(),
+        };
+        mapped.map(|bytes| bytemuck::pod_collect_to_vec(&bytes)).ok_or_else(lost)
     }
-}
-
-/// Keeps the first fault: later ones are its consequences.
-fn note_fault(fault: &Mutex<Option<String>>, message: &str) {
-    let mut slot = fault.lock().expect("no holder of this lock panics");
-    slot.get_or_insert_with(|| message.split_whitespace().collect::<Vec<_>>().join(" "));
 }

@@ -3,6 +3,7 @@
 
 use super::{SceneBuffers, SharedPoints, direct_light::DirectLighting};
 use crate::{
+    bvh::Media,
     error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
     layout::{CameraTile, Counters, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
@@ -16,6 +17,8 @@ const TILE_POINTS: u64 = 1 << 16;
 const BRANCHES: u32 = 4;
 /// Samples of one pixel that a tile holds at most.
 const PIXEL_SAMPLES: u32 = 256;
+/// Dispatches of direct light whose shadow rays are counted together: with one ray of each point they stay far below 2^32.
+const DIRECT_STEPS_PER_READ: u32 = 1024;
 /// Bounces handed to the device at once.
 const BOUNCES_PER_SUBMISSION: u32 = 32;
 /// Pixels of a tile at least.
@@ -65,15 +68,19 @@ pub struct StepCount {
     pub rays: u64,
     pub media_overflows: u64,
     pub unfinished: u64,
+    pub non_finite: u64,
 }
 
 impl CameraTracer {
+    /// All rays start inside of `media`, those around the middle of the camera.
+    ///
     /// # Errors
     /// Limits of the adapter; a lens before an orthographic camera.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
         camera: &Camera,
+        media: Media,
         size: (u32, u32),
         settings: &Settings,
     ) -> Result<Self> {
@@ -100,7 +107,12 @@ impl CameraTracer {
             first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
-            view: CameraTile { branches, filter_steps: offsets.len() as u32 - 1, ..view(camera, size, settings)? },
+            view: CameraTile {
+                branches,
+                filter_steps: offsets.len() as u32 - 1,
+                media,
+                ..view(camera, size, settings)?
+            },
             window: settings.window(size),
         })
     }
@@ -201,13 +213,14 @@ impl CameraTracer {
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
         start.dispatch(&mut encoder, &start.bind(gpu, &named(1, started)), invocations.into());
+        let most = (u64::from(invocations) * u64::from(self.view.branches)).min(TILE_POINTS);
         // The surface that ends the chain comes after max_bounces delta surfaces.
         let mut surfaces = 0;
         loop {
             for _ in 0..BOUNCES_PER_SUBMISSION.min(self.view.max_bounces + 1 - surfaces) {
                 self.advance.dispatch(&mut encoder, &advance, 1);
                 let bindings = &bindings[(surfaces % 2) as usize];
-                trace.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, 0);
+                trace.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most);
                 surfaces += 1;
             }
             gpu.submit(encoder);
@@ -227,12 +240,19 @@ impl CameraTracer {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
         let buffers =
             [("tile", &uniform), ("points", &self.points), ("radiance", &self.radiance), ("counters", &self.counters)];
-        let mut encoder = gpu.encoder();
-        encoder.clear_buffer(&self.counters, 0, None);
-        self.direct.add(gpu, scene, &mut encoder, self.point_count(tile), &buffers);
-        gpu.submit(encoder);
-        let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
-        Ok(StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) })
+        let (steps, points) = (self.direct.steps(scene), self.point_count(tile));
+        let mut count = StepCount::default();
+        for first in (0..steps).step_by(DIRECT_STEPS_PER_READ as usize) {
+            let mut encoder = gpu.encoder();
+            encoder.clear_buffer(&self.counters, 0, None);
+            for step in first..steps.min(first + DIRECT_STEPS_PER_READ) {
+                self.direct.add(gpu, scene, &mut encoder, (step, points), &buffers);
+            }
+            gpu.submit(encoder);
+            let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
+            count += StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) };
+        }
+        Ok(count)
     }
 
     /// Sums over the tile's samples of each of its pixels.
@@ -273,6 +293,7 @@ impl std::ops::AddAssign for StepCount {
         self.rays += other.rays;
         self.media_overflows += other.media_overflows;
         self.unfinished += other.unfinished;
+        self.non_finite += other.non_finite;
     }
 }
 
@@ -282,6 +303,7 @@ impl From<Counters> for StepCount {
             rays: u64::from(counters.rays) | (u64::from(counters.rays_high) << 32),
             media_overflows: u64::from(counters.media_overflows),
             unfinished: u64::from(counters.unfinished),
+            non_finite: u64::from(counters.non_finite),
         }
     }
 }

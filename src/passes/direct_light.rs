@@ -3,7 +3,7 @@
 
 use super::SceneBuffers;
 use crate::{
-    gpu::{Buffer, Gpu, Kernel},
+    gpu::{Buffer, Commands, Gpu, Kernel},
     layout::{DirectLight, EmitterSample},
 };
 
@@ -22,28 +22,32 @@ impl DirectLighting {
         Self { punctual: scene.kernel(gpu, "light_directly"), emitters }
     }
 
-    /// Adds the light to the radiance of the points. `buffers` are `tile`, `points`, `radiance` and `counters`.
+    /// Dispatches that make up all of it.
+    pub fn steps(&self, scene: &SceneBuffers) -> u32 {
+        scene.lights.table.punctual as u32 + self.emitters.as_ref().map_or(0, |(_, samples)| *samples)
+    }
+
+    /// Adds the light of one step to the radiance of the points. `buffers` are `tile`, `points`, `radiance` and `counters`.
     pub fn add(
         &self,
         gpu: &Gpu,
         scene: &SceneBuffers,
-        encoder: &mut wgpu::CommandEncoder,
-        points: u32,
+        commands: &mut Commands,
+        (step, points): (u32, u32),
         buffers: &[(&str, &Buffer)],
     ) {
         let table = &scene.lights.table;
-        for light in 0..table.punctual as u32 {
-            let uniform = gpu.uniform("direct light", &DirectLight { light, points, ..Default::default() });
+        let punctual = table.punctual as u32;
+        let Some(sample) = step.checked_sub(punctual) else {
+            let uniform = gpu.uniform("direct light", &DirectLight { light: step, points, ..Default::default() });
             let bindings = self.punctual.bind(gpu, &[&scene.with(buffers)[..], &[("direct", &uniform)]].concat());
-            self.punctual.dispatch(encoder, &bindings, u64::from(points));
-        }
+            return self.punctual.dispatch(commands, &bindings, u64::from(points));
+        };
         let Some((kernel, samples)) = &self.emitters else { return };
         let (samples, light_count) = (*samples, table.lights.len() as u32);
-        for sample in 0..samples {
-            let uniform = gpu.uniform("emitter sample", &EmitterSample { points, sample, samples, light_count });
-            let own = [("sampling", &uniform), ("choices", &scene.lights.direct.buffer)];
-            let bindings = kernel.bind(gpu, &[&scene.with(buffers)[..], &own].concat());
-            kernel.dispatch(encoder, &bindings, u64::from(points));
-        }
+        let uniform = gpu.uniform("emitter sample", &EmitterSample { points, sample, samples, light_count });
+        let own = [("sampling", &uniform), ("choices", &scene.lights.direct.buffer)];
+        let bindings = kernel.bind(gpu, &[&scene.with(buffers)[..], &own].concat());
+        kernel.dispatch(commands, &bindings, u64::from(points));
     }
 }

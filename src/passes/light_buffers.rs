@@ -2,10 +2,12 @@
 
 use super::{
     environment_map::EnvironmentMap,
+    light_media::set_media,
     light_table::{Choices, LightTable},
     targets::{delta_targets, scene_target},
 };
 use crate::{
+    bvh::{Bvh, MediaProbe, too_deep},
     error::Result,
     gpu::{Buffer, Gpu},
     layout::Surroundings,
@@ -47,11 +49,13 @@ impl LightBuffers {
     ///
     /// # Errors
     /// As [`LightTable::new`], and [`crate::Error::Limit`] if the lights exceed a binding.
-    pub fn new(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &Settings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = delta_targets(scene);
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, gpu.max_binding()));
-        let table = LightTable::new(scene, map.as_ref(), &around, settings)?;
+        let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
+        let probe = MediaProbe::new(scene, bvh);
+        let buried = table.lights.iter_mut().map(|light| set_media(light, &probe)).filter(|fits| !fits).count();
         let upload = |label: &str, choices: &Choices| -> Result<ChoiceBuffer> {
             Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, turns: choices.turns })
         };
@@ -75,7 +79,7 @@ impl LightBuffers {
             direct: upload("direct light choices", &table.for_direct_light())?,
             delta_targets: targets.len() as u32,
             has_environment: map.is_some(),
-            warnings: reduced(scene, map.as_ref()).into_iter().collect(),
+            warnings: reduced(scene, map.as_ref()).into_iter().chain(too_deep("lights", buried)).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
             targets: gpu.storage_with("targets", &spheres)?,
             surroundings: gpu.uniform("surroundings", &surroundings),

@@ -8,6 +8,7 @@ pub mod environment_map;
 pub mod final_gather;
 pub mod gather;
 pub mod light_buffers;
+mod light_media;
 pub mod light_table;
 mod photon_batch;
 pub mod photon_map;

@@ -90,7 +90,7 @@ impl PhotonKernels {
             for _ in 0..BOUNCES_PER_SUBMISSION.min(batch.max_bounces - bounces) {
                 self.advance.dispatch(&mut encoder, &advance, 1);
                 let bindings = &bounce[(bounces % 2) as usize];
-                self.bounce.dispatch_indirect(&mut encoder, bindings, &buffers.dispatch_arguments, 0);
+                self.bounce.dispatch_indirect(&mut encoder, bindings, &buffers.dispatch_arguments, batch.paths.into());
                 bounces += 1;
             }
             gpu.submit(encoder);

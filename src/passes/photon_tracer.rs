@@ -38,6 +38,8 @@ pub struct TracedPhotons {
     pub media_overflows: u64,
     /// Rays given up after the loop budget.
     pub unfinished: u64,
+    /// Paths that ended as a number of theirs was not finite.
+    pub non_finite: u64,
     pub warnings: Vec<String>,
 }
 
@@ -87,6 +89,7 @@ impl PhotonTracer {
             rays: 0,
             media_overflows: 0,
             unfinished: 0,
+            non_finite: 0,
             warnings: Vec::new(),
         };
         let largest = u64::from(settings.global_photons.max(settings.caustic_photons));
@@ -142,6 +145,7 @@ impl PhotonTracer {
             traced.rays += u64::from(result.counters.rays) | (u64::from(result.counters.rays_high) << 32);
             traced.media_overflows += u64::from(result.counters.media_overflows);
             traced.unfinished += u64::from(result.counters.unfinished);
+            traced.non_finite += u64::from(result.counters.non_finite);
             lost_units += u64::from(result.counters.lost);
             if first_path.is_multiple_of(growth_window) {
                 let idle = plan.maps(traced).filter_map(|(name, map)| map.close_if_idle(name, growth_window));

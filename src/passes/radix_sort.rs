@@ -2,7 +2,7 @@
 
 use crate::{
     error::Result,
-    gpu::{Buffer, Gpu, Kernel},
+    gpu::{Buffer, Commands, Gpu, Kernel},
     layout::{RADIX_CHUNK, RADIX_DIGITS, SCAN_SPAN, SortStep},
 };
 
@@ -67,7 +67,7 @@ impl RadixSort {
     }
 
     /// Turns the values of the first of [`scan_levels`] into their exclusive prefix sums.
-    pub(super) fn prefix_sums(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, levels: &[Buffer]) {
+    pub(super) fn prefix_sums(&self, gpu: &Gpu, encoder: &mut Commands, levels: &[Buffer]) {
         let buffers = |l: usize| [("values", &levels[l]), ("sums", &levels[l + 1])];
         let spans = |l: usize| levels[l + 1].size() / 4;
         for l in 0..levels.len() - 1 {

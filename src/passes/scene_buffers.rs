@@ -47,7 +47,7 @@ impl SceneBuffers {
     /// [`crate::Error::Limit`] if an array exceeds two bindings, or the normals one; as [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &Settings) -> Result<Self> {
         let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.light_unit)).collect();
-        let lights = LightBuffers::new(gpu, scene, settings)?;
+        let lights = LightBuffers::new(gpu, scene, bvh, settings)?;
         Ok(Self {
             nodes: Windows::new::<BvhNode>(gpu, "bvh nodes", &bvh.nodes)?,
             primitives: Windows::new::<Primitive>(gpu, "primitives", &with_emitters(&bvh.primitives, &lights.table))?,

@@ -32,10 +32,11 @@ pub(crate) struct CameraPass<'a> {
 impl<'a> CameraPass<'a> {
     pub fn new(session: &'a Session<'a>, settings: &Settings) -> Result<Self> {
         settings.check()?;
-        let camera = session.scene.camera(settings.camera.as_deref())?;
+        let number = session.scene.camera_number(settings.camera.as_deref())?;
+        let (camera, media) = (&session.scene.cameras[number], session.camera_media[number]);
         let size = picture_size(camera, settings)?;
         let (gpu, buffers) = (session.gpu, &session.buffers);
-        let tracer = CameraTracer::new(gpu, buffers, camera, size, settings)?;
+        let tracer = CameraTracer::new(gpu, buffers, camera, media, size, settings)?;
         let rays = Some(settings.final_gather).filter(|rays| *rays > 0);
         Ok(Self {
             gpu,
@@ -58,9 +59,11 @@ impl<'a> CameraPass<'a> {
     pub fn trace(&self, tile: &Tile, stats: &mut Stats) -> Result<()> {
         let (gpu, buffers) = (self.gpu, self.buffers);
         let count = timed(&mut stats.seconds.camera, || self.tracer.trace(gpu, buffers, tile))?;
+        stats.non_finite.camera += count.non_finite;
         add_step(stats, count);
         if self.direct {
             let count = timed(&mut stats.seconds.direct, || self.tracer.light_directly(gpu, buffers, tile))?;
+            stats.non_finite.direct += count.non_finite;
             add_step(stats, count);
         }
         Ok(())
@@ -105,12 +108,14 @@ pub(crate) struct Film {
     whole: (u32, u32),
     window: Crop,
     sums: Vec<TilePixel>,
+    /// Samples that are not in the sums, as these would not be finite with them.
+    pub non_finite: u64,
 }
 
 impl Film {
     fn new(whole: (u32, u32), window: Crop) -> Self {
         let pixels = window.width as usize * window.height as usize;
-        Self { whole, window, sums: vec![TilePixel::default(); pixels] }
+        Self { whole, window, sums: vec![TilePixel::default(); pixels], non_finite: 0 }
     }
 
     fn add(&mut self, tracer: &CameraTracer, tile: &Tile, pixels: &[TilePixel]) {
@@ -118,7 +123,12 @@ impl Film {
             let Some((x, y)) = tracer.pixel(tile, i) else { continue };
             let sum = &mut self.sums[y as usize * self.window.width as usize + x as usize];
             let add = |a: &mut [f32; 3], b: [f32; 3]| *a = (Vec3::from(*a) + Vec3::from(b)).to_array();
-            add(&mut sum.radiance, pixel.radiance);
+            self.non_finite += u64::from(pixel.non_finite);
+            if (Vec3::from(sum.radiance) + Vec3::from(pixel.radiance)).is_finite() {
+                add(&mut sum.radiance, pixel.radiance);
+            } else {
+                self.non_finite += u64::from(tile.samples);
+            }
             add(&mut sum.normal, pixel.normal);
             add(&mut sum.albedo, pixel.albedo);
             sum.alpha += pixel.alpha;

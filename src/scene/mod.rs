@@ -150,11 +150,20 @@ impl Scene {
     /// # Errors
     /// [`Error::Setting`] that lists the cameras.
     pub fn camera(&self, wanted: Option<&str>) -> Result<&Camera> {
+        Ok(&self.cameras[self.camera_number(wanted)?])
+    }
+
+    /// Index in [`Scene::cameras`] of [`Scene::camera`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn camera_number(&self, wanted: Option<&str>) -> Result<usize> {
+        let numbered = |number: usize| (number < self.cameras.len()).then_some(number);
         let found = match wanted {
-            None => self.cameras.first(),
+            None => numbered(0),
             Some(wanted) => {
-                let named = self.cameras.iter().find(|camera| camera.name == wanted);
-                named.or_else(|| self.cameras.get(wanted.parse::<usize>().ok()?))
+                let named = self.cameras.iter().position(|camera| camera.name == wanted);
+                named.or_else(|| numbered(wanted.parse().ok()?))
             }
         };
         found.ok_or_else(|| {

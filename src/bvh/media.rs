@@ -1,0 +1,262 @@
+//! Which solids of glass a point lies in: the media that a path which starts there is inside of.
+//!
+//! From far away a straight path to the point enters and leaves solids as any path does, and what it has not left is
+//! around the point. Six such paths come along the axes; the most frequent answer holds, so that a hole in one solid does not
+//! decide. Along an axis, whether a triangle is crossed is a question of the plane: its outline winds about the point or not.
+//! Edges count by a half-open rule (Sunday 2021, "Practical Geometry Algorithms", winding number), the same for both
+//! triangles of an edge, so a path through edges or corners of a closed mesh enters it as often as it leaves it.
+
+use glam::{DVec2, DVec3};
+
+use super::{Bvh, BvhChild, FILLER};
+use crate::{
+    layout::{MEDIA_DEPTH, Primitive, SPHERE_BIT},
+    scene::{Bounds, Scene, Surface},
+};
+
+/// By how much of their coordinates boxes are widened: corners in them are rounded.
+const BOX_SLACK: f64 = 1e-6;
+
+/// A stack of media as the device takes it: materials, each plus one, outermost first; 0 for none.
+pub type Media = [u32; MEDIA_DEPTH];
+
+/// Finds the media around points of a scene.
+#[derive(Debug)]
+pub struct MediaProbe<'a> {
+    scene: &'a Scene,
+    bvh: &'a Bvh,
+    /// Whether a material is solid glass.
+    is_glass: Vec<bool>,
+    /// Box around all solid glass, metres.
+    bounds: Bounds,
+}
+
+/// A place where a line along an axis meets the surface of a solid.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    /// Metres along the axis from the point.
+    height: f64,
+    /// The outside lies further along the axis.
+    outside_ahead: bool,
+    material: u32,
+}
+
+impl<'a> MediaProbe<'a> {
+    /// For points of `scene`, whose tree is `bvh`.
+    #[must_use]
+    pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
+        let is_glass: Vec<bool> =
+            scene.materials.iter().map(|m| matches!(m.surface, Surface::Glass { .. })).collect();
+        let is_such = |material: u32| is_glass[material as usize];
+        let triangles = scene.triangles.iter().filter(|t| is_such(t.material)).map(Bounds::from);
+        let spheres = scene.spheres.iter().filter(|s| is_such(s.material)).map(Bounds::from);
+        let bounds = triangles.chain(spheres).fold(Bounds::EMPTY, Bounds::union);
+        Self { scene, bvh, is_glass, bounds }
+    }
+
+    /// Materials of the media around a point, metres, outermost first.
+    #[must_use]
+    pub fn at(&self, point: DVec3) -> Vec<u32> {
+        let (min, max) = (self.bounds.min.as_dvec3(), self.bounds.max.as_dvec3());
+        if !(point.cmpge(min).all() && point.cmple(max).all()) {
+            return Vec::new();
+        }
+        let found: Vec<Vec<u32>> = (0..3)
+            .flat_map(|axis| {
+                let mut crossings = self.crossings(point, axis);
+                crossings.sort_by(|a, b| b.height.abs().total_cmp(&a.height.abs()).then(a.material.cmp(&b.material)));
+                [stack_along(&crossings, true), stack_along(&crossings, false)]
+            })
+            .collect();
+        let votes = |stack: &Vec<u32>| found.iter().filter(|other| *other == stack).count();
+        // The last of several maxima is taken: the first in order of the axes.
+        found.iter().rev().max_by_key(|stack| votes(stack)).cloned().unwrap_or_default()
+    }
+
+    /// Where the line through `point` along an axis crosses solids of glass.
+    fn crossings(&self, point: DVec3, axis: usize) -> Vec<Crossing> {
+        let mut found = Vec::new();
+        let mut waiting = vec![0];
+        while let Some(node) = waiting.pop() {
+            for child in self.bvh.nodes[node as usize].children() {
+                if !is_on_line(&child, point, axis) {
+                    continue;
+                }
+                if child.count == 0 {
+                    waiting.push(child.first);
+                }
+                for primitive in child.first..child.first + child.count {
+                    self.cross(&self.bvh.primitives[primitive as usize], point, axis, &mut found);
+                }
+            }
+        }
+        found
+    }
+
+    fn cross(&self, primitive: &Primitive, point: DVec3, axis: usize, found: &mut Vec<Crossing>) {
+        let material = primitive.material & !SPHERE_BIT;
+        if primitive.id == FILLER || !self.is_glass[material as usize] {
+            return;
+        }
+        let id = primitive.id as usize;
+        if let Some(triangle) = self.scene.triangles.get(id) {
+            let corners = triangle.positions.map(|corner| split(corner.as_dvec3() - point, axis));
+            let crossed = cross_triangle(corners);
+            found.extend(crossed.map(|(height, outside_ahead)| Crossing { height, outside_ahead, material }));
+        } else {
+            let sphere = &self.scene.spheres[id - self.scene.triangles.len()];
+            let (aside, middle) = split(sphere.center.as_dvec3() - point, axis);
+            let half_squared = f64::from(sphere.radius).powi(2) - aside.length_squared();
+            if half_squared > 0.0 {
+                let half = half_squared.sqrt();
+                found.push(Crossing { height: middle - half, outside_ahead: false, material });
+                found.push(Crossing { height: middle + half, outside_ahead: true, material });
+            }
+        }
+    }
+}
+
+/// The stack as the device takes it, and whether all of it fits; if not, the outermost media are kept.
+#[must_use]
+pub fn packed(stack: &[u32]) -> (Media, bool) {
+    let mut media = Media::default();
+    media.iter_mut().zip(stack).for_each(|(slot, material)| *slot = material + 1);
+    (media, stack.len() <= MEDIA_DEPTH)
+}
+
+/// What to say where paths start in more media than they keep.
+#[must_use]
+pub fn too_deep(what: &str, count: usize) -> Option<String> {
+    (count > 0).then(|| {
+        format!("{count} {what} lie within more than {MEDIA_DEPTH} nested media: the outermost {MEDIA_DEPTH} count there")
+    })
+}
+
+/// The media that a path along the axis has not left when it comes to the point, from far ahead or from far behind.
+/// `crossings`: the farthest first.
+fn stack_along(crossings: &[Crossing], from_ahead: bool) -> Vec<u32> {
+    let mut stack = Vec::new();
+    for crossing in crossings.iter().filter(|c| if from_ahead { c.height > 0.0 } else { c.height < 0.0 }) {
+        if crossing.outside_ahead == from_ahead {
+            stack.push(crossing.material);
+        } else if let Some(innermost) = stack.iter().rposition(|medium| *medium == crossing.material) {
+            stack.remove(innermost);
+        }
+    }
+    stack
+}
+
+/// A vector's part across an axis, and that along it.
+fn split(v: DVec3, axis: usize) -> (DVec2, f64) {
+    (DVec2::new(v[(axis + 1) % 3], v[(axis + 2) % 3]), v[axis])
+}
+
+/// Whether the line along the axis may pass through the box.
+fn is_on_line(child: &BvhChild, point: DVec3, axis: usize) -> bool {
+    [(axis + 1) % 3, (axis + 2) % 3].into_iter().all(|k| {
+        let (min, max) = (f64::from(child.min[k]), f64::from(child.max[k]));
+        let slack = BOX_SLACK * min.abs().max(max.abs());
+        (min - slack..=max + slack).contains(&point[k])
+    })
+}
+
+/// Height at which the axis through the origin passes through a triangle, and whether its outside is ahead there.
+fn cross_triangle(corners: [(DVec2, f64); 3]) -> Option<(f64, bool)> {
+    let [a, b, c] = corners;
+    let winding = edge_winding(a.0, b.0) + edge_winding(b.0, c.0) + edge_winding(c.0, a.0);
+    if winding == 0 {
+        return None;
+    }
+    // Barycentric weights, up to a factor.
+    let weights = [b.0.perp_dot(c.0), c.0.perp_dot(a.0), a.0.perp_dot(b.0)];
+    let sum: f64 = weights.iter().sum();
+    let height = weights.iter().zip(corners).map(|(w, corner)| w * corner.1).sum::<f64>() / sum;
+    Some((if height.is_finite() { height } else { a.1 }, winding > 0))
+}
+
+/// What an edge adds to the winding of an outline about the origin; the opposite of what the reversed edge adds.
+fn edge_winding(from: DVec2, to: DVec2) -> i32 {
+    let side = from.perp_dot(to);
+    if from.y <= 0.0 && to.y > 0.0 && side > 0.0 {
+        return 1;
+    }
+    if from.y > 0.0 && to.y <= 0.0 && side < 0.0 { -1 } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, dvec3, vec3};
+
+    use super::*;
+    use crate::scene::{Material, Sphere, Triangle};
+
+    fn scene(surfaces: usize) -> Scene {
+        let surface = Surface::Glass { ior: 1.5, tint: Vec3::ONE };
+        let material = Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false };
+        Scene { materials: vec![material; surfaces], ..Scene::default() }
+    }
+
+    /// A cube about the origin whose corners, edges and diagonals lie on the axes' lines through round numbers.
+    fn add_cube(scene: &mut Scene, half: f32, material: u32, faces: usize) {
+        let corner = |u: f32, v: f32, axis: usize, side: f32| {
+            let mut p = Vec3::ZERO;
+            (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side * half, u * half, v * half);
+            p
+        };
+        for face in 0..faces {
+            let (axis, side) = (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 });
+            let at = |u, v| corner(u, v * side, axis, side);
+            for positions in [[at(-1., -1.), at(1., -1.), at(1., 1.)], [at(-1., -1.), at(1., 1.), at(-1., 1.)]] {
+                scene.triangles.push(Triangle { positions, normals: [Vec3::X; 3], material });
+            }
+        }
+    }
+
+    fn media(scene: &Scene, point: DVec3) -> Vec<u32> {
+        MediaProbe::new(scene, &Bvh::build(scene)).at(point)
+    }
+
+    #[test]
+    fn nested_solids_are_found_from_the_outside_in() {
+        let mut scene = scene(3);
+        scene.spheres.push(Sphere { center: Vec3::ZERO, radius: 1.0, material: 2 });
+        add_cube(&mut scene, 2.0, 1, 6);
+        add_cube(&mut scene, 4.0, 0, 6);
+        // On edges and diagonals of the faces as seen along all axes, and off them.
+        for (point, around) in [
+            (dvec3(0.0, 0.0, 0.0), vec![0, 1, 2]),
+            (dvec3(1.5, 1.5, 1.5), vec![0, 1]),
+            (dvec3(1.25, -1.25, 0.5), vec![0, 1]),
+            (dvec3(3.0, 3.0, 2.0), vec![0]),
+            (dvec3(2.0 - 1e-9, 0.0, 0.1), vec![0, 1]),
+            (dvec3(2.0 + 1e-9, 0.0, 0.1), vec![0]),
+            (dvec3(5.0, 0.0, 0.0), vec![]),
+        ] {
+            assert_eq!(media(&scene, point), around, "at {point}");
+        }
+        assert_eq!(packed(&[0, 2]), ([1, 3, 0, 0], true));
+        assert_eq!(packed(&[4, 3, 2, 1, 0]), ([5, 4, 3, 2], false));
+    }
+
+    #[test]
+    fn a_missing_face_does_not_decide() {
+        let mut open = scene(1);
+        add_cube(&mut open, 2.0, 0, 5);
+        assert_eq!(media(&open, dvec3(0.3, 0.2, 0.1)), [0]);
+        let mut sheet = scene(1);
+        add_cube(&mut sheet, 2.0, 0, 1);
+        assert!(media(&sheet, dvec3(2.0, 0.2, 0.1)).is_empty(), "control: a single sheet is no solid");
+    }
+
+    #[test]
+    fn a_cavity_with_inward_faces_is_outside() {
+        let mut shell = scene(1);
+        add_cube(&mut shell, 2.0, 0, 6);
+        let outer = shell.triangles.len();
+        add_cube(&mut shell, 1.0, 0, 6);
+        shell.triangles[outer..].iter_mut().for_each(|t| t.positions.swap(1, 2));
+        assert!(media(&shell, dvec3(0.5, 0.5, 0.5)).is_empty());
+        assert_eq!(media(&shell, dvec3(1.5, 0.5, 0.5)), [0]);
+        assert!(media(&shell, vec3(1.5, 9.0, 0.5).as_dvec3()).is_empty());
+    }
+}

@@ -1,0 +1,152 @@
+//! How much work is handed to the device at once. Operating systems end work that keeps a GPU for too long, after about
+//! two seconds, and take the device away from the process; software has no such watchdog.
+//!
+//! Each kernel's cost per invocation is measured on the device. A dispatch that would take longer than [`MOST_PER_DISPATCH`]
+//! is cut into parts, and a submission is closed before it takes longer than [`MOST_PER_SUBMISSION`]. Nothing that reaches
+//! the picture depends on the cuts: an invocation knows its number, never its part.
+
+use std::{
+    collections::HashMap,
+    sync::{Mutex, PoisonError},
+    time::Duration,
+};
+
+/// How dispatches are cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pacing {
+    /// Not at all: for software.
+    Whole,
+    /// By measured time; by [`UNMEASURED`] where the device has no clock.
+    Measured,
+    /// Into parts of that many invocations, for tests.
+    Parts(u32),
+}
+
+/// The longest that a dispatch should take: a quarter of the 100 ms that it may, for the next can be four times as costly.
+pub const MOST_PER_DISPATCH: Duration = Duration::from_millis(25);
+/// The longest that a submission should take.
+const MOST_PER_SUBMISSION: Duration = Duration::from_millis(100);
+/// Invocations of a part at least: fewer would not fill a GPU, nor end much sooner.
+pub(super) const LEAST_PART: u64 = 4096;
+/// Invocations of a part of a kernel that was never measured.
+pub(super) const UNMEASURED: u64 = 1 << 14;
+/// What is left of a cost that later measures fall below. Slow, for a queue of paths that dries up measures less and less.
+const DECAY: f64 = 0.98;
+
+/// What to dispatch next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Part {
+    pub invocations: u64,
+    /// Seconds that it is likely to take; `None`: nobody knows.
+    pub seconds: Option<f64>,
+}
+
+/// Costs of the kernels of a device.
+#[derive(Debug)]
+pub(super) struct Pace {
+    pub pacing: Pacing,
+    /// Seconds per invocation, by stem.
+    costs: Mutex<HashMap<&'static str, f64>>,
+}
+
+impl Pace {
+    pub fn new(pacing: Pacing) -> Self {
+        Self { pacing, costs: Mutex::default() }
+    }
+
+    /// The next part of a dispatch of which `left` invocations are left. Parts but the last are multiples of a workgroup.
+    pub fn part(&self, stem: &str, left: u64) -> Part {
+        let most = match self.pacing {
+            Pacing::Whole => return Part { invocations: left, seconds: Some(0.0) },
+            Pacing::Parts(n) => {
+                return Part { invocations: left.min(workgroups_of(n.into())), seconds: Some(f64::INFINITY) };
+            }
+            Pacing::Measured => self.cost(stem).map(|cost| (MOST_PER_DISPATCH.as_secs_f64() / cost) as u64),
+        };
+        let part = most.unwrap_or(UNMEASURED).max(LEAST_PART);
+        // Equal parts, so that none is a short rest.
+        let parts = left.div_ceil(part).max(1);
+        let invocations = left.min(workgroups_of(left.div_ceil(parts)));
+        Part { invocations, seconds: self.cost(stem).map(|cost| cost * invocations as f64) }
+    }
+
+    /// Whether a submission of that length has room for the part.
+    pub fn fits(&self, seconds: f64, part: &Part) -> bool {
+        seconds == 0.0 || seconds + part.seconds.unwrap_or(f64::INFINITY) <= MOST_PER_SUBMISSION.as_secs_f64()
+    }
+
+    /// Takes note of what a part took. Too few invocations tell of latency, not of cost.
+    pub fn measured(&self, stem: &'static str, invocations: u64, seconds: f64) {
+        if invocations < LEAST_PART / 2 {
+            return;
+        }
+        let cost = (seconds / invocations as f64).max(1e-15);
+        let mut costs = self.costs.lock().unwrap_or_else(PoisonError::into_inner);
+        costs.entry(stem).and_modify(|old| *old = cost.max(DECAY * *old)).or_insert(cost);
+    }
+
+    /// Seconds per invocation, if it was measured.
+    pub fn cost(&self, stem: &str) -> Option<f64> {
+        self.costs.lock().unwrap_or_else(PoisonError::into_inner).get(stem).copied()
+    }
+}
+
+fn workgroups_of(invocations: u64) -> u64 {
+    invocations.max(1).next_multiple_of(crate::layout::WORKGROUP_SIZE.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sizes of the parts of a dispatch, each of which takes that many seconds an invocation.
+    fn parts(pace: &Pace, mut left: u64, cost: f64) -> Vec<u64> {
+        let mut sizes = Vec::new();
+        while left > 0 {
+            let part = pace.part("kernel", left);
+            left -= part.invocations;
+            pace.measured("kernel", part.invocations, cost * part.invocations as f64);
+            sizes.push(part.invocations);
+        }
+        sizes
+    }
+
+    #[test]
+    fn parts_last_as_long_as_they_may() {
+        let pace = Pace::new(Pacing::Measured);
+        // The first part measures.
+        assert_eq!(parts(&pace, 1 << 19, 1e-7), [16_384, 169_344, 169_280, 169_280]);
+        assert_eq!(parts(&pace, 1 << 17, 1e-7), [131_072]);
+        // A kernel that turns costly is cut at its next dispatch; the floor bounds how far.
+        assert_eq!(parts(&pace, 1 << 17, 1e-6), [131_072]);
+        assert!(parts(&pace, 1 << 17, 1e-6).iter().all(|&n| (16_384..=25_024).contains(&n)));
+        assert!(parts(&pace, 1 << 17, 1.0)[1..].iter().all(|n| (4032..=4096).contains(n)));
+        // Seconds that fall are believed little by little.
+        assert_eq!(parts(&pace, 1 << 12, 1e-9), [4096]);
+        assert_eq!(pace.part("kernel", 1 << 17).invocations, LEAST_PART);
+        for _ in 0..2000 {
+            pace.measured("kernel", LEAST_PART, 0.0);
+        }
+        assert_eq!(pace.part("kernel", 1 << 17).invocations, 1 << 17);
+        // What is too small to fill a device says nothing.
+        pace.measured("kernel", 64, 1.0);
+        assert_eq!(pace.part("kernel", 1 << 17).invocations, 1 << 17);
+    }
+
+    #[test]
+    fn submissions_end_before_they_are_too_long() {
+        let pace = Pace::new(Pacing::Measured);
+        let part = |seconds| Part { invocations: 64, seconds };
+        assert!(pace.fits(0.0, &part(None)) && pace.fits(0.0, &part(Some(9.0))), "an empty one takes anything");
+        assert!(pace.fits(0.05, &part(Some(0.025))) && !pace.fits(0.09, &part(Some(0.025))));
+        assert!(!pace.fits(0.001, &part(None)), "who knows");
+    }
+
+    #[test]
+    fn software_gets_all_at_once_and_tests_what_they_ask_for() {
+        let whole = Pace::new(Pacing::Whole);
+        assert_eq!(parts(&whole, 1 << 30, 1.0), [1 << 30]);
+        assert_eq!(whole.part("kernel", 1).seconds, Some(0.0), "no submission is ever full");
+        assert_eq!(parts(&Pace::new(Pacing::Parts(100)), 300, 1.0), [128, 128, 44]);
+    }
+}

@@ -1,0 +1,151 @@
+//! The device's own clock: what each part of a dispatch took, known once the device has done it.
+
+use std::{
+    mem,
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use super::{Gpu, pace::Pace};
+
+/// Parts that one submission can time.
+const ROOM: usize = 128;
+/// Bytes of a time.
+const TIME: u64 = size_of::<u64>() as u64;
+
+/// A part whose time is taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Timed {
+    pub stem: &'static str,
+    pub invocations: u64,
+}
+
+/// The timed parts of a submission, in order.
+#[derive(Debug, Default)]
+pub(super) struct Timings(Vec<Timed>);
+
+impl Timings {
+    pub fn is_full(&self) -> bool {
+        self.0.len() >= ROOM
+    }
+}
+
+/// Times when parts of submissions began and ended.
+#[derive(Debug)]
+pub(super) struct Timer {
+    set: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    /// Seconds of a tick.
+    tick: f64,
+    /// Submissions that have not been looked at.
+    pending: Mutex<Vec<Pending>>,
+}
+
+#[derive(Debug)]
+struct Pending {
+    times: wgpu::Buffer,
+    is_there: Arc<AtomicBool>,
+    timings: Timings,
+}
+
+impl Timer {
+    /// `None` where the device has no clock.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Option<Self> {
+        device.features().contains(wgpu::Features::TIMESTAMP_QUERY).then(|| Self {
+            set: device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("times"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2 * ROOM as u32,
+            }),
+            resolved: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("times"),
+                size: 2 * ROOM as u64 * TIME,
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            }),
+            tick: f64::from(queue.get_timestamp_period()) * 1e-9,
+            pending: Mutex::default(),
+        })
+    }
+
+    /// Where a pass notes when it begins and ends.
+    pub fn time<'t>(&'t self, timings: &mut Timings, part: Timed) -> wgpu::ComputePassTimestampWrites<'t> {
+        let place = 2 * timings.0.len() as u32;
+        timings.0.push(part);
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.set,
+            beginning_of_pass_write_index: Some(place),
+            end_of_pass_write_index: Some(place + 1),
+        }
+    }
+
+    /// Hands the commands over, and the times of their parts back to the host.
+    pub fn submit(&self, gpu: &Gpu, mut encoder: wgpu::CommandEncoder, timings: Timings) {
+        let bytes = 2 * timings.0.len() as u64 * TIME;
+        if bytes == 0 {
+            gpu.queue.submit([encoder.finish()]);
+            return;
+        }
+        let times = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("times read back"),
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        encoder.resolve_query_set(&self.set, 0..2 * timings.0.len() as u32, &self.resolved, 0);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &times, 0, bytes);
+        gpu.queue.submit([encoder.finish()]);
+        let is_there = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&is_there);
+        times.slice(..).map_async(wgpu::MapMode::Read, move |result| told.store(result.is_ok(), Ordering::Release));
+        self.pending().push(Pending { times, is_there, timings });
+    }
+
+    /// Tells the pace what is known by now; call it when the device has done all that was submitted.
+    pub fn collect(&self, pace: &Pace) {
+        for Pending { times, is_there, timings } in mem::take(&mut *self.pending()) {
+            // Those of a device that was lost never come.
+            let Some(mapped) =
+                is_there.load(Ordering::Acquire).then(|| times.slice(..).get_mapped_range().ok()).flatten()
+            else {
+                continue;
+            };
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped);
+            for (Timed { stem, invocations }, span) in timings.0.into_iter().zip(ticks.chunks_exact(2)) {
+                pace.measured(stem, invocations, span[1].saturating_sub(span[0]) as f64 * self.tick);
+            }
+        }
+    }
+
+    fn pending(&self) -> std::sync::MutexGuard<'_, Vec<Pending>> {
+        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::gpu::{Gpu, Kernel, Pacing, pace::LEAST_PART};
+
+    #[test]
+    fn the_clock_of_the_device_is_read() {
+        let gpu = Gpu::open_paced(None, Some(Pacing::Measured)).expect("tests need an adapter");
+        assert!(gpu.timer.is_some(), "{} has no clock", gpu.name);
+        let kernel = Kernel::new(&gpu, "sum_spans", &[]);
+        let span = u64::from(crate::layout::SCAN_SPAN);
+        let values = gpu.storage::<u32>("values", LEAST_PART * span).expect("fits");
+        let sums = gpu.storage::<u32>("sums", LEAST_PART).expect("fits");
+        let bindings = kernel.bind(&gpu, &[("values", &values), ("sums", &sums)]);
+        let cost = |invocations| {
+            let mut commands = gpu.encoder();
+            kernel.dispatch(&mut commands, &bindings, invocations);
+            gpu.submit(commands);
+            gpu.wait().expect("it runs");
+            gpu.pace.cost("sum_spans")
+        };
+        assert_eq!(cost(LEAST_PART / 2 - 64), None, "control: too few to tell");
+        let seconds = cost(LEAST_PART).expect("it was timed") * LEAST_PART as f64;
+        assert!((1e-7..600.0).contains(&seconds), "{seconds} s");
+    }
+}
