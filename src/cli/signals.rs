@@ -9,6 +9,8 @@ use std::{
     time::Duration,
 };
 
+#[cfg(unix)]
+use signal_hook::consts::SIGXFSZ;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 /// How long the work may take to stop by itself. With the polling below the process is gone in under two seconds.
@@ -24,6 +26,9 @@ pub fn watch() {
         // Fails only for signals that no process may catch.
         let _ = signal_hook::flag::register_usize(signal, Arc::clone(&SIGNAL), signal as usize);
     }
+    // Where a file may not grow as large as it would, the write is to fail, and not the process to die in the middle of it.
+    #[cfg(unix)]
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
     thread::spawn(|| {
         while !stop_requested() {
             thread::sleep(POLLING);
