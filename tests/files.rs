@@ -117,7 +117,7 @@ fn nothing_that_is_read_or_written_is_written_over() {
     }
     // A folder of results with the scene in it, under a name of theirs.
     fs::copy(path("scene.gltf"), path("study.json")).expect("can be copied");
-    assert!(refusal(folder.path(), "study study.json -o . --photons 1k -k 1").contains("study.json: is the scene"));
+    assert!(refusal(folder.path(), "study study.json -q -o . --photons 1k -k 1").contains("study.json: is the scene"));
     fs::remove_file(path("study.json")).expect("can be removed");
     fs::write(path("corners.json"), [0; 3]).expect("can be written");
     fs::remove_file(path("link.png")).expect("can be removed");
@@ -251,6 +251,7 @@ fn signals_end_every_stage_and_leave_no_file() {
         (hours, "grid", "TERM", 143),
         (hours, "camera", "INT", 130),
         (hours, "camera", "TERM", 143),
+        (hours, "camera", "HUP", 129),
         (&write, "camera: 100", "TERM", 143),
         (study, "study:", "INT", 130),
         (compare, "compare", "TERM", 143),
