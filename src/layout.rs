@@ -205,7 +205,8 @@ pub struct VisiblePoint {
     pub media_inner: u32,
 }
 
-/// What happens to a batch of paths; see `shaders/lib/queue.wesl`.
+/// What happens to a batch of paths; see `shaders/lib/queue.wesl`. A batch has at most 2^19 paths of at most 4095 bounces, so that
+/// what is counted once a bounce stays below 2^31; the host adds batches up in 64 bits.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Counters {
@@ -215,7 +216,7 @@ pub struct Counters {
     pub next: u32,
     /// Photons staged, also those that did not fit.
     pub staged: u32,
-    /// Flux that the bounce limit took, in units of `1 / PhotonBatch::lost_scale` W.
+    /// Flux that the bounce limit took, in units of `1 / PhotonBatch::lost_scale` W: low word.
     pub lost: u32,
     /// Rays traced, low and high word.
     pub rays: u32,
@@ -226,6 +227,22 @@ pub struct Counters {
     pub unfinished: u32,
     /// Infinite or undefined numbers that were left out, each with the path or sample that it belonged to.
     pub non_finite: u32,
+    /// High word of `lost`.
+    pub lost_high: u32,
+}
+
+impl Counters {
+    /// Rays traced.
+    #[must_use]
+    pub fn all_rays(&self) -> u64 {
+        u64::from(self.rays) | (u64::from(self.rays_high) << 32)
+    }
+
+    /// Flux that the bounce limit took, in its unit.
+    #[must_use]
+    pub fn all_lost(&self) -> u64 {
+        u64::from(self.lost) | (u64::from(self.lost_high) << 32)
+    }
 }
 
 /// Settings of one batch of photon paths; see `shaders/lib/photon_batch.wesl`.
@@ -255,6 +272,15 @@ pub struct PhotonBatch {
     pub target_count: u32,
     pub pad0: u32,
     pub pad1: u32,
+}
+
+impl PhotonBatch {
+    /// The same batch with its first path at that place among all paths of its kind, which are dealt to `turns` in turn.
+    #[must_use]
+    pub fn starting_at(self, path: u64) -> Self {
+        let (round, turn) = (path / u64::from(self.turns), path % u64::from(self.turns));
+        Self { first_round: round as u32, first_round_high: (round >> 32) as u32, first_turn: turn as u32, ..self }
+    }
 }
 
 /// Streams of random numbers: of general photon paths, and of those aimed at mirrors and glass.
