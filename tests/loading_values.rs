@@ -24,6 +24,9 @@ fn materials_are_read_as_the_nearest_surface() {
         surface
     };
     assert_eq!(quiet(lambert([0.5, 0.25, 0.125])), Surface::Diffuse { albedo: Vec3::new(0.5, 0.25, 0.125) });
+    let (surface, notes) = read_as(lambert([1.5, 1.0, -0.25]));
+    assert_eq!(surface, Surface::Diffuse { albedo: Vec3::new(1.0, 1.0, 0.0) });
+    assert_eq!(notes, [r#"material "paint": base colour 1.5 1 -0.25 is clamped to 0..1"#]);
     let gold = json!({ "metallicFactor": 1, "roughnessFactor": 0, "baseColorFactor": [1, 0.8, 0.3, 1] });
     assert_eq!(quiet(json!({ "pbrMetallicRoughness": gold })), Surface::Mirror { tint: Vec3::new(1.0, 0.8, 0.3) });
     let clear = json!({ "metallicFactor": 0, "roughnessFactor": 0 });
