@@ -35,6 +35,12 @@ fn materials_are_read_as_the_nearest_surface() {
     glass["extensions"]["KHR_materials_volume"]["thicknessFactor"] = 0.into();
     assert_eq!(quiet(glass.clone()), Surface::Pane { ior: 1.33, tint: Vec3::ONE });
 
+    let mut all_reflecting = glass.clone();
+    all_reflecting["extensions"]["KHR_materials_ior"]["ior"] = 0.into();
+    let (surface, notes) = read_as(all_reflecting);
+    assert_eq!((surface, notes.len()), (Surface::Mirror { tint: Vec3::ONE }, 1), "{notes:?}");
+    assert!(notes[0].contains("ior 0"), "{notes:?}");
+
     glass["pbrMetallicRoughness"]["roughnessFactor"] = 0.25.into();
     let (surface, notes) = read_as(glass.clone());
     assert_eq!(surface, Surface::Pane { ior: 1.33, tint: Vec3::ONE });
@@ -67,7 +73,7 @@ fn lights_keep_their_candela_whatever_the_scale() {
     assert_eq!(light.position, Vec3::new(-0.5, -0.5, 2.0));
     assert_eq!(light.intensity_in(LightUnit::Radiometric), light.intensity);
     assert!((light.intensity_in(LightUnit::Photometric) - Vec3::new(1.0, 0.5, 0.0)).length() < 1e-6);
-    assert!((light.power(1.0).x / (4.0 * std::f32::consts::PI * 683.0) - 1.0).abs() < 1e-6);
+    assert!((light.power(1.0).x / (4.0 * std::f64::consts::PI * 683.0) - 1.0).abs() < 1e-6);
 }
 
 #[test]

@@ -10,15 +10,16 @@ use super::strict_json::{elements, member, objects, parse, read_element};
 /// Materials that a file may have.
 const MAX_MATERIALS: usize = 1 << 16;
 
-/// Parses the JSON text; refuses versions and required extensions that are not read, by name. What is never used (images,
-/// textures, samplers, animations) is left out.
+/// Parses the JSON text; refuses versions and required extensions that are not read, by name. What is never used
+/// (textures, samplers, animations, and of images all but their files' names) is left out.
 pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<json::Root> {
     let Value::Object(mut file) = parse(text)? else { return fault("JSON", "is not an object") };
     let asset = read_asset(&mut file)?;
     let used = member::<Vec<String>>(&mut file, "extensionsUsed")?.unwrap_or_default();
     let required = member::<Vec<String>>(&mut file, "extensionsRequired")?.unwrap_or_default();
     extensions::check(&used, &required, ignored, notes)?;
-    for unused in ["images", "textures", "samplers"] {
+    let images = objects(&mut file, "images")?;
+    for unused in ["textures", "samplers"] {
         objects(&mut file, unused)?;
     }
     if !objects(&mut file, "animations")?.is_empty() {
@@ -36,11 +37,24 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
         accessors: elements(&mut file, "accessors")?,
         buffer_views: elements(&mut file, "bufferViews")?,
         buffers: elements(&mut file, "buffers")?,
+        images: images.iter().map(named_image).collect(),
         extensions: member(&mut file, "extensions")?,
         extensions_used: used,
         extensions_required: required,
         ..json::Root::default()
     })
+}
+
+/// An image of which nothing is known but its file.
+fn named_image(image: &Value) -> json::Image {
+    json::Image {
+        buffer_view: None,
+        mime_type: None,
+        name: None,
+        uri: image.get("uri").and_then(Value::as_str).map(str::to_owned),
+        extensions: None,
+        extras: None,
+    }
 }
 
 /// The head of a file, looked at before the rest: other versions may be shaped differently.
