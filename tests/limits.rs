@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | windows | a device with tiny bindings gives the same picture: all that exceeds one is split | a larger binding is not split |
 //! | refusal | what two bindings cannot hold is refused by the limit's name | it renders where they can |
+//! | photons | maps that no buffers hold are refused before anything is done for them | maps that buffers hold |
 //! | budget | a ray that outruns its loop budget is counted, not lost in silence | the full budget counts none |
 //! | memory | the peak is at most 96 bytes a photon of capacity and 32 MiB | a tenth of that does not hold it |
 //! | tiles | device memory does not grow with samples or size | it grows with photons |
@@ -64,6 +65,26 @@ fn what_exceeds_a_binding_is_split() {
     let refused = picture(&device_with_bindings(primitives * 45 / 100)).expect_err("control: three windows");
     let Error::Limit { what, limit, .. } = &refused else { panic!("{refused}") };
     assert_eq!((what.as_str(), *limit), ("primitives", "maxStorageBufferRange"), "{refused}");
+}
+
+#[test]
+fn maps_that_no_buffers_hold_are_refused_at_once() {
+    let scene = room(4);
+    // 1024 places of photons in a window, two windows.
+    let gpu = device_with_bindings(16 << 10);
+    let refused = |global_photons, caustic_photons| {
+        let settings = Settings { global_photons, caustic_photons, ..settings(Mode::Hybrid, 1, 8) };
+        let before = gpu.dispatches();
+        let error = render(&gpu, &scene, &settings, &Silent).map(|_| ()).expect_err("bindings are tiny");
+        assert_eq!(gpu.dispatches(), before, "work was done for nothing");
+        let Error::Limit { what, needed, allowed, .. } = error else { panic!("{error}") };
+        (what, needed, allowed)
+    };
+    for (global, caustic, needed) in [(100_000_000, 1, 100_000_000), (1, 2049, 2049), (u32::MAX, 1, u32::MAX.into())] {
+        assert_eq!(refused(global, caustic), ("a photon map".to_string(), needed, 2048));
+    }
+    let (what, ..) = refused(2048, 2048);
+    assert_ne!(what, "a photon map", "control: these maps fit, only what comes after does not");
 }
 
 /// Rays of a picture of the room that were given up with that loop budget.

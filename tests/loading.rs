@@ -1,10 +1,12 @@
 //! What is refused, and with which words.
 
+#[path = "gltf/files.rs"]
+mod files;
 mod gltf;
 
 use caustica::scene::{Environment, Scene};
 use glam::Vec3;
-use gltf::{add_accessor, data_uri, floats, load, load_bytes, loaded, message, triangle};
+use gltf::{add_accessor, add_zeros, data_uri, floats, load, load_bytes, loaded, message, triangle};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -261,20 +263,56 @@ fn scenes_without_light_or_shape_say_what_they_hold() {
 }
 
 #[test]
-fn the_hash_covers_the_files_beside_the_scene() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
+fn json_that_is_wrong_is_named_with_its_place() {
+    let check = |change: fn(&mut Value), expected: &str| assert_eq!(refusal(change), expected);
+    check(|g| g["nodes"] = json!({}), "nodes: is not a list");
+    check(|g| g["nodes"][1] = json!(3), "nodes[1]: is not an object");
+    check(|g| g["samplers"] = json!([[]]), "samplers[0]: is not an object");
+    check(|g| g["nodes"][0]["mesh"] = json!(-1), "nodes[0]: invalid value: integer `-1`, expected u32");
+    check(|g| g["nodes"][0]["mesh"] = json!(0.5), "nodes[0]: invalid type: floating point `0.5`, expected u32");
+    check(|g| g["accessors"][1] = json!({ "type": "SCALAR" }), "accessors[1]: missing field `count`");
+    check(|g| g["scene"] = json!("first"), "scene: invalid type: string \"first\", expected u32");
+    check(|g| g["asset"] = json!({}), "asset: missing field `version`");
+    check(|g| drop(g.as_object_mut().map(|g| g.remove("asset"))), "asset: is missing");
+    check(|g| g["materials"] = json!(vec![json!({}); 65_537]), "materials: 65537 of them, at most 65536 are read");
+    let text = triangle().to_string();
+    let twice = text.replacen("\"mesh\":0", "\"mesh\":0,\"mesh\":1", 1);
+    let said = message(load_bytes(twice.as_bytes()));
+    assert!(said.starts_with("JSON: the name \"mesh\" is there twice in one object at line 1"), "{said}");
+    let deep = text.replacen("\"mesh\":0", &format!("\"mesh\":0,\"extras\":{}", "[".repeat(500_000)), 1);
+    assert!(message(load_bytes(deep.as_bytes())).starts_with("JSON: recursion limit exceeded"));
+    let broken = [text.as_bytes(), b"\xff"].concat();
+    assert_eq!(message(load_bytes(&broken)), format!("JSON: byte {} is not UTF-8", text.len()));
+}
+
+#[test]
+fn absurd_counts_cost_nothing() {
+    let zeros = refusal(|g| {
+        let positions = add_zeros(g, 5126, 1 << 40, "VEC3");
+        g["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = positions.into();
+    });
+    assert_eq!(zeros, "accessors[2]: 1099511627776 elements without a bufferView, at most 16777216 are read");
+    let instances = refusal(|g| {
+        let at = add_zeros(g, 5126, 1 << 24, "VEC3");
+        let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "TRANSLATION": at } } });
+        g["nodes"] = json!(vec![json!({ "mesh": 0, "extensions": instancing }); 7]);
+        g["scenes"][0]["nodes"] = json!([0, 1, 2, 3, 4, 5, 6]);
+    });
+    assert_eq!(instances, "scene: 117440512 triangles, at most 100000000 are read");
+    // As many corners as there can be without bytes, all at one place: nothing is held for them.
     let mut gltf = triangle();
-    gltf["buffers"][0]["uri"] = "my%20data.bin".into();
-    let path = folder.path().join("test.gltf");
-    std::fs::write(&path, gltf.to_string()).expect("a temporary file");
-    let hash = |last: u8| {
-        let mut bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
-        bytes.extend([0, 0, 1, 0, 2, 0, 0, last]);
-        std::fs::write(folder.path().join("my data.bin"), bytes).expect("a temporary file");
-        Scene::load(&path).unwrap_or_else(|error| panic!("{error}")).hash
-    };
-    assert_eq!(hash(0), hash(0));
-    assert_ne!(hash(0), hash(1));
+    let positions = add_zeros(&mut gltf, 5126, 1 << 24, "VEC3");
+    gltf["meshes"][0]["primitives"] = json!([{ "attributes": { "POSITION": positions } }]);
+    let scene = loaded(&gltf);
+    assert!(scene.triangles.is_empty());
+    assert_eq!(scene.warnings[0], "5592405 of 5592405 triangles have no area and are not drawn");
+    let length = refusal(|g| g["buffers"][0]["byteLength"] = (1_u64 << 60).into());
+    assert_eq!(length, "buffers[0]: byteLength is 1152921504606846976, but there are 44 bytes");
+    let joints = refusal(|g| {
+        let zeros = add_zeros(g, 5121, 3, "VEC4");
+        g["meshes"][0]["primitives"][0]["attributes"]["JOINTS_8"] = zeros.into();
+    });
+    assert_eq!(joints, "meshes[0].primitives[0].attributes.JOINTS_8: is one of more than 8 sets of joints");
 }
 
 proptest! {

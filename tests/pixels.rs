@@ -45,7 +45,8 @@ fn parallel_camera(ymag: f32) -> Camera {
 /// Pixel and position of what the samples of a picture of `size` see.
 fn visible(scene: &Scene, camera: &Camera, size: u32, settings: &Settings) -> Vec<((u32, u32), Vec3)> {
     let buffers = SceneBuffers::new(gpu(), scene, &Bvh::build(scene), settings).expect("the scene fits");
-    let tracer = CameraTracer::new(gpu(), &buffers, camera, [0; 4], (size, size), settings).expect("the camera is right");
+    let tracer =
+        CameraTracer::new(gpu(), &buffers, camera, [0; 4], (size, size), settings).expect("the camera is right");
     let mut found = Vec::new();
     for tile in tracer.tiles() {
         tracer.trace(gpu(), &buffers, &tile).expect("the tile is traced");

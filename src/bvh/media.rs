@@ -45,8 +45,7 @@ impl<'a> MediaProbe<'a> {
     /// For points of `scene`, whose tree is `bvh`.
     #[must_use]
     pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
-        let is_glass: Vec<bool> =
-            scene.materials.iter().map(|m| matches!(m.surface, Surface::Glass { .. })).collect();
+        let is_glass: Vec<bool> = scene.materials.iter().map(|m| matches!(m.surface, Surface::Glass { .. })).collect();
         let is_such = |material: u32| is_glass[material as usize];
         let triangles = scene.triangles.iter().filter(|t| is_such(t.material)).map(Bounds::from);
         let spheres = scene.spheres.iter().filter(|s| is_such(s.material)).map(Bounds::from);
@@ -128,7 +127,9 @@ pub fn packed(stack: &[u32]) -> (Media, bool) {
 #[must_use]
 pub fn too_deep(what: &str, count: usize) -> Option<String> {
     (count > 0).then(|| {
-        format!("{count} {what} lie within more than {MEDIA_DEPTH} nested media: the outermost {MEDIA_DEPTH} count there")
+        format!(
+            "{count} {what} lie within more than {MEDIA_DEPTH} nested media: the outermost {MEDIA_DEPTH} count there"
+        )
     })
 }
 

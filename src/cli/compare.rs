@@ -30,7 +30,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let mut scene = Scene::load_with(&args.scene, &options.shared.loading.options())?;
     options.shared.environment.light([&mut scene])?;
     display.check()?;
-    prepare(args)?;
+    prepare(args, &scene)?;
     let settings = options.settings();
     let gpu = Gpu::open(options.shared.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
@@ -56,10 +56,11 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 }
 
 /// Makes the folder and finds out before the work that every file can be written there.
-fn prepare(args: &CompareArgs) -> Result<()> {
+fn prepare(args: &CompareArgs, scene: &Scene) -> Result<()> {
     let folder = &args.output;
     fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
-    let environment = args.options.shared.environment.env.as_deref();
-    let mut files = Files::read(environment.map(|path| (path, "the environment")));
+    let mut files = Files::default();
+    files.read_scene(scene)?;
+    args.options.shared.environment.env.iter().try_for_each(|path| files.read(path, "the environment"))?;
     FILES.iter().try_for_each(|name| files.write(&folder.join(name)))
 }

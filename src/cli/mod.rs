@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod any_words;
 mod args;
+mod bugs;
 mod compare;
 mod devices;
 mod environment;
@@ -31,15 +32,15 @@ use args::{Args, Command};
 pub fn run() -> ExitCode {
     let args = Args::parse();
     signals::watch();
-    match work(args.command) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(Error::Stopped) => ExitCode::from(signals::exit_code()),
-        Err(error) => {
-            // One line, whatever a driver's message holds.
-            say::say(&format!("error: {}", error.to_string().lines().collect::<Vec<_>>().join(" ")));
-            ExitCode::FAILURE
-        }
-    }
+    let error = match bugs::caught(|| work(args.command)) {
+        Ok(Ok(())) => return ExitCode::SUCCESS,
+        Ok(Err(Error::Stopped)) => return ExitCode::from(signals::exit_code()),
+        Ok(Err(error)) => error.to_string(),
+        Err(bug) => bug,
+    };
+    // One line, whatever a driver's message holds.
+    say::say(&format!("error: {}", error.lines().collect::<Vec<_>>().join(" ")));
+    ExitCode::FAILURE
 }
 
 fn work(command: Command) -> Result<()> {

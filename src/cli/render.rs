@@ -23,9 +23,9 @@ pub fn render(args: &RenderArgs) -> Result<()> {
         log_library();
     }
     let display = Display::new(options.shared.quiet, options.shared.verbose);
-    let inputs = [(args.scene.as_path(), "the scene")];
-    let environment = options.shared.environment.env.as_deref().map(|path| (path, "the environment"));
-    let mut files = Files::read(inputs.into_iter().chain(environment));
+    let mut files = Files::default();
+    files.read(&args.scene, "the scene")?;
+    options.shared.environment.env.iter().try_for_each(|path| files.read(path, "the environment"))?;
     args.outputs.iter().chain(&args.stats).try_for_each(|path| files.write(path))?;
     let settings = args.settings();
 
@@ -36,6 +36,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
         options.shared.environment.light([&mut scene])?;
         Ok(scene)
     })?;
+    files.read_scene(&scene)?;
     display.check()?;
     display.note(&light_unit_line(&settings));
     if settings.search == Search::KdTree && !settings.raw_estimate {

@@ -11,7 +11,7 @@ use caustica::{
     Error, Result,
     gpu::Gpu,
     image::read_exr,
-    scene::Scene,
+    scene::{LoadOptions, Scene},
     settings::{Mode, Settings},
     study::{self, Finer, Look, Plan, Reference, Results, Subject},
 };
@@ -50,7 +50,7 @@ pub fn run(args: &StudyArgs) -> Result<()> {
     for warning in plan.subjects.iter().flat_map(|s| &s.scene.warnings).collect::<BTreeSet<_>>() {
         display.note(&format!("warning: {warning}"));
     }
-    prepare(args)?;
+    prepare(args, &plan)?;
     let gpu = Gpu::open(options.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
     let watch = StudyDisplay { display: &display, told: Mutex::default() };
@@ -95,6 +95,10 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
     let look = Look { exposure: options.exposure, tonemap: options.tonemap.into() };
     let settings = options.settings();
     if args.preset == Some(PresetArg::Report) {
+        if options.loading.options() != LoadOptions::default() {
+            let problem = "has scenes of its own, which --scene, --allow-outside and --ignore-required do not change";
+            return Err(Error::Setting { name: "--preset", value: "report".to_owned(), problem: problem.to_owned() });
+        }
         let folder = args.scene.clone().unwrap_or_else(|| PathBuf::from(SCENES));
         let size = Some(options.size.unwrap_or(PRESET_SIZE));
         // The report's estimate, whatever became of it since.
@@ -122,11 +126,15 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
 }
 
 /// Makes the folder and finds out before the work that files can be written there.
-fn prepare(args: &StudyArgs) -> Result<()> {
+fn prepare(args: &StudyArgs, plan: &Plan) -> Result<()> {
     let folder = &args.output;
     std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
-    let environment = args.options.environment.env.as_deref();
-    let mut files = Files::read(environment.map(|path| (path, "the environment")));
+    let mut files = Files::default();
+    plan.subjects.iter().try_for_each(|subject| files.read_scene(&subject.scene))?;
+    args.options.environment.env.iter().try_for_each(|path| files.read(path, "the environment"))?;
+    if let Some(ReferenceArg::File(path)) = &args.reference {
+        files.read(path, "the reference")?;
+    }
     ["study.csv", "study.json", "contact-sheet.png", "report.html"]
         .iter()
         .try_for_each(|name| files.write(&folder.join(name)))

@@ -23,7 +23,10 @@ pub use commands::Commands;
 pub use kernel::{Bindings, Kernel};
 pub use pace::{MOST_PER_DISPATCH, Pacing};
 
-use crate::error::{Error, Result};
+use crate::{
+    error::{Error, Result},
+    memory::available,
+};
 use fault::Faults;
 use kernel::Parts;
 use pace::Pace;
@@ -82,7 +85,11 @@ impl Gpu {
         let faults = Faults::of(&device);
         let (timer, parts) = (Timer::new(&device, &queue), Parts::new(&device));
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);
-        let (memory, dispatches) = (Arc::default(), AtomicU64::new(0));
+        let (memory, dispatches) = (Arc::<MemoryCount>::default(), AtomicU64::new(0));
+        // Memory of software is the host's, which gives more than it has and then ends the process.
+        if let Some(bytes) = available().filter(|_| chosen.kind == "software") {
+            memory.set_limit(bytes);
+        }
         Ok(Self {
             device,
             queue,

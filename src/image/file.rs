@@ -88,11 +88,12 @@ fn target_of(path: &Path) -> io::Result<Option<PathBuf>> {
 
 fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
     let parent = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut name = std::ffi::OsString::from(".");
-    name.push(target.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "names no file"))?);
-    name.push(".");
+    if target.file_name().is_none() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "names no file"));
+    }
+    // Short whatever the target's name: that may be as long as names can be.
     let mut builder = Builder::new();
-    builder.prefix(&name).suffix(".part");
+    builder.prefix(".caustica-").suffix(".part");
     #[cfg(unix)]
     {
         // As any new file: the umask takes its bits away.
@@ -127,9 +128,12 @@ fn put_in_place(temporary: NamedTempFile, written: io::Result<()>, target: &Path
 fn explain(error: io::Error, folder: &Path) -> io::Error {
     let kind = error.kind();
     let why = match kind {
-        io::ErrorKind::NotFound => "does not exist".to_string(),
-        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => "cannot be written".to_string(),
-        io::ErrorKind::NotADirectory => "is not a folder".to_string(),
+        io::ErrorKind::NotFound if !folder.exists() => "does not exist",
+        // Folders that the system makes up say so as well.
+        io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "cannot be written"
+        }
+        io::ErrorKind::NotADirectory => "is not a folder",
         _ => return error,
     };
     io::Error::new(kind, format!("the folder {} {why}", folder.display()))

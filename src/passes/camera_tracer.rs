@@ -300,7 +300,7 @@ impl std::ops::AddAssign for StepCount {
 impl From<Counters> for StepCount {
     fn from(counters: Counters) -> Self {
         Self {
-            rays: u64::from(counters.rays) | (u64::from(counters.rays_high) << 32),
+            rays: counters.all_rays(),
             media_overflows: u64::from(counters.media_overflows),
             unfinished: u64::from(counters.unfinished),
             non_finite: u64::from(counters.non_finite),

@@ -201,8 +201,23 @@ impl PhotonMap {
 
 /// Elements of a window: the largest power of two that one binding holds.
 fn window_elements<T>(gpu: &Gpu) -> u32 {
-    let most = (gpu.max_binding() / size_of::<T>() as u64).clamp(64, 1 << 30);
+    elements_within::<T>(gpu.max_binding())
+}
+
+/// The same for bindings of that many bytes. Photons are counted in 31 bits: a window has no more than 2^29.
+fn elements_within<T>(binding: u64) -> u32 {
+    let most = (binding / size_of::<T>() as u64).clamp(64, 1 << 29);
     1 << most.ilog2()
+}
+
+/// Photons of the largest map where bindings have that many bytes.
+fn most_photons(binding: u64) -> u64 {
+    MAX_WINDOWS as u64 * u64::from(elements_within::<PhotonPlace>(binding))
+}
+
+/// Finds out, before a photon is traced, whether a map of so many can be built.
+pub(super) fn check_capacity(gpu: &Gpu, photons: u32) -> Result<()> {
+    if u64::from(photons) > most_photons(gpu.max_binding()) { Err(too_many(gpu, photons.into())) } else { Ok(()) }
 }
 
 fn too_many(gpu: &Gpu, count: u64) -> Error {
@@ -212,7 +227,34 @@ fn too_many(gpu: &Gpu, count: u64) -> Error {
         unit: "photons",
         limit: "maxStorageBufferRange",
         adapter: gpu.name.clone(),
-        allowed: MAX_WINDOWS as u64 * u64::from(window_elements::<PhotonPlace>(gpu)),
+        allowed: most_photons(gpu.max_binding()),
         advice: "ask for fewer --photons or use another --device".to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::CELL_PHOTONS;
+
+    #[test]
+    fn a_hundred_million_photons_fit_the_bindings_of_a_gpu() {
+        for (binding, photons) in [
+            (64, 128),
+            (128 << 20, 1 << 24),
+            ((1 << 31) - 4, 1 << 27),
+            ((1 << 32) - 4, 1 << 28),
+            (1 << 34, 1 << 30),
+            (1 << 60, 1 << 30),
+        ] {
+            assert_eq!(most_photons(binding), photons, "bindings of {binding} bytes");
+            // All else that is made of a photon fits then as well: its key and place in two buffers of the sort, its part of the
+            // counts of digits, of the cells and of what a search reads.
+            assert!(photons * 8 <= binding.max(1024), "sort entries in {binding} bytes");
+            assert!(photons / u64::from(CELL_PHOTONS) * 37 <= binding.max(1024), "cells in {binding} bytes");
+            // A path that found no place is sent beyond 2^31.
+            assert!(photons < 1 << 31);
+        }
+        assert!(most_photons((1 << 31) - 4) > 100_000_000 && most_photons(128 << 20) < 100_000_000);
     }
 }

@@ -123,15 +123,12 @@ impl PhotonTracer {
             let until_check = growth_window - first_path % growth_window;
             let wanted = plan.maps(traced).map(|(_, map)| map.paths_wanted(first_path)).max().unwrap_or(0);
             let paths = wanted.min(batch_limit).min(max_paths - first_path).min(until_check);
-            let round = first_path / u64::from(plan.choices.turns);
             let batch = PhotonBatch {
-                first_round: round as u32,
-                first_round_high: (round >> 32) as u32,
                 paths: paths as u32,
-                first_turn: (first_path % u64::from(plan.choices.turns)) as u32,
                 staging_capacity: buffers.staging_capacity as u32,
                 ..plan.batch(scene, settings, traced)
-            };
+            }
+            .starting_at(first_path);
             let result = self.kernels.run(gpu, scene, &plan.choices.buffer, buffers, &batch)?;
             let staged = u64::from(result.counters.staged);
             if staged > buffers.staging_capacity {
@@ -142,11 +139,11 @@ impl PhotonTracer {
             let maps = [plan.fills_global.then_some(global), plan.fills_caustic.then_some(caustic)];
             self.kernels.store(gpu, buffers, maps, &result, first_path)?;
             first_path += paths;
-            traced.rays += u64::from(result.counters.rays) | (u64::from(result.counters.rays_high) << 32);
+            traced.rays += result.counters.all_rays();
             traced.media_overflows += u64::from(result.counters.media_overflows);
             traced.unfinished += u64::from(result.counters.unfinished);
             traced.non_finite += u64::from(result.counters.non_finite);
-            lost_units += u64::from(result.counters.lost);
+            lost_units += result.counters.all_lost();
             if first_path.is_multiple_of(growth_window) {
                 let idle = plan.maps(traced).filter_map(|(name, map)| map.close_if_idle(name, growth_window));
                 let idle: Vec<String> = idle.collect();

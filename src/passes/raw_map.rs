@@ -1,6 +1,6 @@
 //! Photons as they come from the photon pass: a map that fills up, and the paths that it is normalised by.
 
-use super::photon_map::PhotonStore;
+use super::photon_map::{PhotonStore, check_capacity};
 use crate::{error::Result, gpu::Gpu, layout::Photon};
 
 /// A map that gains less than this fraction of its capacity while a window of paths is traced is idle.
@@ -25,6 +25,7 @@ impl RawMap {
     /// An empty map; without room if it is not `wanted`.
     pub(super) fn new(gpu: &Gpu, capacity: u32, wanted: bool) -> Result<Self> {
         let capacity = if wanted { capacity } else { 0 };
+        check_capacity(gpu, capacity)?;
         Ok(Self {
             photons: PhotonStore::new(gpu, capacity)?,
             capacity: u64::from(capacity),
@@ -98,5 +99,23 @@ impl RawMap {
             "the {name} map hardly grows: {gained} photons from the last {window} paths; it stays at {} of {} photons",
             self.stored, self.capacity
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_counted_beyond_32_bits() {
+        let gpu = Gpu::open(None).expect("tests need an adapter");
+        let mut map = RawMap::new(&gpu, 10, true).expect("fits");
+        let first = (1_u64 << 32) - 2;
+        assert_eq!(map.place([1, 2, 3].into_iter(), first), [0, 1, 3]);
+        assert_eq!((map.stored, map.emitted), (6, first + 3));
+        // 4 more fit, but the second path does not as a whole.
+        let places = map.place([3, 2, 1].into_iter(), first + 3);
+        assert_eq!((places[0], map.stored, map.emitted, map.open), (6, 9, first + 4, false));
+        assert!(places[1..].iter().all(|&place| place >= 1 << 31));
     }
 }

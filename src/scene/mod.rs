@@ -36,6 +36,8 @@ pub struct Scene {
     pub path: PathBuf,
     /// File name without folders.
     pub file_name: String,
+    /// Files that it names: buffers and images, read or not.
+    pub files: Vec<PathBuf>,
     /// SHA-256 of the bytes of the file and of the buffers it names, in hexadecimal.
     pub hash: String,
     /// What was subtracted from every world coordinate of the file: the middle of its geometry.

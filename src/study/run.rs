@@ -254,10 +254,10 @@ impl Study<'_> {
     }
 }
 
-/// Why a cell failed, as one line; a study that is to stop stops here.
+/// Why a cell failed, as one line; a study that is to stop, or whose device is lost, stops here: what it has is kept.
 fn one_line(error: Error) -> Result<String> {
     match error {
-        Error::Stopped => Err(error),
+        Error::Stopped | Error::Lost { .. } => Err(error),
         other => Ok(other.to_string().lines().collect::<Vec<_>>().join(" ")),
     }
 }

@@ -141,6 +141,9 @@ impl Column<'_> {
     pub(super) fn vector(&self, i: usize) -> Vec3 {
         let size = self.format.component.size();
         self.bytes(i).map_or(Vec3::ZERO, |bytes| {
+            if self.format.component == ComponentType::F32 {
+                return Vec3::new(float32(bytes), float32(&bytes[4..]), float32(&bytes[8..]));
+            }
             let [x, y, z] = [0, 1, 2].map(|c| number(&bytes[c * size..], self.format));
             Vec3::new(x, y, z)
         })

@@ -1,5 +1,7 @@
 //! The extensions that a file may use or require.
 
+use std::collections::HashSet;
+
 use super::fault::{Notes, Read, fault};
 
 /// Extensions that are read, or that change nothing which is read.
@@ -29,6 +31,7 @@ pub(super) fn check(used: &[String], required: &[String], ignored: &[String], no
         }
         notes.add(format!("extension {name} is required, but not read"));
     }
+    let required: HashSet<&String> = required.iter().collect();
     for name in used.iter().filter(unsupported).filter(|name| !required.contains(name)) {
         notes.add(format!("extension {name} is not read"));
     }

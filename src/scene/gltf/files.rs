@@ -4,6 +4,8 @@ use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::{Component, Path, PathBuf};
 
+use gltf::json;
+
 use super::fault::{Read, fault};
 
 /// Where the bytes of buffers come from.
@@ -32,6 +34,14 @@ pub(super) fn read_regular(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 }
 
 impl Resources<'_> {
+    /// Paths of all files that a scene names, whether they are read or not.
+    pub(super) fn named(&self, root: &json::Root) -> Vec<PathBuf> {
+        let buffers = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+        let images = root.images.iter().filter_map(|image| image.uri.as_deref());
+        let files = buffers.chain(images).filter(|uri| !uri.starts_with("data:"));
+        files.filter_map(|uri| self.path(uri, "").ok()).collect()
+    }
+
     /// The first `length` bytes of the file that a URI names, or all if it is shorter.
     pub(super) fn read_file(&self, uri: &str, length: u64, place: &str) -> Read<Vec<u8>> {
         let path = self.path(uri, place)?;

@@ -1,6 +1,7 @@
 //! How large a scene may be: known before any of it is allocated.
 
 use super::fault::{Read, fault};
+use crate::memory::available;
 
 /// Triangles that a scene may have, so that all counts of nodes and corners fit into 32 bits with room to spare.
 const MAX_TRIANGLES: usize = 100_000_000;
@@ -21,11 +22,4 @@ pub(super) fn check(triangles: usize) -> Read<()> {
         }
         _ => Ok(()),
     }
-}
-
-/// Memory that is free, bytes, where the system tells: on Linux.
-fn available() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }

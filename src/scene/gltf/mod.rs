@@ -67,7 +67,7 @@ pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<S
     }
     let resources = Resources { bin, folder, allow_outside: options.allow_outside };
     let scene = assemble(&root, chosen, &resources, hash, notes).map_err(|fault| fault.of(path))?;
-    Ok(Scene { path: path.to_owned(), file_name, ..scene })
+    Ok(Scene { path: path.to_owned(), file_name, files: resources.named(&root), ..scene })
 }
 
 /// The JSON part, with its graph of nodes checked, and the binary chunk.
@@ -118,7 +118,7 @@ fn assemble(
     scene.spheres = carried.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
     carried.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    scene.warnings = notes.0;
+    scene.warnings = notes.into_lines();
     Ok(scene)
 }
 

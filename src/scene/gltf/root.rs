@@ -5,17 +5,21 @@ use serde_json::{Map, Value};
 
 use super::extensions;
 use super::fault::{Notes, Read, fault};
-use super::strict_json::{elements, member, objects, parse};
+use super::strict_json::{elements, member, objects, parse, read_element};
 
-/// Parses the JSON text; refuses versions and required extensions that are not read, by name. What is never used (images,
-/// textures, samplers, animations) is left out.
+/// Materials that a file may have.
+const MAX_MATERIALS: usize = 1 << 16;
+
+/// Parses the JSON text; refuses versions and required extensions that are not read, by name. What is never used
+/// (textures, samplers, animations, and of images all but their files' names) is left out.
 pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<json::Root> {
     let Value::Object(mut file) = parse(text)? else { return fault("JSON", "is not an object") };
     let asset = read_asset(&mut file)?;
     let used = member::<Vec<String>>(&mut file, "extensionsUsed")?.unwrap_or_default();
     let required = member::<Vec<String>>(&mut file, "extensionsRequired")?.unwrap_or_default();
     extensions::check(&used, &required, ignored, notes)?;
-    for unused in ["images", "textures", "samplers"] {
+    let images = objects(&mut file, "images")?;
+    for unused in ["textures", "samplers"] {
         objects(&mut file, unused)?;
     }
     if !objects(&mut file, "animations")?.is_empty() {
@@ -29,15 +33,28 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
         meshes: elements(&mut file, "meshes")?,
         skins: elements(&mut file, "skins")?,
         cameras: elements(&mut file, "cameras")?,
-        materials: elements(&mut file, "materials")?,
+        materials: read_materials(&mut file)?,
         accessors: elements(&mut file, "accessors")?,
         buffer_views: elements(&mut file, "bufferViews")?,
         buffers: elements(&mut file, "buffers")?,
+        images: images.iter().map(named_image).collect(),
         extensions: member(&mut file, "extensions")?,
         extensions_used: used,
         extensions_required: required,
         ..json::Root::default()
     })
+}
+
+/// An image of which nothing is known but its file.
+fn named_image(image: &Value) -> json::Image {
+    json::Image {
+        buffer_view: None,
+        mime_type: None,
+        name: None,
+        uri: image.get("uri").and_then(Value::as_str).map(str::to_owned),
+        extensions: None,
+        extras: None,
+    }
 }
 
 /// The head of a file, looked at before the rest: other versions may be shaped differently.
@@ -56,10 +73,22 @@ fn read_asset(file: &mut Map<String, Value>) -> Read<json::Asset> {
 
 /// The scenes. One without nodes is legal, but the crate wants the list.
 fn read_scenes(file: &mut Map<String, Value>) -> Read<Vec<json::Scene>> {
-    for scene in file.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+    let mut scenes = Vec::new();
+    for (i, mut scene) in objects(file, "scenes")?.into_iter().enumerate() {
         if let Some(scene) = scene.as_object_mut() {
             scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
         }
+        scenes.push(read_element(scene, "scenes", i)?);
     }
-    elements(file, "scenes")
+    Ok(scenes)
+}
+
+/// The materials, whose number is bounded because each takes much more memory than text.
+fn read_materials(file: &mut Map<String, Value>) -> Read<Vec<json::Material>> {
+    match file.get("materials").and_then(Value::as_array).map_or(0, Vec::len) {
+        count if count > MAX_MATERIALS => {
+            fault("materials", format!("{count} of them, at most {MAX_MATERIALS} are read"))
+        }
+        _ => elements(file, "materials"),
+    }
 }
