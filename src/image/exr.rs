@@ -215,6 +215,8 @@ fn open(path: &Path) -> Result<Image<exr::image::Layer<AnyChannels<FlatSamples>>
         .all_channels()
         .first_valid_layer()
         .all_attributes()
+        // A job of exr's that panics on a thread of its own would end the process.
+        .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(|e| failure(path, e))
 }
