@@ -27,15 +27,18 @@ pub struct BvhNode {
     pub right_high: [u32; 4],
 }
 
-/// Set in [`Primitive::material`] when the primitive is a sphere; the other bits are the material's index.
+/// Set in [`Primitive::material`] when the primitive is a sphere.
 pub const SPHERE_BIT: u32 = 0x8000_0000;
+
+/// Set there when the primitive's material is a mirror or glass: where surfaces coincide, the others are met first.
+pub const DELTA_BIT: u32 = 0x4000_0000;
 
 /// A triangle `v0, v0 + e1, v0 + e2`, or a sphere with centre `v0` and radius `e1.x`, in the order of the BVH's leaves.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Primitive {
     pub v0: [f32; 3],
-    /// Index into the materials, with [`SPHERE_BIT`] for a sphere.
+    /// Index into the materials, with [`SPHERE_BIT`] for a sphere, and on the device [`DELTA_BIT`] for a delta surface.
     pub material: u32,
     pub e1: [f32; 3],
     /// Index of the primitive in the scene before the BVH reordered it.

@@ -146,7 +146,7 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
         ("render none.gltf -o a.exr", "none.gltf"),
         ("render text.gltf -o a.exr", "text.gltf"),
         ("render nan.gltf -o a.exr", "nan.gltf"),
-        ("render dark.gltf -o a.exr", "light"),
+        ("render dark.gltf -o a.exr --default-light none", "light"),
         ("render empty.gltf -o a.exr", "empty.gltf"),
         ("render scene.gltf -o a.exr --camera none", "none"),
         ("render scene.gltf -o a.exr --device no-such-adapter", "no-such-adapter"),

@@ -240,3 +240,65 @@ fn good_sources_are_not() {
         assert_eq!(violations(path, source), Vec::<String>::new(), "{path}");
     }
 }
+
+/// Where the word `unsafe` stands in the code, and where a lint against it is lifted or a shader compiled without its
+/// checks: file and word.
+fn untrusted(path: &str, source: &str) -> Vec<String> {
+    let tokens = tokens(source);
+    let lifts = |i: usize| {
+        let before: Vec<&str> = tokens[i.saturating_sub(2)..i].iter().map(String::as_str).collect();
+        tokens[i] == "unsafe_code" && before != ["deny", "("]
+    };
+    let unchecked =
+        |token: &str| matches!(token, "unsafe" | "create_shader_module_trusted" | "create_shader_module_passthrough");
+    let found = (0..tokens.len()).filter(|i| unchecked(&tokens[*i]) || lifts(*i));
+    found.map(|i| format!("{path}: {}", tokens[i])).collect()
+}
+
+#[test]
+fn one_place_is_unsafe_and_no_shader_goes_unchecked() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut paths = Vec::new();
+    files(&root, &root, &mut paths);
+    let source = |path: &str| fs::read_to_string(root.join(path)).expect("the file can be read");
+    for root_of_a_crate in ["lib.rs", "main.rs"] {
+        assert!(source(root_of_a_crate).contains("#![deny(unsafe_code)]"), "{root_of_a_crate}");
+    }
+    let found: Vec<String> = paths.iter().flat_map(|path| untrusted(path, &source(path))).collect();
+    // The one exception: a variable of the environment, set before there is a second thread.
+    assert_eq!(found, ["main.rs: unsafe_code", "main.rs: unsafe"]);
+    assert!(source("main.rs").contains("// SAFETY: "), "it says why");
+}
+
+#[test]
+fn unsafe_code_is_found() {
+    for (source, count) in [
+        ("#![deny(unsafe_code)] // unsafe\nfn f() { let s = \"unsafe\"; }", 0),
+        ("#[allow(unsafe_code)] fn f() { unsafe { g() } }", 2),
+        ("#[expect(dead_code, unsafe_code)] mod a;", 1),
+        ("unsafe impl Send for X {}", 1),
+        ("device.create_shader_module_trusted(d, c)", 1),
+    ] {
+        assert_eq!(untrusted("a.rs", source).len(), count, "{source}");
+    }
+}
+
+/// What of a lock file comes from elsewhere than the registry, or without a checksum: the names of packages. Our own has
+/// neither.
+fn strangers(lock: &str) -> Vec<&str> {
+    let is_known = |package: &&str| {
+        package.contains("\nsource = \"registry+https://github.com/rust-lang/crates.io-index\"\nchecksum = \"")
+    };
+    let unknown = lock.split("[[package]]\n").skip(1).filter(|package| !is_known(package));
+    unknown.map(|package| package.split('"').nth(1).unwrap_or_default()).collect()
+}
+
+#[test]
+fn dependencies_come_from_the_registry() {
+    let lock = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.lock");
+    let lock = fs::read_to_string(lock).expect("the lock file can be read");
+    assert!(lock.matches("[[package]]").count() > 100);
+    assert_eq!(strangers(&lock), ["caustica"]);
+    let elsewhere = lock.replacen("registry+https://github.com/rust-lang", "git+https://example.org", 1);
+    assert_eq!(strangers(&elsewhere).len(), 2, "control");
+}

@@ -83,6 +83,7 @@ fn constants() -> Vec<(&'static str, u64)> {
         BVH_STACK,
         MEDIA_DEPTH,
         SPHERE_BIT,
+        DELTA_BIT,
         DIFFUSE,
         MIRROR,
         GLASS,

@@ -1,10 +1,12 @@
 //! How triangles and spheres come out of meshes, nodes and transforms.
 
+#[path = "gltf/compressed.rs"]
+mod compressed;
 mod gltf;
 
 use caustica::scene::{Scene, Triangle};
 use glam::{Mat4, Quat, Vec3};
-use gltf::{add_accessor, data_uri, floats, load, loaded, message, triangle};
+use gltf::{add_accessor, add_zeros, data_uri, floats, load, loaded, message, push, triangle};
 use serde_json::{Value, json};
 
 /// Corners of a unit square in the plane z = 0, in an order that suits a strip.
@@ -91,6 +93,143 @@ fn interleaved_sparse_and_quantized_positions_are_read() {
     quantized["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
     quantized["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
     assert_eq!(surface(&loaded(&quantized)), expected);
+}
+
+#[test]
+fn sparse_elements_replace_zeros_and_others() {
+    // Positions without a view, all but one of them listed; indices that are sparse over a view.
+    let mut gltf = triangle();
+    let bytes = [vec![1, 0, 2, 0], floats(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0])].concat();
+    let listed = push(&mut gltf, "buffers", json!({ "byteLength": 28, "uri": data_uri(&bytes) }));
+    let view = push(&mut gltf, "bufferViews", json!({ "buffer": listed, "byteLength": 28 }));
+    gltf["accessors"][0] = json!({ "componentType": 5126, "count": 3, "type": "VEC3", "sparse": {
+        "count": 2,
+        "indices": { "bufferView": view, "componentType": 5123 },
+        "values": { "bufferView": view, "byteOffset": 4 },
+    } });
+    let indices = add_accessor(&mut gltf, &[0, 9, 2], 5121, 3, "SCALAR");
+    gltf["accessors"][indices]["sparse"] = json!({
+        "count": 1,
+        "indices": { "bufferView": view, "componentType": 5121 },
+        "values": { "bufferView": view, "byteOffset": 0 },
+    });
+    gltf["meshes"][0]["primitives"][0]["indices"] = indices.into();
+    assert_eq!(surface(&loaded(&gltf)), surface(&loaded(&triangle())));
+    // Negative control: without its list the index 9 is what counts.
+    gltf["accessors"][indices].as_object_mut().expect("an object").remove("sparse");
+    assert_eq!(message(load(&gltf)), "meshes[0].primitives[0].indices: index 9 at 1, but there are 3 vertices");
+}
+
+#[test]
+fn morph_targets_move_vertices_and_normals_by_default_weights() {
+    let mut gltf = triangle();
+    let up = add_accessor(&mut gltf, &floats(&[0.0, 0.0, 1.0].repeat(3)), 5126, 3, "VEC3");
+    let normals = add_accessor(&mut gltf, &floats(&[0.0, 0.0, 1.0].repeat(3)), 5126, 3, "VEC3");
+    let turn = add_accessor(&mut gltf, &floats(&[2.0, 0.0, 0.0].repeat(3)), 5126, 3, "VEC3");
+    let small = add_accessor(&mut gltf, &[0, 0, 0, 0, 127, 0, 0, 0, 0, 0, 0, 0], 5120, 3, "VEC3");
+    gltf["accessors"][small]["normalized"] = true.into();
+    gltf["bufferViews"][5]["byteStride"] = 4.into();
+    gltf["extensionsUsed"].as_array_mut().expect("a list").push("KHR_mesh_quantization".into());
+    gltf["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals.into();
+    gltf["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": up, "NORMAL": turn }, { "POSITION": small }]);
+    let places = |gltf: &Value| {
+        let scene = loaded(gltf);
+        let center = scene.center.as_vec3();
+        (scene.triangles[0].positions.map(|p| p + center), scene.triangles[0].normals[0])
+    };
+    let rest = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    assert_eq!(places(&gltf), (rest, Vec3::Z), "without weights nothing moves");
+    gltf["meshes"][0]["weights"] = json!([0.5, 3]);
+    let expected = [Vec3::new(0.0, 0.0, 0.5), Vec3::new(4.0, 0.0, 0.5), Vec3::new(0.0, 1.0, 0.5)];
+    let (moved, normal) = places(&gltf);
+    assert_eq!(moved, expected);
+    assert!((normal - Vec3::new(1.0, 0.0, 1.0).normalize()).length() < 1e-6, "{normal}");
+    // A node's own weights go before the mesh's, for this node alone.
+    push(&mut gltf, "nodes", json!({ "mesh": 0, "weights": [0, 0] }));
+    gltf["scenes"][0]["nodes"] = json!([3, 0]);
+    let scene = loaded(&gltf);
+    let heights: Vec<f64> = scene.triangles.iter().map(|t| f64::from(t.positions[0].z) + scene.center.z).collect();
+    assert_eq!(heights, [0.0, 0.5]);
+    gltf["nodes"][3]["weights"] = json!([1]);
+    assert_eq!(message(load(&gltf)), "nodes[3].weights: 1 of them for 2 morph targets");
+    gltf["nodes"][3]["weights"] = json!([3e38, 3e38]);
+    let said = message(load(&gltf));
+    assert!(said.starts_with("meshes[0].primitives[0]: ") || said.starts_with("nodes[3]: "), "{said}");
+}
+
+#[test]
+fn skins_stand_as_their_joints_do() {
+    let mut gltf = triangle();
+    // The first vertex holds to joint 0, the second to joint 1, the third to both alike, with weights that sum to 100.
+    let joints = add_accessor(&mut gltf, &[0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0], 5121, 3, "VEC4");
+    let weights = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 50.0, 50.0, 0.0, 0.0];
+    let weights = add_accessor(&mut gltf, &floats(&weights), 5126, 3, "VEC4");
+    let shift = |x: f32| [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, 0.0, 0.0, 1.0];
+    let inverse = add_accessor(&mut gltf, &floats(&[shift(0.0), shift(-1.0)].concat()), 5126, 2, "MAT4");
+    gltf["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = joints.into();
+    gltf["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = weights.into();
+    gltf["skins"] = json!([{ "joints": [3, 4], "inverseBindMatrices": inverse }]);
+    // The node's own place does not count; the joints need not be in the scene.
+    gltf["nodes"][0] = json!({ "mesh": 0, "skin": 0, "translation": [100, 100, 100] });
+    push(&mut gltf, "nodes", json!({ "children": [4] }));
+    push(&mut gltf, "nodes", json!({ "translation": [1, 0, 4] }));
+    let places = |gltf: &Value| {
+        let scene = loaded(gltf);
+        scene.triangles[0].positions.map(|p| p + scene.center.as_vec3())
+    };
+    assert_eq!(places(&gltf), [Vec3::ZERO, Vec3::new(1.0, 0.0, 4.0), Vec3::new(0.0, 1.0, 2.0)]);
+    // Joints that mirror keep the outside out.
+    gltf["nodes"][3]["scale"] = json!([1, 1, -1]);
+    let mirrored = loaded(&gltf).triangles[0].geometric_normal();
+    gltf["nodes"][3]["scale"] = json!([1, 1, 1]);
+    let plain = loaded(&gltf).triangles[0].geometric_normal();
+    assert!((mirrored - Vec3::new(plain.x, plain.y, -plain.z)).length() < 1e-6, "{mirrored}, {plain}");
+
+    let refused = |path: &str, value: Value| {
+        let mut gltf = gltf.clone();
+        *gltf.pointer_mut(path).expect("it is there") = value;
+        message(load(&gltf))
+    };
+    assert_eq!(refused("/skins/0/joints", json!([3, 9])), "skins[0].joints[1]: 9 of 5");
+    let short = refused(&format!("/accessors/{inverse}/count"), 1.into());
+    assert_eq!(short, "skins[0].inverseBindMatrices: 1 matrices for 2 joints");
+    let alone = refused("/skins/0/joints", json!([3]));
+    assert_eq!(alone, "meshes[0].primitives[0].attributes.JOINTS_0: joint 1 of 1 at vertex 1");
+    assert_eq!(refused("/nodes/0/skin", 1.into()), "nodes[0].skin: 1 of 1");
+    let float = refused("/meshes/0/primitives/0/attributes/JOINTS_0", weights.into());
+    assert!(float.ends_with("JOINTS_0: is Vec4 of F32, which joints and their weights cannot be"), "{float}");
+}
+
+#[test]
+fn instances_stand_where_their_attributes_say() {
+    let mut gltf = triangle();
+    let at = add_accessor(&mut gltf, &floats(&[0.0, 0.0, 0.0, 0.0, 0.0, 5.0]), 5126, 2, "VEC3");
+    let turn = add_accessor(&mut gltf, &[0, 0, 0, 127, 0, 0, 127, 0], 5120, 2, "VEC4");
+    gltf["accessors"][turn]["normalized"] = true.into();
+    let scale = add_accessor(&mut gltf, &floats(&[1.0, 1.0, 1.0, 2.0, 2.0, 2.0]), 5126, 2, "VEC3");
+    let attributes = json!({ "TRANSLATION": at, "ROTATION": turn, "SCALE": scale, "_ID": at });
+    gltf["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
+    gltf["nodes"][0]["translation"] = json!([0, 0, 1]);
+    let scene = loaded(&gltf);
+    let places: Vec<_> =
+        scene.triangles.iter().flat_map(|t| t.positions.map(|p| (p + scene.center.as_vec3()).round())).collect();
+    let expected = [[0, 0, 1], [1, 0, 1], [0, 1, 1], [0, 0, 6], [-2, 0, 6], [0, -2, 6]];
+    assert_eq!(places, expected.map(|[x, y, z]: [i16; 3]| Vec3::new(x.into(), y.into(), z.into())));
+
+    let refused = |attributes: Value| {
+        let mut gltf = gltf.clone();
+        gltf["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = attributes;
+        message(load(&gltf))
+    };
+    let place = "nodes[0].extensions.EXT_mesh_gpu_instancing.attributes";
+    assert_eq!(refused(json!({ "SCALE": 99 })), format!("{place}.SCALE: accessor 99 of 5"));
+    let unequal = refused(json!({ "SCALE": scale, "TRANSLATION": 0 }));
+    assert_eq!(unequal, format!("{place}.TRANSLATION: has 3 elements, other attributes have 2"));
+    assert_eq!(refused(json!({ "SCALE": turn })), format!("{place}.SCALE: is Vec4 of normalized I8, not Vec3 of F32"));
+    let zeros = add_zeros(&mut gltf, 5126, 2, "VEC4");
+    let none = json!({ "ROTATION": zeros });
+    gltf["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = none;
+    assert_eq!(message(load(&gltf)), format!("{place}.ROTATION: element 0 is not a rotation"));
 }
 
 /// A tetrahedron around the origin with its outside out, and normals that point from the centre.

@@ -2,10 +2,10 @@
 
 mod gltf;
 
-use caustica::scene::{LightKind, Projection, Surface};
+use caustica::scene::{Environment, LightKind, LoadOptions, Projection, Surface};
 use caustica::settings::LightUnit;
 use glam::Vec3;
-use gltf::{lambert, loaded, triangle};
+use gltf::{lambert, loaded, message, read_with, triangle};
 use serde_json::{Value, json};
 
 /// The surface that a material is read as, and what is said about it.
@@ -34,6 +34,12 @@ fn materials_are_read_as_the_nearest_surface() {
     assert_eq!(quiet(glass.clone()), Surface::Glass { ior: 1.33, tint: Vec3::ONE });
     glass["extensions"]["KHR_materials_volume"]["thicknessFactor"] = 0.into();
     assert_eq!(quiet(glass.clone()), Surface::Pane { ior: 1.33, tint: Vec3::ONE });
+
+    let mut all_reflecting = glass.clone();
+    all_reflecting["extensions"]["KHR_materials_ior"]["ior"] = 0.into();
+    let (surface, notes) = read_as(all_reflecting);
+    assert_eq!((surface, notes.len()), (Surface::Mirror { tint: Vec3::ONE }, 1), "{notes:?}");
+    assert!(notes[0].contains("ior 0"), "{notes:?}");
 
     glass["pbrMetallicRoughness"]["roughnessFactor"] = 0.25.into();
     let (surface, notes) = read_as(glass.clone());
@@ -67,7 +73,7 @@ fn lights_keep_their_candela_whatever_the_scale() {
     assert_eq!(light.position, Vec3::new(-0.5, -0.5, 2.0));
     assert_eq!(light.intensity_in(LightUnit::Radiometric), light.intensity);
     assert!((light.intensity_in(LightUnit::Photometric) - Vec3::new(1.0, 0.5, 0.0)).length() < 1e-6);
-    assert!((light.power(1.0).x / (4.0 * std::f32::consts::PI * 683.0) - 1.0).abs() < 1e-6);
+    assert!((light.power(1.0).x / (4.0 * std::f64::consts::PI * 683.0) - 1.0).abs() < 1e-6);
 }
 
 #[test]
@@ -182,6 +188,101 @@ fn cameras_are_found_by_name_and_number_and_made_if_missing() {
     };
     assert!(scene.triangles[0].positions.iter().all(|p| sees(*p)));
     assert!(!sees(Vec3::new(0.0, 3.0, 0.0)), "not everything is in view");
+}
+
+#[test]
+fn a_scene_without_light_gets_a_sky_and_one_with_light_keeps_it() {
+    let mut gltf = triangle();
+    let mut lit = loaded(&gltf);
+    lit.add_default_light();
+    assert_eq!((lit.environment, lit.warnings), (None, vec![]));
+    gltf["scenes"][0]["nodes"] = json!([0, 2]);
+    let mut dark = loaded(&gltf);
+    assert!(dark.check_renderable().is_err());
+    dark.add_default_light();
+    assert_eq!(dark.warnings, ["no light: lit by a uniform sky of radiance 1"]);
+    let sky = dark.environment.as_ref().expect("a sky");
+    assert_eq!(
+        (sky.name.as_str(), sky.radiance(Vec3::Y), sky.radiance(-Vec3::X)),
+        ("default sky", Vec3::ONE, Vec3::ONE)
+    );
+    assert!(dark.check_renderable().is_ok());
+    // What was asked for stays, dark or not.
+    let mut asked = loaded(&gltf);
+    asked.environment = Some(Environment::uniform(Vec3::ZERO));
+    asked.add_default_light();
+    assert!(asked.check_renderable().is_err());
+    gltf["materials"][0]["emissiveFactor"] = json!([0, 0, 0.5]);
+    let mut glowing = loaded(&gltf);
+    glowing.add_default_light();
+    assert_eq!(glowing.environment, None);
+}
+
+#[test]
+fn scenes_of_a_file_are_chosen_by_name_or_number() {
+    let mut gltf = triangle();
+    gltf["scenes"] = json!([{ "nodes": [0, 1, 2] }, { "name": "lamp only", "nodes": [1] }, { "name": "0" }, {}]);
+    let scene = |wanted: &str| read_with(&gltf, &LoadOptions { scene: Some(wanted.into()), ..LoadOptions::default() });
+    let counts = |wanted: &str| {
+        let scene = scene(wanted).unwrap_or_else(|error| panic!("{error}"));
+        (scene.triangles.len(), scene.lights.len())
+    };
+    assert_eq!((counts("lamp only"), counts("1")), ((0, 1), (0, 1)));
+    assert_eq!(counts("0"), (0, 0), "a name goes before a number");
+    assert_eq!(counts("3"), (0, 0));
+    let default = read_with(&gltf, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!((default.triangles.len(), default.lights.len()), (1, 1));
+    // What is kept under a scene's hash is not found under another's.
+    assert_ne!(scene("1").expect("it loads").hash, default.hash);
+    let expected = r#"scene 4: test.gltf has the scenes 0, 1 "lamp only", 2 "0", 3"#;
+    assert_eq!(message(scene("4")), expected);
+    gltf.as_object_mut().expect("an object").remove("scenes");
+    gltf.as_object_mut().expect("an object").remove("scene");
+    assert_eq!(loaded(&gltf).triangles.len(), 1, "without scenes all nodes are shown");
+    let options = LoadOptions { scene: Some("0".into()), ..LoadOptions::default() };
+    assert_eq!(message(read_with(&gltf, &options)), "scene 0: test.gltf has no scenes");
+}
+
+#[test]
+fn what_the_format_allows_is_read_whatever_else_the_file_holds() {
+    let mut gltf = triangle();
+    gltf["extras"] = json!([1, "two", null]);
+    gltf["unknown"] = json!({ "deep": [[[{}]]] });
+    gltf["extensionsUsed"].as_array_mut().expect("a list").push("FAKE_thing".into());
+    gltf["nodes"][0]["extensions"] = json!({ "FAKE_thing": { "x": -1 } });
+    gltf["nodes"][0]["extras"] = json!("text");
+    gltf["nodes"][0]["mesh"] = json!(0.0);
+    gltf["accessors"][0]["count"] = json!(3.0);
+    gltf["textures"] = json!([{ "extensions": { "KHR_texture_basisu": { "source": 0 } } }]);
+    gltf["samplers"] = json!([{ "wrapS": 1 }]);
+    gltf["images"] = json!([{ "uri": "gone.png" }]);
+    gltf["materials"][0]["alphaMode"] = "FAKE".into();
+    gltf["materials"][0]["extensions"]["KHR_materials_volume"] = json!({});
+    gltf["animations"] = json!([{ "channels": [{ "sampler": 0, "target": { "path": "pointer" } }], "samplers": [{}] }]);
+    gltf["meshes"][0]["primitives"][0]["attributes"]["_OWN"] = 0.into();
+    gltf["meshes"][0]["primitives"][0]["attributes"]["FAKE"] = 0.into();
+    gltf["bufferViews"][0]["target"] = 7.into();
+    let scene = loaded(&gltf);
+    assert_eq!(scene.triangles, loaded(&triangle()).triangles);
+    assert_eq!(
+        scene.warnings,
+        [
+            "extension FAKE_thing is not read",
+            "animations are not read: nodes stand as in the file",
+            "alpha is not read yet: all surfaces are opaque or as their transmission says",
+        ]
+    );
+    gltf["extensionsRequired"] = json!(["FAKE_thing"]);
+    let ignoring = |name: &str| {
+        let options = LoadOptions { ignore_required: vec![name.into()], ..LoadOptions::default() };
+        read_with(&gltf, &options)
+    };
+    let refused =
+        "extensionsRequired[0]: FAKE_thing is not supported; --ignore-required FAKE_thing reads the file without it";
+    assert_eq!(message(ignoring("FAKE_other")), refused);
+    let read = ignoring("FAKE_thing").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(read.warnings[0], "extension FAKE_thing is required, but not read");
+    assert_eq!(read.triangles, scene.triangles);
 }
 
 #[test]

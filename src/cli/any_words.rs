@@ -35,3 +35,25 @@ fn check_settings(settings: &Settings) -> Result<(), String> {
     }
     checked
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{fs, path::Path};
+
+    use super::check;
+
+    #[test]
+    fn words_of_the_corpus_are_understood_or_refused() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/options");
+        let (mut understood, mut refused) = (0, 0);
+        for entry in fs::read_dir(folder).expect("can be listed") {
+            let path = entry.expect("an entry").path();
+            println!("{}", path.display());
+            match check(&fs::read(&path).expect("can be read")) {
+                Ok(()) => understood += 1,
+                Err(_) => refused += 1,
+            }
+        }
+        assert!(understood >= 10 && refused >= 4, "{understood} understood, {refused} refused");
+    }
+}

@@ -1,5 +1,7 @@
 //! The command line: arguments in, files and messages out. Uses the public library only.
 
+#[cfg(test)]
+mod any_words;
 mod args;
 mod bugs;
 mod compare;

@@ -11,7 +11,7 @@ use caustica::{
     Error, Result,
     gpu::Gpu,
     image::read_exr,
-    scene::Scene,
+    scene::{LoadOptions, Scene},
     settings::{Mode, Settings},
     study::{self, Finer, Look, Plan, Reference, Results, Subject},
 };
@@ -95,6 +95,10 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
     let look = Look { exposure: options.exposure, tonemap: options.tonemap.into() };
     let settings = options.settings();
     if args.preset == Some(PresetArg::Report) {
+        if options.loading.options() != LoadOptions::default() {
+            let problem = "has scenes of its own, which --scene, --allow-outside and --ignore-required do not change";
+            return Err(Error::Setting { name: "--preset", value: "report".to_owned(), problem: problem.to_owned() });
+        }
         let folder = args.scene.clone().unwrap_or_else(|| PathBuf::from(SCENES));
         let size = Some(options.size.unwrap_or(PRESET_SIZE));
         // The report's estimate, whatever became of it since.

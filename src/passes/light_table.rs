@@ -172,8 +172,7 @@ impl LightTable {
             LightKind::Directional => (layout::DIRECTIONAL_LIGHT, "directional", Vec3::ZERO),
         };
         self.start_group(&light.name, name);
-        let power =
-            crate::scene::Light { intensity: light.intensity_in(unit), ..light.clone() }.power(radius).as_dvec3();
+        let power = crate::scene::Light { intensity: light.intensity_in(unit), ..light.clone() }.power(radius);
         let (position, e1) = (light.position.to_array(), light.direction.to_array());
         let solid_angle = light.solid_angle();
         let light = layout::Light { position, kind, e1, e2: e2.to_array(), ..Default::default() };

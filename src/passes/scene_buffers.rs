@@ -12,7 +12,7 @@ use crate::{
     bvh::Bvh,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{self, BvhNode, Primitive},
+    layout::{self, BvhNode, DELTA_BIT, Primitive, SPHERE_BIT},
     scene::{Material, Scene, Surface},
     settings::{LightUnit, Sampler, Settings},
 };
@@ -50,7 +50,7 @@ impl SceneBuffers {
         let lights = LightBuffers::new(gpu, scene, bvh, settings)?;
         Ok(Self {
             nodes: Windows::new::<BvhNode>(gpu, "bvh nodes", &bvh.nodes)?,
-            primitives: Windows::new::<Primitive>(gpu, "primitives", &with_emitters(&bvh.primitives, &lights.table))?,
+            primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &lights.table))?,
             normals: gpu.storage_with("normals", &bvh.normals)?,
             materials: gpu.storage_with("materials", &materials)?,
             has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
@@ -118,12 +118,18 @@ fn window_or_all(window: u64) -> f64 {
     if window == 0 { f64::from(u32::MAX) } else { window as f64 }
 }
 
-/// The primitives, each with the light that it is.
-fn with_emitters<'a>(primitives: &'a [Primitive], lights: &LightTable) -> Cow<'a, [Primitive]> {
-    if !lights.has_surfaces() {
+/// The primitives, each with the light that it is, and those of delta surfaces marked.
+fn marked<'a>(primitives: &'a [Primitive], scene: &Scene, lights: &LightTable) -> Cow<'a, [Primitive]> {
+    let is_delta: Vec<bool> = scene.materials.iter().map(|m| m.surface.is_delta()).collect();
+    if !lights.has_surfaces() && !is_delta.contains(&true) {
         return Cow::Borrowed(primitives);
     }
-    primitives.iter().map(|p| Primitive { emitter: lights.emitter(p.id), ..*p }).collect()
+    let bits = |material: u32| {
+        let delta = is_delta.get((material & !SPHERE_BIT) as usize) == Some(&true);
+        if delta { material | DELTA_BIT } else { material }
+    };
+    let mark = |p: &Primitive| Primitive { emitter: lights.emitter(p.id), material: bits(p.material), ..*p };
+    primitives.iter().map(mark).collect()
 }
 
 fn material(material: &Material, unit: LightUnit) -> layout::Material {

@@ -1,6 +1,6 @@
 //! Cameras.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use serde::Serialize;
 
 use super::Bounds;
@@ -40,24 +40,40 @@ pub struct Camera {
     pub aspect: Option<f32>,
 }
 
-/// Angles of [`Camera::framing`], degrees: above the horizon, and of view.
-const ELEVATION: f32 = 15.0;
-const ANGLE_OF_VIEW: f32 = 40.0;
+/// Angles of [`Camera::framing`], degrees: from +Z towards +X, above the horizon, and of view.
+const AZIMUTH: f32 = 30.0;
+const ELEVATION: f32 = 22.0;
+const ANGLE_OF_VIEW: f32 = 35.0;
+
+/// Part of the picture that the box around all geometry may fill.
+const FILL: f32 = 0.94;
 
 impl Camera {
-    /// A camera that sees all of `bounds` in a square picture, along -Z and slightly from above.
+    /// A camera that sees all of `bounds` in a picture that is not higher than wide: from the front, which is +Z in glTF,
+    /// a little from the right and from above.
     #[must_use]
     pub fn framing(bounds: Bounds) -> Self {
-        let (radius, yfov) = (0.5 * bounds.diagonal(), ANGLE_OF_VIEW.to_radians());
-        let radius = if radius > 0.0 { radius } else { 1.0 };
-        let center = if bounds.min.x <= bounds.max.x { 0.5 * (bounds.min + bounds.max) } else { Vec3::ZERO };
-        let (sin, cos) = ELEVATION.to_radians().sin_cos();
-        let back = Vec3::new(0.0, sin, cos);
+        let is_empty = bounds.min.x > bounds.max.x;
+        let (center, half) = if is_empty {
+            (Vec3::ZERO, Vec3::ZERO)
+        } else {
+            (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min))
+        };
+        let half = if half == Vec3::ZERO { Vec3::ONE } else { half };
+        let turn = Quat::from_rotation_y(AZIMUTH.to_radians()) * Quat::from_rotation_x(-ELEVATION.to_radians());
+        let [right, up, back] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| turn * axis);
+        let yfov = ANGLE_OF_VIEW.to_radians();
+        let slope = FILL * (0.5 * yfov).tan();
+        // Each corner of the box asks for a distance at which it is in view.
+        let distance = (0..8)
+            .map(|i| half * Vec3::from_array([1, 2, 4].map(|bit| if i & bit == 0 { -1.0 } else { 1.0 })))
+            .map(|corner| corner.dot(right).abs().max(corner.dot(up).abs()) / slope + corner.dot(back))
+            .fold(0.0, f32::max);
         Self {
             name: "framing".to_owned(),
-            position: center + back * (radius / (0.5 * yfov).sin()),
-            right: Vec3::X,
-            up: Vec3::new(0.0, cos, -sin),
+            position: center + back * distance,
+            right,
+            up,
             forward: -back,
             projection: Projection::Perspective { yfov },
             aspect: None,

@@ -37,7 +37,7 @@ pub struct LightInfo {
     /// Unit vector along which it shines; none for a point light.
     pub direction: Option<[f32; 3]>,
     /// Power in W, each channel; of a directional light what the sphere around the scene's box catches.
-    pub power: [f32; 3],
+    pub power: [f64; 3],
 }
 
 /// All surfaces of one emissive material.
@@ -199,7 +199,7 @@ impl fmt::Display for LightInfo {
         if let Some(direction) = self.direction {
             write!(f, "  along {}", triple(direction.map(f64::from)))?;
         }
-        write!(f, "  {} W", triple(self.power.map(f64::from)))
+        write!(f, "  {} W", triple(self.power))
     }
 }
 

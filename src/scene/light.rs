@@ -3,7 +3,7 @@
 
 use std::f32::consts::PI;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::settings::LightUnit;
@@ -60,11 +60,13 @@ impl Light {
     /// Power, W in each channel: intensity times solid angle. A directional light sends as much as a disc of
     /// `scene_radius`, metres, catches.
     #[must_use]
-    pub fn power(&self, scene_radius: f32) -> Vec3 {
-        match self.kind {
-            LightKind::Point | LightKind::Spot { .. } => self.solid_angle() * self.intensity,
-            LightKind::Directional => PI * scene_radius * scene_radius * self.intensity,
-        }
+    pub fn power(&self, scene_radius: f32) -> DVec3 {
+        // In f64: of the brightest lights of f32 the product leaves its range.
+        let factor = match self.kind {
+            LightKind::Point | LightKind::Spot { .. } => f64::from(self.solid_angle()),
+            LightKind::Directional => std::f64::consts::PI * f64::from(scene_radius).powi(2),
+        };
+        factor * self.intensity.as_dvec3()
     }
 }
 

@@ -66,9 +66,16 @@ fn size_with_neighbours(path: &Path) -> u64 {
     entries.map(|entry| entry.expect("an entry").metadata().expect("its size").len()).sum()
 }
 
+/// The scene as the command reads it.
+fn load(path: &Path) -> Result<Scene, String> {
+    let mut scene = Scene::load(path).map_err(|error| error.to_string())?;
+    scene.add_default_light();
+    Ok(scene)
+}
+
 /// Renders in this process; says what is wrong with the picture.
 fn render(path: &Path) -> Result<(), String> {
-    let scene = Scene::load(path).map_err(|error| error.to_string())?;
+    let scene = load(path)?;
     let settings = Settings { neighbors: 10, ..common::settings(Mode::Hybrid, 500, 16) };
     let silent = caustica::progress::Silent;
     let render = caustica::renderer::render(common::gpu(), &scene, &settings, &silent).map_err(|e| e.to_string())?;
@@ -101,7 +108,7 @@ fn outcome(path: &Path, expected: Expected) -> Result<(), String> {
             Err(what) => Err(what),
         },
         Expected::Empty => {
-            let scene = Scene::load(path).map_err(|error| error.to_string())?;
+            let scene = load(path)?;
             match scene.check_renderable() {
                 Err(Error::Scene { problem, .. }) if problem.contains("nothing to draw") => Ok(()),
                 other => Err(format!("{other:?}")),

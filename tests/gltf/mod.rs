@@ -1,8 +1,10 @@
 //! Small glTF files made on the spot.
 #![allow(dead_code, reason = "no test uses all of them")]
 
+use std::path::Path;
+
 use base64::Engine as _;
-use caustica::scene::Scene;
+use caustica::scene::{LoadOptions, Scene};
 use serde_json::{Value, json};
 
 /// Numbers as a data URI.
@@ -61,10 +63,15 @@ pub fn add_accessor(gltf: &mut Value, bytes: &[u8], component: u32, count: usize
     push(gltf, "accessors", json!({ "bufferView": view, "componentType": component, "count": count, "type": kind }))
 }
 
-fn push(gltf: &mut Value, list: &str, item: Value) -> usize {
+pub fn push(gltf: &mut Value, list: &str, item: Value) -> usize {
     let list = gltf[list].as_array_mut().expect("a list");
     list.push(item);
     list.len() - 1
+}
+
+/// Appends an accessor without bytes of its own, all zeros.
+pub fn add_zeros(gltf: &mut Value, component: u32, count: u64, kind: &str) -> usize {
+    push(gltf, "accessors", json!({ "componentType": component, "count": count, "type": kind }))
 }
 
 /// Loads bytes as `test.gltf` in a folder of its own.
@@ -73,6 +80,11 @@ pub fn load_bytes(bytes: &[u8]) -> caustica::Result<Scene> {
     let path = folder.path().join("test.gltf");
     std::fs::write(&path, bytes).expect("a temporary file");
     Scene::load(&path)
+}
+
+/// Reads a file from memory, as `test.gltf` in a folder that is not there.
+pub fn read_with(gltf: &Value, options: &LoadOptions) -> caustica::Result<Scene> {
+    Scene::read(gltf.to_string().as_bytes(), Path::new("not/there/test.gltf"), options)
 }
 
 pub fn load(gltf: &Value) -> caustica::Result<Scene> {

@@ -1,20 +1,35 @@
 //! Accessors: every offset, stride, count and index is checked against the bytes that are there before any is used.
 
+use std::collections::HashMap;
+
 use glam::{DMat4, Vec3};
 use gltf::json;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 
-use super::buffers::Buffers;
+use super::buffers::{Buffers, slice};
+use super::draco;
 use super::fault::{Read, fault};
+use super::meshopt;
 
 /// Elements that an accessor without a bufferView (all zeros but for sparse ones) may have.
-const MAX_ZEROS: u64 = 1 << 24;
+pub(super) const MAX_ZEROS: u64 = 1 << 24;
 
 /// A parsed file with its bytes.
 pub(super) struct Document<'a> {
     pub(super) root: &'a json::Root,
-    pub(super) buffers: Buffers<'a>,
+    buffers: Buffers<'a>,
+    /// What compressed bufferViews hold.
+    views: Vec<Option<Vec<u8>>>,
+    /// What compressed primitives hold, by accessor.
+    unpacked: HashMap<usize, Unpacked>,
+}
+
+/// Elements of an accessor that come out of a compressed primitive, one after the other.
+#[derive(Debug)]
+pub(super) struct Unpacked {
+    pub(super) bytes: Vec<u8>,
+    pub(super) format: Format,
 }
 
 /// Shape of an accessor's elements.
@@ -34,7 +49,7 @@ impl Format {
     }
 
     /// Bytes of one element. Matrices of small integers, whose columns are padded, are read by nobody.
-    fn size(self) -> usize {
+    pub(super) fn size(self) -> usize {
         self.component.size() * self.kind.multiplicity()
     }
 }
@@ -126,6 +141,9 @@ impl Column<'_> {
     pub(super) fn vector(&self, i: usize) -> Vec3 {
         let size = self.format.component.size();
         self.bytes(i).map_or(Vec3::ZERO, |bytes| {
+            if self.format.component == ComponentType::F32 {
+                return Vec3::new(float32(bytes), float32(&bytes[4..]), float32(&bytes[8..]));
+            }
             let [x, y, z] = [0, 1, 2].map(|c| number(&bytes[c * size..], self.format));
             Vec3::new(x, y, z)
         })
@@ -175,10 +193,17 @@ impl Column<'_> {
 }
 
 impl<'a> Document<'a> {
+    /// Decodes what is compressed in the buffers.
+    pub(super) fn new(root: &'a json::Root, buffers: Buffers<'a>) -> Read<Self> {
+        let views = meshopt::decode(root, &buffers)?;
+        let mut document = Self { root, buffers, views, unpacked: HashMap::new() };
+        document.unpacked = draco::decode(&document)?;
+        Ok(document)
+    }
+
     /// Checks all views and accessors, also those that nothing uses: ranges, references, and that floats are finite.
     pub(super) fn check(&self) -> Read<()> {
-        let plain = |view: &json::buffer::View| view.extensions.as_ref().is_none_or(|e| e.others.is_empty());
-        for (i, _) in self.root.buffer_views.iter().enumerate().filter(|(_, view)| plain(view)) {
+        for i in 0..self.root.buffer_views.len() {
             self.view(i, "")?;
         }
         for i in 0..self.root.accessors.len() {
@@ -199,10 +224,19 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
+    /// Bytes of all buffers.
+    pub(super) fn held(&self) -> u64 {
+        self.buffers.iter().flatten().map(|bytes| bytes.len() as u64).sum()
+    }
+
     /// Number of elements and their format.
     pub(super) fn shape(&self, index: usize, place: &str) -> Read<(usize, Format)> {
         let accessor = self.accessor(index, place)?;
-        Ok((accessor.count.0 as usize, Format::of(accessor, place)?))
+        let format = match self.unpacked.get(&index) {
+            Some(unpacked) => unpacked.format,
+            None => Format::of(accessor, place)?,
+        };
+        Ok((accessor.count.0 as usize, format))
     }
 
     /// The elements of an accessor that `place` names.
@@ -211,6 +245,11 @@ impl<'a> Document<'a> {
         let place = format!("accessors[{index}]");
         let format = Format::of(accessor, &place)?;
         let count = accessor.count.0;
+        if let Some(Unpacked { bytes, format }) = self.unpacked.get(&index) {
+            let size = format.size();
+            let dense = Some(Elements { bytes, stride: size, size, count: count as usize });
+            return Ok(Column { format: *format, count: count as usize, dense, sparse: None });
+        }
         let dense = match accessor.buffer_view {
             Some(view) => {
                 let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
@@ -246,7 +285,7 @@ impl<'a> Document<'a> {
         })
     }
 
-    fn accessor(&self, index: usize, place: &str) -> Read<&'a Accessor> {
+    pub(super) fn accessor(&self, index: usize, place: &str) -> Read<&'a Accessor> {
         let known = self.root.accessors.len();
         self.root.accessors.get(index).map_or_else(|| fault(place, format!("accessor {index} of {known}")), Ok)
     }
@@ -278,24 +317,15 @@ impl<'a> Document<'a> {
     }
 
     /// Bytes of a bufferView.
-    fn view(&self, index: usize, place: &str) -> Read<&[u8]> {
+    pub(super) fn view(&self, index: usize, place: &str) -> Read<&[u8]> {
         let Some(view) = self.root.buffer_views.get(index) else {
             return fault(format!("{place}.bufferView"), format!("{index} of {}", self.root.buffer_views.len()));
         };
-        let place = format!("bufferViews[{index}]");
-        let buffer = view.buffer.value();
-        let Some(data) = self.buffers.get(buffer) else {
-            return fault(format!("{place}.buffer"), format!("{buffer} of {}", self.buffers.len()));
-        };
-        let Some(data) = data else {
-            return fault(format!("buffers[{buffer}]"), "has no uri, and there is no binary chunk for it");
-        };
-        let (offset, length) = (view.byte_offset.map_or(0, |offset| offset.0), view.byte_length.0);
-        let size = self.root.buffers[buffer].byte_length.0.min(data.len() as u64);
-        match offset.checked_add(length) {
-            Some(end) if end <= size => Ok(&data[offset as usize..end as usize]),
-            _ => fault(place, format!("{length} bytes at {offset} run past buffers[{buffer}], which has {size}")),
+        if let Some(decoded) = &self.views[index] {
+            return Ok(decoded);
         }
+        let (offset, length) = (view.byte_offset.map_or(0, |offset| offset.0), view.byte_length.0);
+        slice(&self.buffers, view.buffer.value(), offset, length, &format!("bufferViews[{index}]"))
     }
 }
 

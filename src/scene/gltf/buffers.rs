@@ -8,9 +8,13 @@ use sha2::{Digest as _, Sha256};
 
 use super::fault::{Read, fault};
 use super::files::Resources;
+use super::meshopt;
 
 /// Bytes of each buffer, exactly `byteLength` of them; `None` where the file gives no data.
 pub(super) type Buffers<'a> = Vec<Option<Cow<'a, [u8]>>>;
+
+/// What is said of a buffer whose bytes are nowhere.
+const NO_DATA: &str = "has no uri, and there is no binary chunk for it";
 
 /// Reads all buffers; `hash` takes the bytes of the files among them.
 pub(super) fn read<'a>(root: &json::Root, resources: &Resources<'a>, hash: &mut Sha256) -> Read<Buffers<'a>> {
@@ -18,11 +22,10 @@ pub(super) fn read<'a>(root: &json::Root, resources: &Resources<'a>, hash: &mut 
     for (i, buffer) in root.buffers.iter().enumerate() {
         let place = format!("buffers[{i}]");
         let length = buffer.byte_length.0;
-        let is_plain = buffer.extensions.as_ref().is_none_or(|extensions| extensions.others.is_empty());
         let bytes = match &buffer.uri {
             None if i == 0 && resources.bin.is_some() => resources.bin.map(Cow::Borrowed),
-            None if is_plain => return fault(place, "has no uri, and there is no binary chunk for it"),
-            None => None,
+            None if meshopt::is_fallback(buffer) => None,
+            None => return fault(place, NO_DATA),
             Some(uri) if uri.starts_with("data:") => Some(Cow::Owned(decode_data_uri(uri, &place)?)),
             Some(uri) => {
                 let bytes = resources.read_file(uri, length, &format!("{place}.uri"))?;
@@ -30,14 +33,40 @@ pub(super) fn read<'a>(root: &json::Root, resources: &Resources<'a>, hash: &mut 
                 Some(Cow::Owned(bytes))
             }
         };
-        if let Some(bytes) = &bytes
-            && (bytes.len() as u64) < length
-        {
+        let Some(bytes) = bytes else {
+            buffers.push(None);
+            continue;
+        };
+        if (bytes.len() as u64) < length {
             return fault(place, format!("byteLength is {length}, but there are {} bytes", bytes.len()));
         }
-        buffers.push(bytes);
+        buffers.push(Some(match bytes {
+            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[..length as usize]),
+            Cow::Owned(mut bytes) => {
+                bytes.truncate(length as usize);
+                Cow::Owned(bytes)
+            }
+        }));
     }
     Ok(buffers)
+}
+
+/// Bytes of a buffer that something refers to.
+pub(super) fn slice<'b>(
+    buffers: &'b Buffers<'_>,
+    buffer: usize,
+    offset: u64,
+    length: u64,
+    place: &str,
+) -> Read<&'b [u8]> {
+    let Some(data) = buffers.get(buffer) else {
+        return fault(format!("{place}.buffer"), format!("{buffer} of {}", buffers.len()));
+    };
+    let Some(data) = data else { return fault(format!("buffers[{buffer}]"), NO_DATA) };
+    match offset.checked_add(length) {
+        Some(end) if end <= data.len() as u64 => Ok(&data[offset as usize..end as usize]),
+        _ => fault(place, format!("{length} bytes at {offset} run past buffers[{buffer}], which has {}", data.len())),
+    }
 }
 
 /// Bytes of a data URI (RFC 2397), base64 or percent-encoded.

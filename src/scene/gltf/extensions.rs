@@ -1,10 +1,14 @@
 //! The extensions that a file may use or require.
 
+use std::collections::HashSet;
+
 use super::fault::{Notes, Read, fault};
 
 /// Extensions that are read, or that change nothing which is read.
-const SUPPORTED: [&str; 11] = [
+const SUPPORTED: [&str; 13] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "KHR_draco_mesh_compression",
     "KHR_implicit_shapes",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
@@ -27,6 +31,7 @@ pub(super) fn check(used: &[String], required: &[String], ignored: &[String], no
         }
         notes.add(format!("extension {name} is required, but not read"));
     }
+    let required: HashSet<&String> = required.iter().collect();
     for name in used.iter().filter(unsupported).filter(|name| !required.contains(name)) {
         notes.add(format!("extension {name} is not read"));
     }

@@ -1,6 +1,6 @@
 //! What is wrong with a file, before the file's name is known, and what was ignored in it.
 
-use std::path::Path;
+use std::{collections::HashSet, path::Path};
 
 use crate::Error;
 
@@ -28,13 +28,20 @@ impl Fault {
 
 /// What was ignored or read in a special way: each line once, in the order of its first appearance.
 #[derive(Debug, Default)]
-pub(crate) struct Notes(pub(crate) Vec<String>);
+pub(crate) struct Notes {
+    lines: Vec<String>,
+    known: HashSet<String>,
+}
 
 impl Notes {
     pub(crate) fn add(&mut self, note: impl Into<String>) {
         let note = note.into();
-        if !self.0.contains(&note) {
-            self.0.push(note);
+        if self.known.insert(note.clone()) {
+            self.lines.push(note);
         }
+    }
+
+    pub(crate) fn into_lines(self) -> Vec<String> {
+        self.lines
     }
 }

@@ -58,6 +58,10 @@ fn surface(material: &json::Material, name: &str, place: &str, notes: &mut Notes
         }
         note_roughness(roughness, name, notes);
         let ior = ior(material, place)?;
+        if ior == 0.0 {
+            notes.add(format!("material {name:?}: ior 0 reflects all light, as a white mirror"));
+            return Ok(Surface::Mirror { tint: Vec3::ONE });
+        }
         return Ok(if thickness > 0.0 {
             Surface::Glass { ior, tint: color }
         } else {
@@ -97,16 +101,16 @@ fn specular_factor(material: &json::Material) -> f32 {
     specular.map_or(1.0, |specular| specular.specular_factor.0)
 }
 
-/// Index of refraction, ≥ 1.
+/// Index of refraction, ≥ 1; or 0, for which Fresnel's equations are to give 1 (KHR_materials_ior).
 fn ior(material: &json::Material, place: &str) -> Read<f32> {
     let ior = material.extensions.as_ref().and_then(|extensions| extensions.ior.as_ref());
     let ior = ior.map_or(DEFAULT_IOR, |ior| ior.ior.0);
-    if ior.is_finite() && ior >= 1.0 {
+    if ior.is_finite() && (ior >= 1.0 || ior == 0.0) {
         Ok(ior)
     } else {
         fault(
             format!("{place}.extensions.KHR_materials_ior.ior"),
-            format!("{ior} is not an index of refraction from 1"),
+            format!("{ior} is not an index of refraction from 1, nor 0"),
         )
     }
 }

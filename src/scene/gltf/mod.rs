@@ -17,6 +17,7 @@ mod accessor;
 mod buffers;
 mod cameras;
 mod container;
+mod draco;
 mod extensions;
 mod fault;
 mod files;
@@ -25,6 +26,7 @@ mod lights;
 mod materials;
 mod memory;
 mod meshes;
+mod meshopt;
 mod nodes;
 mod placing;
 mod primitives;
@@ -84,7 +86,7 @@ fn assemble(
     mut hash: Sha256,
     mut notes: Notes,
 ) -> Read<Scene> {
-    let document = Document { root, buffers: buffers::read(root, resources, &mut hash)? };
+    let document = Document::new(root, buffers::read(root, resources, &mut hash)?)?;
     document.check()?;
     skins::check(&document)?;
     let shapes = meshes::check(&document, &mut notes)?;
@@ -116,7 +118,7 @@ fn assemble(
     scene.spheres = carried.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
     carried.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    scene.warnings = notes.0;
+    scene.warnings = notes.into_lines();
     Ok(scene)
 }
 

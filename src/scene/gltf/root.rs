@@ -5,7 +5,10 @@ use serde_json::{Map, Value};
 
 use super::extensions;
 use super::fault::{Notes, Read, fault};
-use super::strict_json::{elements, member, objects, parse};
+use super::strict_json::{elements, member, objects, parse, read_element};
+
+/// Materials that a file may have.
+const MAX_MATERIALS: usize = 1 << 16;
 
 /// Parses the JSON text; refuses versions and required extensions that are not read, by name. What is never used
 /// (textures, samplers, animations, and of images all but their files' names) is left out.
@@ -30,7 +33,7 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
         meshes: elements(&mut file, "meshes")?,
         skins: elements(&mut file, "skins")?,
         cameras: elements(&mut file, "cameras")?,
-        materials: elements(&mut file, "materials")?,
+        materials: read_materials(&mut file)?,
         accessors: elements(&mut file, "accessors")?,
         buffer_views: elements(&mut file, "bufferViews")?,
         buffers: elements(&mut file, "buffers")?,
@@ -70,10 +73,22 @@ fn read_asset(file: &mut Map<String, Value>) -> Read<json::Asset> {
 
 /// The scenes. One without nodes is legal, but the crate wants the list.
 fn read_scenes(file: &mut Map<String, Value>) -> Read<Vec<json::Scene>> {
-    for scene in file.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+    let mut scenes = Vec::new();
+    for (i, mut scene) in objects(file, "scenes")?.into_iter().enumerate() {
         if let Some(scene) = scene.as_object_mut() {
             scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
         }
+        scenes.push(read_element(scene, "scenes", i)?);
     }
-    elements(file, "scenes")
+    Ok(scenes)
+}
+
+/// The materials, whose number is bounded because each takes much more memory than text.
+fn read_materials(file: &mut Map<String, Value>) -> Read<Vec<json::Material>> {
+    match file.get("materials").and_then(Value::as_array).map_or(0, Vec::len) {
+        count if count > MAX_MATERIALS => {
+            fault("materials", format!("{count} of them, at most {MAX_MATERIALS} are read"))
+        }
+        _ => elements(file, "materials"),
+    }
 }

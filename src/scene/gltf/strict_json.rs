@@ -23,9 +23,14 @@ pub(super) fn elements<T: DeserializeOwned>(object: &mut Map<String, Value>, nam
     let list = objects(object, name)?;
     let mut elements = Vec::with_capacity(list.len());
     for (i, element) in list.into_iter().enumerate() {
-        elements.push(T::deserialize(element).or_else(|error| fault(format!("{name}[{i}]"), error.to_string()))?);
+        elements.push(read_element(element, name, i)?);
     }
     Ok(elements)
+}
+
+/// Element `i` of a list.
+pub(super) fn read_element<T: DeserializeOwned>(element: Value, list: &str, i: usize) -> Read<T> {
+    T::deserialize(element).or_else(|error| fault(format!("{list}[{i}]"), error.to_string()))
 }
 
 /// The elements of a list as they are, which must be objects; none where the list is missing.
