@@ -1,7 +1,6 @@
 //! Pictures of radiance that others made, OpenEXR and Radiance HDR, read for their colours alone.
 
 use std::{
-    fs::File,
     io::{self, Cursor, Read},
     path::Path,
 };
@@ -13,6 +12,7 @@ use exr::{
 };
 use image::{ImageDecoder, ImageError, codecs::hdr::HdrDecoder};
 
+use super::file::open_regular;
 use crate::error::{Error, Result};
 
 /// Bytes of a file that are read: more than the largest picture takes uncompressed.
@@ -48,8 +48,8 @@ type Problem = Box<dyn std::error::Error + Send + Sync>;
 /// [`Error::Io`] if it cannot be read, begins otherwise or is too large.
 pub(crate) fn read_radiance_bytes(path: &Path) -> Result<Vec<u8>> {
     let read = || -> std::result::Result<Vec<u8>, Problem> {
-        let mut file = File::open(path)?;
-        // Only what looks right is read to the end: the path may be that of a device.
+        let mut file = open_regular(path)?;
+        // Only what looks right is read to the end.
         let mut bytes = Vec::new();
         file.by_ref().take(EXR.len() as u64).read_to_end(&mut bytes)?;
         if !bytes.starts_with(EXR) && !bytes.starts_with(HDR) {
