@@ -197,10 +197,12 @@ pub struct VisiblePoint {
     pub offset: f32,
     /// Geometric normal, unit, on the viewer's side.
     pub ng: [f32; 3],
-    pub pad0: u32,
+    /// Media around the point as in [`Light::media`], 16 bits each: the two outermost, and below the others. 0 and 0 for none, and
+    /// where one of them is not among the first 65,535 materials.
+    pub media_outer: u32,
     /// Interpolated normal, unit, on the viewer's side of the geometric one.
     pub ns: [f32; 3],
-    pub pad1: u32,
+    pub media_inner: u32,
 }
 
 /// What happens to a batch of paths; see `shaders/lib/queue.wesl`. A batch has at most 2^19 paths of at most 4095 bounces, so that

@@ -48,7 +48,7 @@ fn twins() -> Vec<Twin> {
         Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
         Path { origin, flags, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
-        VisiblePoint { position, valid, weight, offset, ng, pad0, ns, pad1 }
+        VisiblePoint { position, valid, weight, offset, ng, media_outer, ns, media_inner }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
         Store { staged, first_photon, photons, map_bit }

@@ -74,13 +74,13 @@ fn a_light_in_nested_glass_sends_out_what_is_not_trapped() {
     let mut scene = ball_in_shell();
     add_box(&mut scene, Vec3::splat(-3.0), Vec3::splat(3.0), 2);
     scene.lights.push(point_light(vec3(ASIDE, 0.0, 0.0), 1.0));
-    let settings = Settings { max_bounces: 60, ..settings(Mode::IndirectPhotons, 20_000, 8) };
+    let settings = Settings { max_bounces: 40, max_paths: Some(20_000), ..settings(Mode::IndirectPhotons, 20_000, 8) };
     let traced = traced(&scene, &settings);
     assert_eq!((traced.non_finite, traced.unfinished), (0, 0));
     let power = 4.0 * PI;
     let leaving = |critical: f64| power * (1.0 - (1.0 - critical * critical).sqrt());
     let flux = flux(&traced.caustic);
-    assert!(within(flux, leaving(critical_sine()), 0.03), "{flux} W instead of {}", leaving(critical_sine()));
+    assert!(within(flux, leaving(critical_sine()), 0.04), "{flux} W instead of {}", leaving(critical_sine()));
     assert!(!within(flux, leaving(wrong_critical_sine()), 0.5), "control: as from air");
 }
 
@@ -118,8 +118,28 @@ fn what_lies_in_the_same_glass_is_lit_by_rays_and_photons_alike() {
     add_quad(&mut scene, vec3(-0.8, -0.5, 0.8), vec3(1.6, 0.0, 0.0), vec3(0.0, 0.0, -1.6), 0);
     scene.lights.push(point_light(vec3(0.0, 0.3, 0.0), 1.0));
     scene.cameras.push(camera(vec3(0.0, 0.6, 0.001), vec3(0.0, -0.5, 0.0), 30.0));
-    let of = |mode| mean(&render_scene(&scene, &Settings { max_bounces: 12, ..settings(mode, 20_000, 8) }));
+    let of = |mode| mean(&render_scene(&scene, &Settings { max_bounces: 12, ..settings(mode, 10_000, 6) }));
     let (hybrid, photons) = (of(Mode::Hybrid), of(Mode::Photons));
-    assert!(within(photons, hybrid, 0.04), "{photons} by photons, {hybrid} with rays");
+    assert!(within(photons, hybrid, 0.05), "{photons} by photons, {hybrid} with rays");
     assert!(!within(photons, 0.5 * hybrid, 0.3) && hybrid > 0.1, "control");
+}
+
+#[test]
+fn rays_of_final_gathering_start_in_what_is_around_them() {
+    // A floor in a block of water in one of flint, in a room that is lit beside them: light comes in over the walls.
+    let of = |ior: f64| Surface::Glass { ior: ior as f32, tint: Vec3::ONE };
+    let mut scene = scene(&[of(FLINT), of(WATER), diffuse(0.8)]);
+    add_box(&mut scene, Vec3::splat(-0.6), Vec3::splat(0.6), 0);
+    add_box(&mut scene, Vec3::splat(-0.5), Vec3::splat(0.5), 1);
+    add_box(&mut scene, Vec3::splat(-2.0), Vec3::splat(2.0), 2);
+    add_quad(&mut scene, vec3(-0.4, -0.4, 0.4), vec3(0.8, 0.0, 0.0), vec3(0.0, 0.0, -0.8), 2);
+    scene.lights.push(point_light(vec3(1.5, 0.0, 0.0), 10.0));
+    scene.cameras.push(camera(vec3(0.0, 0.4, 0.001), vec3(0.0, -0.4, 0.0), 40.0));
+    let of = |final_gather: u32| {
+        let settings = Settings { final_gather, ..settings(Mode::IndirectPhotons, 20_000, 6) };
+        mean(&render_scene(&scene, &settings))
+    };
+    let (estimated, gathered) = (of(0), of(32));
+    assert!(within(gathered, estimated, 0.1), "{gathered} by final gathering, {estimated} without");
+    assert!(!within(gathered, estimated / (FLINT * FLINT), 0.5), "control: as if the rays left from water into air");
 }

@@ -23,7 +23,7 @@ fn room(intensity: f32, radiance: f32) -> Scene {
 }
 
 fn picture(scene: &Scene, seed: u32) -> Render {
-    let settings = Settings { seed, light_samples: 1, neighbors: 30, ..settings(Mode::Hybrid, 5000, 12) };
+    let settings = Settings { seed, light_samples: 1, neighbors: 30, ..settings(Mode::Hybrid, 3000, 8) };
     render_scene(scene, &settings)
 }
 
