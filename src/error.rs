@@ -16,7 +16,7 @@ pub enum Error {
     #[error("{0}")]
     Device(String),
     /// Something is larger than the adapter allows.
-    #[error("{what} needs {needed} {unit}, but {limit} of {adapter} is {allowed}; {advice}")]
+    #[error("{what} needs {needed} {unit}, but {limit} of {adapter} allows {allowed}; {advice}")]
     Limit {
         what: String,
         needed: u64,

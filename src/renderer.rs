@@ -221,7 +221,11 @@ pub(crate) fn picture_size(camera: &Camera, settings: &Settings) -> Result<(u32,
         return Err(Error::Setting {
             name: "size",
             value: format!("{width}x{height}"),
-            problem: format!("needs about {} MiB of memory, {} MiB are free", needed >> 20, free >> 20),
+            problem: format!(
+                "needs about {} MiB of memory, {} MiB are free; ask for a smaller --size, or for parts of it with --crop",
+                needed >> 20,
+                free >> 20
+            ),
         });
     }
     Ok((width, height))

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | destroys | an output over any file that is read, or over another output, is refused before the work | a path beside it is written |
 //! | full | a file that cannot be written whole is an error, and the older one stays | without the limit it is replaced |
-//! | places | folders, files as folders and names too long are refused before the work | names that are only long or odd are written |
+//! | places | folders, files as folders, names too long, and pipes to read are refused before the work | names that are only long or odd are written |
 //! | closed | a reader that has gone, or a full disk behind stderr, is no failure | what is read is all there |
 //! | stops | SIGINT and SIGTERM end every stage of every command, and leave no file | a run that is not stopped goes on |
 #![cfg(unix)]
@@ -175,6 +175,16 @@ fn places_that_cannot_be_written_are_refused_before_the_work() {
     ] {
         let text = refusal(folder.path(), &format!("{QUICK} -q -o {output}"));
         assert!(text.contains(said), "{output}: {text}");
+    }
+    // Nobody writes into the pipe: what reads it would wait for ever.
+    let made = Command::new("mkfifo").arg(folder.path().join("pipe.exr")).status().expect("mkfifo runs");
+    assert!(made.success());
+    for line in [
+        format!("{QUICK} -q -o a.exr --env pipe.exr"),
+        "study scene.gltf -q -o out --photons 1k -k 1 --reference pipe.exr".to_string(),
+    ] {
+        let text = refusal(folder.path(), &line);
+        assert!(text.contains("pipe.exr: is not a regular file"), "{line}: {text}");
     }
     // Controls: a name as long as names can be, and one that is no text.
     let odd = OsStr::from_bytes(b"\xff\xfe.png");

@@ -40,9 +40,9 @@ fn parse(bytes: &[u8]) -> Option<(Value, Option<Vec<u8>>)> {
         return Some((serde_json::from_slice(bytes).ok()?, None));
     }
     let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize);
-    let end = 20 + word(12)?;
+    let end = word(12)?.checked_add(20)?;
     let root = serde_json::from_slice(bytes.get(20..end)?).ok()?;
-    Some((root, Some(bytes.get(end + 8..).unwrap_or_default().to_vec())))
+    Some((root, Some(bytes.get(end.checked_add(8)?..).unwrap_or_default().to_vec())))
 }
 
 fn assemble(root: &Value, bin: Option<&[u8]>) -> Vec<u8> {
@@ -169,8 +169,8 @@ fn descend<'a>(value: &'a mut Value, dice: &mut Dice) -> &'a mut Value {
 /// A number near another one, or one at an edge of what formats can hold.
 fn number(now: f64, dice: &mut Dice) -> Value {
     match dice.below(5) {
-        0 => json!(now as i64 + 1),
-        1 => json!(now as i64 - 1),
+        0 => json!((now as i64).saturating_add(1)),
+        1 => json!((now as i64).saturating_sub(1)),
         2 => json!(now * 2.0),
         3 => json!(dice.below(9)),
         _ => serde_json::from_str(dice.word(NUMBERS)).unwrap_or_default(),

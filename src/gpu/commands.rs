@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     Gpu,
-    pace::Part,
+    pace::{LEAST_TIMED, Part},
     timer::{Timed, Timings},
 };
 
@@ -66,7 +66,7 @@ impl<'g> Commands<'g> {
     fn record(&mut self, stem: &'static str, part: &Part, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
         self.gpu.dispatches.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         self.seconds += part.seconds.unwrap_or(f64::INFINITY);
-        let timer = self.gpu.timer.as_ref();
+        let timer = self.gpu.timer.as_ref().filter(|_| part.invocations >= LEAST_TIMED);
         let timed = timer.map(|timer| timer.time(&mut self.timings, Timed { stem, invocations: part.invocations }));
         let mut pass = self
             .encoder

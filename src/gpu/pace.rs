@@ -30,6 +30,8 @@ const MOST_PER_SUBMISSION: Duration = Duration::from_millis(100);
 pub(super) const LEAST_PART: u64 = 4096;
 /// Invocations of a part of a kernel that was never measured.
 pub(super) const UNMEASURED: u64 = 1 << 14;
+/// Invocations of a part that is timed, at least: fewer tell of latency, not of cost.
+pub(super) const LEAST_TIMED: u64 = LEAST_PART / 2;
 /// What is left of a cost that later measures fall below. Slow, for a queue of paths that dries up measures less and less.
 const DECAY: f64 = 0.98;
 
@@ -75,11 +77,8 @@ impl Pace {
         seconds == 0.0 || seconds + part.seconds.unwrap_or(f64::INFINITY) <= MOST_PER_SUBMISSION.as_secs_f64()
     }
 
-    /// Takes note of what a part took. Too few invocations tell of latency, not of cost.
+    /// Takes note of what a part of at least [`LEAST_TIMED`] invocations took.
     pub fn measured(&self, stem: &'static str, invocations: u64, seconds: f64) {
-        if invocations < LEAST_PART / 2 {
-            return;
-        }
         let cost = (seconds / invocations as f64).max(1e-15);
         let mut costs = self.costs.lock().unwrap_or_else(PoisonError::into_inner);
         costs.entry(stem).and_modify(|old| *old = cost.max(DECAY * *old)).or_insert(cost);
@@ -127,9 +126,6 @@ mod tests {
         for _ in 0..2000 {
             pace.measured("kernel", LEAST_PART, 0.0);
         }
-        assert_eq!(pace.part("kernel", 1 << 17).invocations, 1 << 17);
-        // What is too small to fill a device says nothing.
-        pace.measured("kernel", 64, 1.0);
         assert_eq!(pace.part("kernel", 1 << 17).invocations, 1 << 17);
     }
 

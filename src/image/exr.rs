@@ -4,7 +4,11 @@
 //! name before a dot is a layer. Every reader takes this form, whereas many read only the first of several parts. The
 //! format wants channels stored in alphabetical order; readers show R, G, B, A first whatever the order.
 
-use std::{collections::BTreeMap, io::Cursor, path::Path};
+use std::{
+    collections::BTreeMap,
+    io::{Cursor, Read},
+    path::Path,
+};
 
 use exr::{
     math::Vec2,
@@ -15,7 +19,7 @@ use exr::{
     },
 };
 
-use super::{Frame, PlaceInWhole, write_file};
+use super::{Frame, PlaceInWhole, file::open_regular, write_file};
 use crate::{
     error::{Error, Result},
     settings::Settings,
@@ -208,13 +212,18 @@ pub fn read_exr_attributes(path: &Path) -> Result<BTreeMap<String, String>> {
 }
 
 fn open(path: &Path) -> Result<Image<exr::image::Layer<AnyChannels<FlatSamples>>>> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
+    let mut bytes = Vec::new();
+    open_regular(path)
+        .and_then(|mut file| file.read_to_end(&mut bytes))
+        .map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
     exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .first_valid_layer()
         .all_attributes()
+        // A job of exr's that panics on a thread of its own would end the process.
+        .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(|e| failure(path, e))
 }

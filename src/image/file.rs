@@ -48,6 +48,19 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     write().map_err(|source| Error::Io { path: path.to_path_buf(), source })
 }
 
+/// Opens a file to be read. Pipes and devices are refused: they may never end, or never begin.
+///
+/// # Errors
+/// What the system says, and folders and all that is no file.
+pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
+    let found = fs::metadata(path)?;
+    match (found.is_dir(), found.is_file()) {
+        (true, _) => Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder")),
+        (_, false) => Err(io::Error::new(io::ErrorKind::InvalidInput, "is not a regular file")),
+        _ => File::open(path),
+    }
+}
+
 /// Finds out, before hours of work, whether [`write_file`] could write there now.
 ///
 /// # Errors

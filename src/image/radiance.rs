@@ -1,7 +1,6 @@
 //! Pictures of radiance that others made, OpenEXR and Radiance HDR, read for their colours alone.
 
 use std::{
-    fs::File,
     io::{self, Cursor, Read},
     path::Path,
 };
@@ -13,12 +12,18 @@ use exr::{
 };
 use image::{ImageDecoder, ImageError, codecs::hdr::HdrDecoder};
 
+use super::file::open_regular;
 use crate::error::{Error, Result};
 
 /// Bytes of a file that are read: more than the largest picture takes uncompressed.
 const MAX_BYTES: u64 = 4 << 30;
 /// Pixels of a picture: 16384 x 8192.
 const MAX_PIXELS: u64 = 1 << 27;
+
+/// Pixels that any file may claim, and those that it may claim for each of its bytes: the best of the formats'
+/// compressions, deflate, makes 1032 bytes of one.
+const PIXELS_BEFORE_DOUBT: u64 = 1 << 20;
+const PIXELS_PER_BYTE: u64 = 1032;
 
 /// How files of the two formats begin.
 const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
@@ -43,8 +48,8 @@ type Problem = Box<dyn std::error::Error + Send + Sync>;
 /// [`Error::Io`] if it cannot be read, begins otherwise or is too large.
 pub(crate) fn read_radiance_bytes(path: &Path) -> Result<Vec<u8>> {
     let read = || -> std::result::Result<Vec<u8>, Problem> {
-        let mut file = File::open(path)?;
-        // Only what looks right is read to the end: the path may be that of a device.
+        let mut file = open_regular(path)?;
+        // Only what looks right is read to the end.
         let mut bytes = Vec::new();
         file.by_ref().take(EXR.len() as u64).read_to_end(&mut bytes)?;
         if !bytes.starts_with(EXR) && !bytes.starts_with(HDR) {
@@ -80,12 +85,16 @@ fn failure(path: &Path, problem: Problem) -> Error {
     Error::Io { path: path.to_path_buf(), source }
 }
 
-/// Width and height of a picture that may be read.
-fn checked_size(width: u64, height: u64) -> std::result::Result<(u32, u32), Problem> {
-    match (u32::try_from(width), u32::try_from(height)) {
-        (Ok(w @ 1..), Ok(h @ 1..)) if width * height <= MAX_PIXELS => Ok((w, h)),
-        _ => Err(format!("is {width} x {height} pixels; 1 to {MAX_PIXELS} pixels are read").into()),
+/// Width and height of a picture that may be read, given the length of its file.
+fn checked_size(width: u64, height: u64, length: usize) -> std::result::Result<(u32, u32), Problem> {
+    let (width, height) = match (u32::try_from(width), u32::try_from(height)) {
+        (Ok(w @ 1..), Ok(h @ 1..)) if width * height <= MAX_PIXELS => (w, h),
+        _ => return Err(format!("is {width} x {height} pixels; 1 to {MAX_PIXELS} pixels are read").into()),
+    };
+    if u64::from(width) * u64::from(height) > PIXELS_BEFORE_DOUBT + PIXELS_PER_BYTE * length as u64 {
+        return Err(format!("is damaged: {length} bytes do not hold {width} x {height} pixels").into());
     }
+    Ok((width, height))
 }
 
 /// What a decoder says of a file that it does not take to its end.
@@ -111,7 +120,7 @@ fn decode_hdr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
     let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(of_hdr)?;
     let exposure = decoder.metadata().exposure.unwrap_or(1.0);
     let (width, height) = decoder.dimensions();
-    let (width, height) = checked_size(width.into(), height.into())?;
+    let (width, height) = checked_size(width.into(), height.into(), bytes.len())?;
     let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
     decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(of_hdr)?;
     let note = format!("its EXPOSURE of {exposure} is not undone, as in other renderers");
@@ -135,6 +144,7 @@ fn channels(header: &Header) -> Option<Channels> {
     colors.find(|names| names.iter().all(|name| has(name))).map(Channels::Rgb).or(luminance)
 }
 
+// On one thread: a job of exr's that panics on its own would end the process.
 fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(of_exr)?;
     let part = meta.headers.iter().filter(|header| !header.deep).find_map(|header| Some((header, channels(header)?)));
@@ -142,9 +152,9 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
     if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
         return Err("has subsampled channels, which are not read".into());
     }
-    checked_size(header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+    checked_size(header.layer_size.width() as u64, header.layer_size.height() as u64, bytes.len())?;
     let display = header.shared_attributes.display_window;
-    let (width, height) = checked_size(display.size.width() as u64, display.size.height() as u64)?;
+    let (width, height) = checked_size(display.size.width() as u64, display.size.height() as u64, bytes.len())?;
     let window = Window { width, height, offset: header.own_attributes.layer_position - display.position };
     let read = exr::prelude::read().no_deep_data().largest_resolution_level().specific_channels();
     let pixels = match channels {
@@ -158,6 +168,7 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
                 )
                 .first_valid_layer()
                 .all_attributes()
+                .non_parallel()
                 .from_buffered(Cursor::new(bytes))
                 .map_err(of_exr)?
                 .layer_data
@@ -172,6 +183,7 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
                 )
                 .first_valid_layer()
                 .all_attributes()
+                .non_parallel()
                 .from_buffered(Cursor::new(bytes))
                 .map_err(of_exr)?
                 .layer_data

@@ -135,6 +135,8 @@ fn what_cannot_be_read_is_one_line() {
         "is 4000000 x 4000000 pixels; 1 to 134217728 pixels are read"
     );
     assert_eq!(refusal(&hdr(header, 0, 5, &[])), "is 0 x 5 pixels; 1 to 134217728 pixels are read");
+    let few = hdr(header, 16_384, 8_192, &[[1, 2, 3, 128]]);
+    assert_eq!(refusal(&few), format!("is damaged: {} bytes do not hold 16384 x 8192 pixels", few.len()));
     for (damaged, expected) in [
         (hdr(header, 2, 2, &[[1, 2, 3, 128]; 3]), "is damaged: it ends too early"),
         (

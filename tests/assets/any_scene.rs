@@ -8,7 +8,7 @@ use caustica::{
 };
 
 /// Triangles up to which the tree is built too.
-const MAX_BUILT: usize = 10_000;
+const MAX_BUILT: usize = 1000;
 
 /// Reads the bytes. What comes out is sound, or a refusal in one line, which is returned.
 pub fn check(bytes: &[u8]) -> Result<Scene, String> {
