@@ -311,7 +311,8 @@ fn absurd_counts_cost_nothing() {
     gltf["meshes"][0]["primitives"] = json!([{ "attributes": { "POSITION": positions } }]);
     let scene = loaded(&gltf);
     assert!(scene.triangles.is_empty());
-    assert_eq!(scene.warnings[0], "4194304 of 4194304 triangles have no area and are not drawn");
+    let said = "4194304 of 4194304 triangles have no area and are not drawn";
+    assert_eq!(scene.warnings.last().map(String::as_str), Some(said));
     let length = refusal(|g| g["buffers"][0]["byteLength"] = (1_u64 << 60).into());
     assert_eq!(length, "buffers[0]: byteLength is 1152921504606846976, but there are 44 bytes");
     let joints = refusal(|g| {

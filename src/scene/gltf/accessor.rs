@@ -187,8 +187,8 @@ impl Column<'_> {
     }
 
     fn bytes(&self, i: usize) -> Option<&[u8]> {
-        let replaced = self.sparse.and_then(|sparse| sparse.get(i));
-        replaced.or_else(|| self.dense.map(|dense| dense.get(i)))
+        let replaced = self.sparse.as_ref().and_then(|sparse| sparse.get(i));
+        replaced.or_else(|| self.dense.as_ref().map(|dense| dense.get(i)))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Meshes shown by nodes: each read once for all nodes that make the same of it.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, hash_map::Entry::Vacant};
 
 use glam::DMat4;
 
@@ -110,8 +110,8 @@ impl<'d> Gallery<'d> {
             gallery.meshes.push(meshes::read(document, mesh, &shapes[mesh], shaping)?);
         }
         for skin in gallery.entries.iter().filter_map(|entry| entry.skin) {
-            if !gallery.poses.contains_key(&skin) {
-                gallery.poses.insert(skin, skins::pose(document, skin, worlds)?);
+            if let Vacant(place) = gallery.poses.entry(skin) {
+                place.insert(skins::pose(document, skin, worlds)?);
             }
         }
         Ok(gallery)
