@@ -100,7 +100,7 @@ fn mutate_value(root: &mut Value, dice: &mut Dice) {
     match value {
         Value::Number(_) => *value = number(value.as_f64().unwrap_or(0.0), dice),
         Value::String(text) => match dice.below(4) {
-            0 => text.push_str(dice.word(&["/", "..", "%20", "%00", "%ff", "é", ","])),
+            0 => text.push_str(dice.word(&["/", "..", "%20", "%00", "%ff", "é", ",", "\n", "\u{1b}[7m"])),
             1 => text.truncate(text.char_indices().nth(dice.below(9)).map_or(text.len(), |(at, _)| at)),
             _ => *text = dice.word(WORDS).to_owned(),
         },

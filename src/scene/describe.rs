@@ -4,7 +4,7 @@ use std::{f64::consts::PI, fmt};
 
 use serde::Serialize;
 
-use super::{LightKind, Projection, Scene};
+use super::{LightKind, Projection, Scene, words::one_line};
 
 /// Facts about a scene. Coordinates are the file's: metres in its world. Angles are in radians.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -226,5 +226,5 @@ fn section<T>(
     line: impl Fn(T) -> String,
 ) -> fmt::Result {
     writeln!(f, "  {heading} ({})", entries.len())?;
-    entries.enumerate().try_for_each(|(i, entry)| writeln!(f, "    {i}  {}", line(entry)))
+    entries.enumerate().try_for_each(|(i, entry)| writeln!(f, "    {i}  {}", one_line(&line(entry))))
 }

@@ -20,6 +20,7 @@ mod light;
 mod load_options;
 mod material;
 mod shape;
+mod words;
 
 pub use camera::{Camera, Projection};
 pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};

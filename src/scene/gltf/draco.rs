@@ -96,9 +96,11 @@ impl Packed<'_> {
             .with_max_decoded_bytes(BYTES_PER_VERTEX.saturating_mul(vertices.max(1)));
         let mut mesh = Mesh::new();
         let mut buffer = DecoderBuffer::new(bytes).with_limits(limits);
-        MeshDecoder::new()
-            .decode(&mut buffer, &mut mesh)
-            .or_else(|error| fault(place, format!("the compressed data is damaged: {error}")))?;
+        MeshDecoder::new().decode(&mut buffer, &mut mesh).or_else(|error| {
+            // Some of the decoder's messages are indented over several lines.
+            let words: Vec<_> = error.to_string().split_whitespace().map(str::to_owned).collect();
+            fault(place, format!("the compressed data is damaged: {}", words.join(" ")))
+        })?;
         if mesh.num_points() as u64 != vertices {
             return fault(place, format!("holds {} vertices, the accessors {vertices}", mesh.num_points()));
         }

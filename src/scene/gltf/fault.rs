@@ -2,7 +2,7 @@
 
 use std::{collections::HashSet, path::Path};
 
-use crate::Error;
+use crate::{Error, scene::words::one_line};
 
 /// A fault in the file: `place` is a JSON path or a part of the container.
 #[derive(Debug)]
@@ -22,7 +22,7 @@ pub(crate) fn fault<T>(place: impl Into<String>, problem: impl Into<String>) -> 
 impl Fault {
     /// The error that a user sees.
     pub(crate) fn of(self, path: &Path) -> Error {
-        Error::Scene { path: path.to_owned(), place: self.place, problem: self.problem }
+        Error::Scene { path: path.to_owned(), place: one_line(&self.place), problem: one_line(&self.problem) }
     }
 }
 
@@ -35,7 +35,7 @@ pub(crate) struct Notes {
 
 impl Notes {
     pub(crate) fn add(&mut self, note: impl Into<String>) {
-        let note = note.into();
+        let note = one_line(&note.into());
         if self.known.insert(note.clone()) {
             self.lines.push(note);
         }
