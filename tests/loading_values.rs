@@ -2,7 +2,7 @@
 
 mod gltf;
 
-use caustica::scene::{Environment, LightKind, LoadOptions, Projection, Surface};
+use caustica::scene::{Camera, Environment, LightKind, LoadOptions, Projection, Surface};
 use caustica::settings::LightUnit;
 use glam::Vec3;
 use gltf::{lambert, loaded, message, read_with, triangle};
@@ -184,13 +184,17 @@ fn cameras_are_found_by_name_and_number_and_made_if_missing() {
     let scene = loaded(&gltf);
     assert_eq!(scene.warnings, ["no camera: one is made that frames the whole scene"]);
     let camera = scene.camera(None).expect("a framing camera");
-    let sees = |p: Vec3| {
+    let sees = |p: Vec3, size: (u32, u32)| {
         let v = p - camera.position;
-        let half = camera.projection.half_height_at(v.dot(camera.forward));
-        v.dot(camera.up).abs().max(v.dot(camera.right).abs()) <= half
+        // Half the height, and of it the part that the width has.
+        let half = camera.half_height_at(v.dot(camera.forward), size);
+        v.dot(camera.up).abs() <= half && v.dot(camera.right).abs() <= half * size.0 as f32 / size.1 as f32
     };
-    assert!(scene.triangles[0].positions.iter().all(|p| sees(*p)));
-    assert!(!sees(Vec3::new(0.0, 3.0, 0.0)), "not everything is in view");
+    let whole = |size| scene.triangles[0].positions.iter().all(|p| sees(*p, size));
+    assert!([(9, 9), (16, 9), (9, 16)].into_iter().all(whole));
+    assert!(!sees(Vec3::new(0.0, 3.0, 0.0), (9, 9)), "not everything is in view");
+    let upright = Camera { keeps_width: false, ..camera.clone() };
+    assert!(upright.half_height_at(1.0, (9, 16)) < camera.half_height_at(1.0, (9, 16)), "control");
 }
 
 #[test]
@@ -206,9 +210,10 @@ fn a_scene_without_light_gets_a_sky_and_one_with_light_keeps_it() {
     assert_eq!(dark.warnings, ["no light: lit by a uniform sky of radiance 1"]);
     let sky = dark.environment.as_ref().expect("a sky");
     assert_eq!(
-        (sky.name.as_str(), sky.radiance(Vec3::Y), sky.radiance(-Vec3::X)),
+        (sky.name.as_str(), sky.radiance(Vec3::Y), sky.radiance(Vec3::new(-0.8, 0.6, 0.0))),
         ("default sky", Vec3::ONE, Vec3::ONE)
     );
+    assert!(sky.radiance(-Vec3::Y).max_element() < 0.5, "what is white stands out from the sky");
     assert!(dark.check_renderable().is_ok());
     // What was asked for stays, dark or not.
     let mut asked = loaded(&gltf);

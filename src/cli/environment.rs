@@ -39,7 +39,7 @@ pub struct EnvironmentOptions {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DefaultLightArg {
-    /// A uniform sky of radiance 1
+    /// A uniform sky of radiance 1 over darker ground
     Sky,
     /// Nothing: such a scene is an error
     None,

@@ -315,7 +315,7 @@ fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Re
         let problem = "needs a perspective camera; this one is orthographic".to_owned();
         return Err(Error::Setting { name: "aperture", value: settings.aperture.to_string(), problem });
     }
-    let half_height = camera.projection.half_height_at(1.0);
+    let half_height = camera.half_height_at(1.0, (width, height));
     let half_width = half_height * width as f32 / height as f32;
     let bounces = if settings.max_bounces == 0 { super::BOUNCE_CEILING } else { settings.max_bounces };
     Ok(CameraTile {

@@ -38,6 +38,9 @@ pub struct Camera {
     pub projection: Projection,
     /// Width over height, where the file says.
     pub aspect: Option<f32>,
+    /// In a picture that is higher than wide, what is seen is as wide as it is high in a square one, so that nothing is
+    /// cut off at the sides.
+    pub keeps_width: bool,
 }
 
 /// Angles of [`Camera::framing`], degrees: from +Z towards +X, above the horizon, and of view.
@@ -49,8 +52,8 @@ const ANGLE_OF_VIEW: f32 = 35.0;
 const FILL: f32 = 0.94;
 
 impl Camera {
-    /// A camera that sees all of `bounds` in a picture that is not higher than wide: from the front, which is +Z in glTF,
-    /// a little from the right and from above.
+    /// A camera that sees all of `bounds` in a picture of any shape: from the front, which is +Z in glTF, a little from the
+    /// right and from above.
     #[must_use]
     pub fn framing(bounds: Bounds) -> Self {
         let is_empty = bounds.min.x > bounds.max.x;
@@ -77,6 +80,14 @@ impl Camera {
             forward: -back,
             projection: Projection::Perspective { yfov },
             aspect: None,
+            keeps_width: true,
         }
+    }
+
+    /// Half the height of what is seen at a distance along the axis in a picture of so many pixels, metres.
+    #[must_use]
+    pub fn half_height_at(&self, depth: f32, (width, height): (u32, u32)) -> f32 {
+        let stretch = if self.keeps_width { (height as f32 / width as f32).max(1.0) } else { 1.0 };
+        stretch * self.projection.half_height_at(depth)
     }
 }

@@ -31,6 +31,9 @@ pub struct Environment {
     pub warnings: Vec<String>,
 }
 
+/// Radiance from below in [`Environment::sky`].
+const GROUND: f32 = 0.3;
+
 impl Environment {
     /// Reads an OpenEXR or Radiance HDR file, whichever it is by its content. OpenEXR: any type of sample; R, G and B,
     /// or luminance alone, of the first part and layer that has them. `strength` is a factor ≥ 0, `rotation` in degrees.
@@ -82,6 +85,15 @@ impl Environment {
             rotation: 0.0,
             warnings: Vec::new(),
         }
+    }
+
+    /// A uniform sky of radiance 1 that goes over into ground of [`GROUND`] about the horizon: under the same light from
+    /// everywhere, what is white could not be told from what is behind it.
+    #[must_use]
+    pub fn sky() -> Self {
+        let pixels = vec![[1.0; 3], [1.0; 3], [GROUND; 3], [GROUND; 3]];
+        let hash = hash(bytemuck::cast_slice(&pixels));
+        Self { name: "default sky".to_owned(), hash, height: 4, pixels, ..Self::uniform(Vec3::ONE) }
     }
 
     /// It gives no light at all.

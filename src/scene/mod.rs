@@ -125,12 +125,11 @@ impl Scene {
             || self.spheres.iter().any(|sphere| is_such(sphere.material))
     }
 
-    /// Lights a scene that has no light of its own by a soft uniform sky, radiance 1 from everywhere, and notes it. A scene
-    /// with an environment keeps it, dark or not.
+    /// Lights a scene that has no light of its own by a soft uniform sky ([`Environment::sky`]), and notes it. A scene with an
+    /// environment keeps it, dark or not.
     pub fn add_default_light(&mut self) {
         if self.lights.is_empty() && !self.has_emission() && self.environment.is_none() {
-            let sky = Environment::uniform(Vec3::ONE);
-            self.environment = Some(Environment { name: "default sky".to_owned(), ..sky });
+            self.environment = Some(Environment::sky());
             self.warnings.push("no light: lit by a uniform sky of radiance 1".to_owned());
         }
     }

@@ -49,8 +49,9 @@ struct Points<'a> {
 impl<'a> Points<'a> {
     fn new(frame: &'a Frame, camera: &Camera) -> Self {
         let (width, height) = (frame.width as usize, frame.height as f32);
+        let size = (frame.width, frame.height);
         let widths: Vec<f32> =
-            frame.depth.iter().map(|&depth| 2.0 * camera.projection.half_height_at(depth) / height).collect();
+            frame.depth.iter().map(|&depth| 2.0 * camera.half_height_at(depth, size) / height).collect();
         let across = |i: usize| {
             let x = ((i % width) as f32 + 0.5 - width as f32 / 2.0) * widths[i];
             let y = (height / 2.0 - (i / width) as f32 - 0.5) * widths[i];
@@ -103,6 +104,7 @@ mod tests {
             forward: -Vec3::Z,
             projection: Projection::Perspective { yfov: std::f32::consts::FRAC_PI_2 },
             aspect: None,
+            keeps_width: false,
         };
         let mut frame = Frame { width: SIZE, height: SIZE, ..Frame::default() };
         for i in 0..SIZE * SIZE {

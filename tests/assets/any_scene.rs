@@ -71,7 +71,7 @@ fn sound(scene: &Scene) {
 }
 
 fn sound_camera(camera: &Camera) {
-    let Camera { name, position, right, up, forward, projection, aspect } = camera;
+    let Camera { name, position, right, up, forward, projection, aspect, keeps_width: _ } = camera;
     let frame = [right, up, forward];
     let upright = frame.iter().all(|axis| (axis.length() - 1.0).abs() < 1e-3)
         && [right.dot(*up), up.dot(*forward), forward.dot(*right)].iter().all(|cosine| cosine.abs() < 1e-3);

@@ -55,7 +55,16 @@ pub fn camera(position: Vec3, target: Vec3, degrees: f32) -> Camera {
     let helper = if forward.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
     let right = forward.cross(helper).normalize();
     let projection = Projection::Perspective { yfov: degrees.to_radians() };
-    Camera { name: String::new(), position, right, up: right.cross(forward), forward, projection, aspect: Some(1.0) }
+    Camera {
+        name: String::new(),
+        position,
+        right,
+        up: right.cross(forward),
+        forward,
+        projection,
+        aspect: Some(1.0),
+        keeps_width: false,
+    }
 }
 
 pub fn sphere(center: Vec3, radius: f32, material: u32) -> Sphere {

@@ -116,6 +116,7 @@ fn room(light: Vec3) -> Scene {
             forward: Vec3::NEG_Z,
             projection: Projection::Perspective { yfov: 1.0 },
             aspect: None,
+            keeps_width: false,
         }],
         ..Scene::default()
     }

@@ -22,7 +22,7 @@ pub(super) fn read(root: &json::Root, placed: &Placed) -> Read<Option<(usize, DV
     let Some([right, up, forward]) = axes(placed.world) else {
         return fault(format!("nodes[{}]", placed.node), "its transform leaves its camera no direction");
     };
-    let camera = Camera { name, position: Vec3::ZERO, right, up, forward, projection, aspect };
+    let camera = Camera { name, position: Vec3::ZERO, right, up, forward, projection, aspect, keeps_width: false };
     Ok(Some((index, placed.world.w_axis.truncate(), camera)))
 }
 
