@@ -12,7 +12,8 @@ mod timer;
 use std::{
     sync::{
         Arc,
-        atomic::{AtomicBool, AtomicU64, Ordering},
+        atomic::{AtomicU64, Ordering},
+        mpsc,
     },
     time::Duration,
 };
@@ -240,11 +241,13 @@ impl Gpu {
         let mut encoder = self.encoder();
         encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
         self.submit(encoder);
-        let is_there = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&is_there);
-        staging.slice(..).map_async(wgpu::MapMode::Read, move |r| told.store(r.is_ok(), Ordering::Release));
+        let (tell, told) = mpsc::channel();
+        // Nobody listens any more where the wait below failed.
+        staging.slice(..).map_async(wgpu::MapMode::Read, move |result| drop(tell.send(result.is_ok())));
         self.wait()?;
-        let mapped = is_there.load(Ordering::Acquire).then(|| staging.slice(..).get_mapped_range().ok()).flatten();
+        // Another thread's wait may be the one that tells, a moment after this one's is over.
+        let is_there = told.recv_timeout(HUNG_AFTER).unwrap_or(false);
+        let mapped = is_there.then(|| staging.slice(..).get_mapped_range().ok()).flatten();
         // Without a fault there is one reason left.
         let lost = || Error::Lost {
             adapter: format!("{} ({})", self.name, self.driver),
