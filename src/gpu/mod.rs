@@ -242,8 +242,10 @@ impl Gpu {
         encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
         self.submit(encoder);
         let (tell, told) = mpsc::channel();
-        // Nobody listens any more where the wait below failed.
-        staging.slice(..).map_async(wgpu::MapMode::Read, move |result| drop(tell.send(result.is_ok())));
+        staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+            // Nobody listens any more where the wait below failed.
+            let _ = tell.send(result.is_ok());
+        });
         self.wait()?;
         // Another thread's wait may be the one that tells, a moment after this one's is over.
         let is_there = told.recv_timeout(HUNG_AFTER).unwrap_or(false);
