@@ -59,7 +59,7 @@ fn hybrid_is_direct_rays_plus_indirect_photons() {
 #[test]
 fn final_gathering_has_the_mean_of_the_estimate() {
     let scene = room();
-    let settings = Settings { max_bounces: 0, ..settings(Mode::Hybrid, 100_000, 24) };
+    let settings = Settings { max_bounces: 0, spp: 1, ..settings(Mode::Hybrid, 50_000, 24) };
     let plain = mean(&render_scene(&scene, &settings));
     for emission in [Emission::Aimed, Emission::Unaimed] {
         let gathered = mean(&render_scene(&scene, &Settings { final_gather: 6, emission, ..settings.clone() }));
@@ -77,7 +77,7 @@ fn final_gathering_has_the_mean_of_the_estimate() {
 fn hybrid_and_photons_agree_in_the_limit() {
     let scene = room();
     let [hybrid, photons] =
-        [Mode::Hybrid, Mode::Photons].map(|mode| mean(&render_scene(&scene, &settings(mode, 1_000_000, 48))));
+        [Mode::Hybrid, Mode::Photons].map(|mode| mean(&render_scene(&scene, &settings(mode, 400_000, 32))));
     assert!(within(photons, hybrid, 0.01), "mode 1 has mean {photons}, mode 0 has {hybrid}");
     assert!(!within(1.02 * photons, hybrid, 0.01), "control: a picture 2 % brighter passes");
 }
@@ -140,17 +140,17 @@ fn a_full_map_is_normalised_by_its_own_paths() {
     let scene = room();
     for light_sampling in [LightSampling::Power, LightSampling::Uniform] {
         let small = Settings {
-            global_photons: 10_000,
-            caustic_photons: 200_000,
-            max_paths: Some(1_000_000),
+            global_photons: 5_000,
+            caustic_photons: 100_000,
+            max_paths: Some(500_000),
             neighbors: 50,
             light_sampling,
-            ..settings(Mode::Photons, 1, 48)
+            ..settings(Mode::Photons, 1, 32)
         };
         let full = render_scene(&scene, &small);
-        let open = render_scene(&scene, &Settings { global_photons: 500_000, ..small.clone() });
+        let open = render_scene(&scene, &Settings { global_photons: 250_000, ..small.clone() });
         let (global, caustic) = (full.stats.photons.global, full.stats.photons.caustic);
-        assert!(global.stored > 9_900, "the global map holds only {} photons", global.stored);
+        assert!(global.stored > 4_900, "the global map holds only {} photons", global.stored);
         assert!(caustic.emitted > 20 * global.emitted, "the global map was full after {} paths", global.emitted);
         let (a, b) = (mean(&full), mean(&open));
         assert!(within(a, b, 0.03), "{light_sampling:?}: mean {a} with a full map, {b} with an open one");
