@@ -222,9 +222,25 @@ fn wait_for(child: &mut Child) -> Option<ExitStatus> {
     None
 }
 
+/// The same command, which hears the end of its terminal even where this test does not, as under nohup.
+fn hearing_hangups(command: &Command) -> Command {
+    let mut hearing = Command::new("env");
+    hearing.arg("--default-signal=HUP").arg(command.get_program()).args(command.get_args());
+    if let Some(folder) = command.get_current_dir() {
+        hearing.current_dir(folder);
+    }
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => hearing.env(name, value),
+            None => hearing.env_remove(name),
+        };
+    }
+    hearing
+}
+
 /// Sends a signal when a line that begins so is on stderr. Returns the exit code.
 fn stopped_at(folder: &Path, line: &str, stage: &str, signal: &str) -> Option<i32> {
-    let mut child = command(folder, line).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut child = hearing_hangups(&command(folder, line)).stderr(Stdio::piped()).spawn().expect("it starts");
     let mut stderr = BufReader::new(child.stderr.take().expect("it is piped"));
     let mut said = String::new();
     let begun = loop {
