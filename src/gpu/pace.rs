@@ -16,7 +16,7 @@ use std::{
 pub enum Pacing {
     /// Not at all: for software.
     Whole,
-    /// By measured time; by [`UNMEASURED`] where the device has no clock.
+    /// By measured time; in parts of equal size where the device has no clock.
     Measured,
     /// Into parts of that many invocations, for tests.
     Parts(u32),

@@ -87,7 +87,7 @@ impl Environment {
         }
     }
 
-    /// A uniform sky of radiance 1 that goes over into ground of [`GROUND`] about the horizon: under the same light from
+    /// A uniform sky of radiance 1 that goes over into ground of 0.3 about the horizon: under the same light from
     /// everywhere, what is white could not be told from what is behind it.
     #[must_use]
     pub fn sky() -> Self {
