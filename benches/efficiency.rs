@@ -15,8 +15,8 @@ const SETTINGS: [&str; 7] = [
     "--photons 200k --spp 4 --raw-estimate",
     "--photons 200k --spp 4 --raw-estimate --share 0",
     "--photons 200k --spp 1 --raw-estimate --share 0",
-    "--photons 100k --spp 4 --raw-estimate -k 60",
-    "--global-photons 50k --caustic-photons 20k --spp 4 --raw-estimate -k 60",
+    "--global-photons 100k --caustic-photons 50k --spp 2 --raw-estimate -k 60",
+    "--photons 50k --spp 2 --raw-estimate -k 60",
 ];
 
 fn main() {
