@@ -424,7 +424,7 @@ pub struct FinalStep {
 }
 
 /// Photons of a finest cell of the photon grid; cells of a coarser one.
-pub const CELL_PHOTONS: u32 = 32;
+pub const CELL_PHOTONS: u32 = 16;
 pub const CELL_FAN: u32 = 8;
 
 /// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert curve, or
@@ -613,7 +613,7 @@ pub struct GridStep {
 }
 
 /// Bytes of `SearchState` in the shaders, in which a query waits for its next dispatch.
-pub const SEARCH_STATE_BYTES: usize = 112;
+pub const SEARCH_STATE_BYTES: usize = 64;
 /// Bytes of `Disc` in the shaders: the surface around a query.
 pub const DISC_BYTES: usize = 48;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.

@@ -1,5 +1,5 @@
-//! Radiance from the photons around a point. Kernels: `mark_points`, `key_points`, `aim_search`,
-//! `count_photons`, `survey_surface`, `gather`, `finish_gather`.
+//! Radiance from the photons around a point. Kernels: `mark_points`, `key_points`, `search_radius`, `survey_surface`,
+//! `gather`, `finish_gather`.
 
 use super::{
     SceneBuffers,
@@ -24,8 +24,8 @@ const PACKET: u32 = 4;
 /// Packets that are searched or wait together.
 const BLOCK: u64 = 8;
 /// Of how many blocks of packets one is searched in each dispatch of the search: pilots first, the others start from
-/// their radius; and rounds of counting in one submission.
-const STRIDES: [(u32, u32); 3] = [(64, 4), (8, 3), (1, 2)];
+/// their radius.
+const STRIDES: [u32; 3] = [64, 8, 1];
 
 /// The radiance estimate that is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,8 +124,7 @@ struct Variant {
 
 #[derive(Debug)]
 struct Compiled {
-    aim: Kernel,
-    count: Kernel,
+    search: Kernel,
     survey: Option<Kernel>,
     sum: Kernel,
     finish: Kernel,
@@ -243,7 +242,7 @@ impl<'s> Gather<'s> {
         &self,
         gpu: &Gpu,
         map: &PhotonMap,
-        Compiled { aim, count, survey, sum, finish }: &Compiled,
+        Compiled { search, survey, sum, finish }: &Compiled,
         info: &GatherInfo,
         [points, radiance, gathered, radii]: [&Buffer; 4],
         progress: &dyn Progress,
@@ -266,10 +265,8 @@ impl<'s> Gather<'s> {
             ("gathered", gathered),
         ]);
         let with_info = |info| [buffers.as_slice(), &[("gather_info", info)]].concat();
-        let infos =
-            STRIDES.map(|(stride, _)| gpu.uniform("gather info", &GatherInfo { count: waiting, stride, ..*info }));
-        let search_bindings =
-            infos.each_ref().map(|info| (aim.bind(gpu, &with_info(info)), count.bind(gpu, &with_info(info))));
+        let infos = STRIDES.map(|stride| gpu.uniform("gather info", &GatherInfo { count: waiting, stride, ..*info }));
+        let search_bindings = infos.each_ref().map(|info| search.bind(gpu, &with_info(info)));
         let (sum_bindings, finish_bindings) =
             (sum.bind(gpu, &with_info(&infos[0])), finish.bind(gpu, &with_info(&infos[0])));
         let survey = survey.as_ref().zip(self.scene);
@@ -285,13 +282,9 @@ impl<'s> Gather<'s> {
                 encoder.clear_buffer(&scratch.discs, 0, None);
             }
             encoder.clear_buffer(&scratch.open, 0, None);
-            for ((aim_bindings, count_bindings), (stride, rounds)) in search_bindings.iter().zip(STRIDES) {
+            for (bindings, stride) in search_bindings.iter().zip(STRIDES) {
                 let packets = packets.div_ceil(BLOCK).div_ceil(stride.into()) * BLOCK;
-                for _ in 0..rounds {
-                    aim.dispatch(&mut encoder, aim_bindings, packets * u64::from(PACKET));
-                    count.dispatch(&mut encoder, count_bindings, packets);
-                }
-                aim.dispatch(&mut encoder, aim_bindings, packets * u64::from(PACKET));
+                search.dispatch(&mut encoder, bindings, packets);
             }
             if let Some((survey, bindings)) = &survey {
                 survey.dispatch(&mut encoder, bindings, waiting.into());
@@ -356,8 +349,7 @@ impl<'s> Gather<'s> {
         let with_budget = [overrides.as_slice(), &[("TRACE_BUDGET", SURVEY_TRACE_BUDGET)]].concat();
         let survey = |scene: &SceneBuffers| scene.kernel_with(gpu, "survey_surface", &with_budget);
         let compiled = Compiled {
-            aim: kernel("aim_search"),
-            count: kernel("count_photons"),
+            search: kernel("search_radius"),
             survey: self.scene.filter(|_| self.options.surveys()).map(survey),
             sum: kernel("gather"),
             finish: kernel("finish_gather"),

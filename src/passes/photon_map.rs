@@ -5,7 +5,7 @@
 //! along a Hilbert curve of 20 bits per axis and splits them into what a search reads (`places`: position and
 //! direction, 16 bytes) and what an estimate reads besides (`fluxes`, 16 bytes); where these exceed a binding, into two windows.
 //!
-//! Over the sorted photons lies the grid: a finest cell is 32 photons that follow each other on the curve, a coarser
+//! Over the sorted photons lies the grid: a finest cell is 16 photons that follow each other on the curve, a coarser
 //! one eight finer cells, each with its exact bounds. Cells thus follow the density of the photons at every scale: a
 //! caustic has small cells, an empty region none, and photons on one spot have cells of size zero.
 
