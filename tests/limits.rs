@@ -10,20 +10,18 @@
 //! | tiles | device memory does not grow with samples or size | it grows with photons |
 
 mod common;
+mod rays;
 
 use caustica::{
     Error,
-    bvh::Bvh,
-    gpu::{Gpu, Kernel},
-    layout::{CameraTile, Counters, FirstHit, Path, VisiblePoint},
-    passes::SceneBuffers,
+    gpu::Gpu,
     progress::Silent,
     renderer::render,
     scene::Scene,
     settings::{Mode, Settings},
 };
 use common::*;
-use glam::vec3;
+use glam::{Vec3, vec3};
 
 /// A closed room with a height field of 2 · side² triangles, a glass ball and a light.
 fn room(side: i32) -> Scene {
@@ -87,44 +85,13 @@ fn maps_that_no_buffers_hold_are_refused_at_once() {
     assert_ne!(what, "a photon map", "control: these maps fit, only what comes after does not");
 }
 
-/// Rays of a picture of the room that were given up with that loop budget.
+/// Of rays in the room, those that were given up with that loop budget.
 fn unfinished(budget: f64) -> u32 {
-    const RAYS: u32 = 512;
-    let gpu = gpu();
-    let scene = room(60);
-    let buffers = SceneBuffers::new(gpu, &scene, &Bvh::build(&scene), &Settings::default()).expect("the scene fits");
-    let kernel = Kernel::new(gpu, "trace_camera", &[("TRACE_BUDGET", budget), ("HAS_ENVIRONMENT", 0.0)]);
-    let ray = |i: u32| {
-        let angle = i as f32 * 2.4;
-        let direction = vec3(angle.cos(), -0.5, angle.sin()).normalize().to_array();
-        Path { origin: [0.0, 1.0, 0.0], direction, ..Path::default() }
+    let ray = |i: u16| {
+        let angle = f32::from(i) * 2.4;
+        (Vec3::Y, vec3(angle.cos(), -0.5, angle.sin()))
     };
-    let count = u64::from(RAYS);
-    let paths = gpu.storage_with("paths", &(0..RAYS).map(ray).collect::<Vec<_>>()).expect("fits");
-    let queue = gpu.storage_with("queue", &(0..RAYS).collect::<Vec<_>>()).expect("fits");
-    let queue_out = gpu.storage::<u32>("queue out", count).expect("fits");
-    let counters = gpu.storage_with("counters", &[Counters { current: RAYS, ..Counters::default() }]).expect("fits");
-    let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
-    let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
-    let radiance = gpu.storage::<[f32; 4]>("radiance", count).expect("fits");
-    let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..CameraTile::default() });
-    let bindings = kernel.bind(
-        gpu,
-        &buffers.with(&[
-            ("tile", &tile),
-            ("paths", &paths),
-            ("queue_in", &queue),
-            ("queue_out", &queue_out),
-            ("counters", &counters),
-            ("points", &points),
-            ("first_hits", &first_hits),
-            ("radiance", &radiance),
-        ]),
-    );
-    let mut encoder = gpu.encoder();
-    kernel.dispatch(&mut encoder, &bindings, count);
-    gpu.submit(encoder);
-    gpu.read::<Counters>(&counters, 0, 1).expect("counters read back")[0].unfinished
+    rays::trace(&room(60), &[("TRACE_BUDGET", budget)], &(0..512).map(ray).collect::<Vec<_>>()).0.unfinished
 }
 
 #[test]

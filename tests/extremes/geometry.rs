@@ -1,53 +1,17 @@
 //! Shapes and places that leave rounding no room.
 
 use caustica::{
-    bvh::Bvh,
-    gpu::Kernel,
-    layout::{CameraTile, Counters, FirstHit, Path, VisiblePoint},
-    passes::SceneBuffers,
     scene::{Light, LightKind, Scene, Triangle},
     settings::{Mode, Settings},
     stats::NonFinite,
 };
 use glam::{Quat, Vec3, vec3};
 
-use crate::{common::*, gltf, is_finite};
+use crate::{common::*, gltf, is_finite, rays};
 
 /// For each ray, whether it hits something.
-fn hits(scene: &Scene, rays: &[(Vec3, Vec3)]) -> Vec<bool> {
-    let gpu = gpu();
-    let count = rays.len() as u64;
-    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &Settings::default()).expect("the scene fits");
-    let kernel: Kernel = buffers.kernel(gpu, "trace_camera");
-    let path = |&(origin, direction): &(Vec3, Vec3)| Path {
-        origin: origin.to_array(),
-        direction: direction.normalize().to_array(),
-        ..Path::default()
-    };
-    let paths = gpu.storage_with("paths", &rays.iter().map(path).collect::<Vec<_>>()).expect("fits");
-    let queue = gpu.storage_with("queue", &(0..rays.len() as u32).collect::<Vec<_>>()).expect("fits");
-    let queue_out = gpu.storage::<u32>("queue out", count).expect("fits");
-    let start = Counters { current: rays.len() as u32, ..Counters::default() };
-    let counters = gpu.storage_with("counters", &[start]).expect("fits");
-    let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
-    let first_hits = gpu.storage_with("first hits", &vec![FirstHit::default(); rays.len()]).expect("fits");
-    let radiance = gpu.storage::<[f32; 4]>("radiance", count).expect("fits");
-    let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..CameraTile::default() });
-    let own = [
-        ("tile", &tile),
-        ("paths", &paths),
-        ("queue_in", &queue),
-        ("queue_out", &queue_out),
-        ("counters", &counters),
-        ("points", &points),
-        ("first_hits", &first_hits),
-        ("radiance", &radiance),
-    ];
-    let bindings = kernel.bind(gpu, &buffers.with(&own));
-    let mut encoder = gpu.encoder();
-    kernel.dispatch(&mut encoder, &bindings, count);
-    gpu.submit(encoder);
-    gpu.read::<FirstHit>(&first_hits, 0, count).expect("hits read back").iter().map(|hit| hit.alpha > 0.0).collect()
+fn hits(scene: &Scene, asked: &[(Vec3, Vec3)]) -> Vec<bool> {
+    rays::trace(scene, &[], asked).1.iter().map(|hit| hit.alpha > 0.0).collect()
 }
 
 /// A closed mesh about the origin: a cube's lattice, pushed out to a dented sphere; neighbours share their corners' bits.

@@ -25,6 +25,8 @@ mod geometry;
 mod gltf;
 mod media;
 mod numbers;
+#[path = "../rays/mod.rs"]
+mod rays;
 
 use caustica::{
     bvh::Bvh,
