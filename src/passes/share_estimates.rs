@@ -8,7 +8,9 @@ use crate::{
 };
 
 /// Pixels of a cell in each round. A coarser cell than 8 x 8 saves little: its points are few already.
-const ROUNDS: [u32; 3] = [64, 16, 1];
+const ROUNDS: [u32; 4] = [64, 16, 4, 1];
+/// Samples that a cell has at least: of fewer, most would be queries themselves.
+const LEAST_CELL: u32 = 4;
 
 /// What of a tile is shared.
 #[derive(Debug)]
@@ -73,8 +75,7 @@ impl EstimateSharing {
     pub fn run(&mut self, gpu: &Gpu, turn: u32, tile: &SharedPoints, estimates: &mut Estimates) -> Result<()> {
         let count = tile.pixels * tile.samples * tile.branches;
         for cell_pixels in ROUNDS {
-            // A cell of one sample is the point itself.
-            if self.reach == 0.0 || cell_pixels * tile.samples == 1 {
+            if self.reach == 0.0 || cell_pixels * tile.samples < LEAST_CELL {
                 break;
             }
             let round = ShareRound {
