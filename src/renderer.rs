@@ -16,10 +16,13 @@ use crate::{
     gpu::Gpu,
     image::Frame,
     memory::available,
-    passes::{Gather, GatherOptions, LightGroup, MapKernels, PhotonMap, PhotonTracer, RawMap, SceneBuffers},
+    passes::{
+        CameraKernels, EstimateSharing, Gather, GatherOptions, LightGroup, MapKernels, PhotonMap, PhotonTracer, RawMap,
+        SceneBuffers,
+    },
     progress::{Progress, Stage},
     scene::{Camera, Scene},
-    settings::{Crop, Settings},
+    settings::{Crop, Search, Settings},
     stats::{DeviceStats, LightStats, MapStats, NonFinite, Stats, timed},
 };
 
@@ -110,7 +113,22 @@ impl<'a> Session<'a> {
         let around = scene.cameras.iter().map(|camera| packed(&probe.at(camera.position.as_dvec3())));
         let (camera_media, fits): (Vec<Media>, Vec<bool>) = around.unzip();
         stats.warnings.extend(too_deep("cameras", fits.iter().filter(|fits| !**fits).count()));
-        Ok(Self { gpu, scene, buffers, camera_media, stats })
+        let session = Self { gpu, scene, buffers, camera_media, stats };
+        session.compile_ahead(settings);
+        Ok(session)
+    }
+
+    /// Has the kernels compiled that a picture by these settings needs, in their order, while the first of them run.
+    fn compile_ahead(&self, settings: &Settings) {
+        let (gpu, scene) = (self.gpu, &self.buffers);
+        if settings.mode.traces_photons() {
+            drop((PhotonTracer::new(gpu, scene), MapKernels::new(gpu)));
+        }
+        drop(CameraKernels::new(gpu, scene, settings));
+        if settings.mode.traces_photons() && settings.search != Search::KdTree {
+            drop(EstimateSharing::new(gpu, settings.share_reach));
+            self.gather(settings).compile_ahead(gpu, &settings.into());
+        }
     }
 
     /// First pass: photons leave the lights and are stored in a global and a caustic map, as `mode`, the photon

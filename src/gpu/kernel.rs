@@ -1,4 +1,6 @@
-//! A compiled kernel, its bindings by name, and dispatches.
+//! A kernel, its bindings by name, and dispatches.
+
+use std::sync::{Arc, OnceLock};
 
 use super::{
     Buffer, Commands, Gpu,
@@ -8,55 +10,94 @@ use super::{
 /// The bind group that says which part of a dispatch runs: owned here, filled for each dispatch (`shaders/lib/dispatch.wesl`).
 const PART_GROUP: u32 = 3;
 
-/// A compiled compute kernel.
-#[derive(Debug)]
-pub struct Kernel {
-    shader: &'static Shader,
-    pipeline: wgpu::ComputePipeline,
-    /// Of the groups that the caller fills.
-    layouts: Vec<Option<wgpu::BindGroupLayout>>,
-    /// The kernel finds its index with `invocation_index`, so that its dispatches can be cut.
-    can_be_cut: bool,
-}
+/// A compute kernel. Several that are equal share what was compiled.
+#[derive(Clone, Debug)]
+pub struct Kernel(Arc<Program>);
 
 /// The buffers of one dispatch, one bind group per group that the kernel uses.
 #[derive(Debug)]
 pub struct Bindings(Vec<(u32, wgpu::BindGroup)>);
 
+/// A kernel with its constants, compiled by whoever comes first: a thread of the [`Compiler`], or one that needs it.
+#[derive(Debug)]
+pub(super) struct Program {
+    shader: &'static Shader,
+    constants: Vec<(&'static str, f64)>,
+    device: wgpu::Device,
+    part_layout: wgpu::BindGroupLayout,
+    compiled: OnceLock<Compiled>,
+}
+
+#[derive(Debug)]
+struct Compiled {
+    pipeline: wgpu::ComputePipeline,
+    /// Of the groups that the caller fills.
+    layouts: Vec<Option<wgpu::BindGroupLayout>>,
+}
+
+impl Program {
+    pub fn new(
+        device: &wgpu::Device,
+        part_layout: &wgpu::BindGroupLayout,
+        shader: &'static Shader,
+        constants: Vec<(&'static str, f64)>,
+    ) -> Self {
+        let (device, part_layout) = (device.clone(), part_layout.clone());
+        Self { shader, constants, device, part_layout, compiled: OnceLock::new() }
+    }
+
+    /// Compiles the kernel, or waits for who does.
+    pub fn compile(&self) {
+        self.compiled();
+    }
+
+    fn compiled(&self) -> &Compiled {
+        self.compiled.get_or_init(|| {
+            let (device, shader) = (&self.device, self.shader);
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(shader.stem),
+                source: wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
+            });
+            let layouts: Vec<_> = (0..PART_GROUP).map(|g| group_layout(device, shader, g)).collect();
+            let part = self.can_be_cut().then_some(&self.part_layout);
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(shader.stem),
+                bind_group_layouts: &layouts.iter().map(Option::as_ref).chain([part]).collect::<Vec<_>>(),
+                immediate_size: 0,
+            });
+            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(shader.stem),
+                layout: Some(&layout),
+                module: &module,
+                entry_point: Some(shader.stem),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &self.constants,
+                    zero_initialize_workgroup_memory: false,
+                },
+                cache: None,
+            });
+            Compiled { pipeline, layouts }
+        })
+    }
+
+    /// The kernel finds its index with `invocation_index`, so that its dispatches can be cut.
+    fn can_be_cut(&self) -> bool {
+        self.shader.bindings.iter().any(|b| b.group == PART_GROUP)
+    }
+}
+
 impl Kernel {
-    /// Compiles the kernel `stem`; `overrides` sets its `override` constants. Names that this kernel does not have are
-    /// passed over, so that one list serves several kernels.
+    /// The kernel `stem`, which other threads begin to compile; `overrides` sets its `override` constants. Names that this
+    /// kernel does not have are passed over, so that one list serves several kernels.
     ///
     /// # Panics
     /// If no kernel has that stem.
     #[must_use]
     pub fn new(gpu: &Gpu, stem: &str, overrides: &[(&str, f64)]) -> Self {
         let shader = shader(stem);
-        let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(stem),
-            source: wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
-        });
-        let constants: Vec<_> = overrides.iter().copied().filter(|(name, _)| shader.overrides.contains(name)).collect();
-        let layouts: Vec<_> = (0..PART_GROUP).map(|g| group_layout(gpu, shader, g)).collect();
-        let can_be_cut = shader.bindings.iter().any(|b| b.group == PART_GROUP);
-        let part = can_be_cut.then_some(&gpu.parts.layout);
-        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(stem),
-            bind_group_layouts: &layouts.iter().map(Option::as_ref).chain([part]).collect::<Vec<_>>(),
-            immediate_size: 0,
-        });
-        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(stem),
-            layout: Some(&layout),
-            module: &module,
-            entry_point: Some(stem),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &constants,
-                zero_initialize_workgroup_memory: false,
-            },
-            cache: None,
-        });
-        Self { shader, pipeline, layouts, can_be_cut }
+        let value = |name: &str| overrides.iter().find(|(n, _)| *n == name).map(|(_, value)| *value);
+        let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();
+        Self(gpu.compiler.program(&gpu.device, &gpu.parts.layout, shader, constants))
     }
 
     /// Binds buffers by the names of the shader's variables. Names that this kernel does not use are passed over, so
@@ -70,11 +111,12 @@ impl Kernel {
             buffers
                 .iter()
                 .find(|(n, _)| *n == name)
-                .unwrap_or_else(|| panic!("{}: no buffer is bound to {name}", self.shader.stem))
+                .unwrap_or_else(|| panic!("{}: no buffer is bound to {name}", self.0.shader.stem))
                 .1
         };
         let group = |(g, layout): (usize, &Option<wgpu::BindGroupLayout>)| {
             let entries: Vec<_> = self
+                .0
                 .shader
                 .bindings
                 .iter()
@@ -82,13 +124,13 @@ impl Kernel {
                 .map(|b| wgpu::BindGroupEntry { binding: b.index, resource: find(b.name).as_entire_binding() })
                 .collect();
             let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some(self.shader.stem),
+                label: Some(self.0.shader.stem),
                 layout: layout.as_ref()?,
                 entries: &entries,
             });
             Some((g as u32, bind_group))
         };
-        Bindings(self.layouts.iter().enumerate().filter_map(group).collect())
+        Bindings(self.0.compiled().layouts.iter().enumerate().filter_map(group).collect())
     }
 
     /// Runs `invocations` invocations, in workgroups of [`crate::layout::WORKGROUP_SIZE`] folded to two dimensions
@@ -106,13 +148,13 @@ impl Kernel {
 
     fn record(&self, commands: &mut Commands, bindings: &Bindings, most: u64, arguments: Option<&Buffer>) {
         let gpu = commands.gpu;
-        let stem = self.shader.stem;
+        let stem = self.0.shader.stem;
         let record = |pass: &mut wgpu::ComputePass<'_>, first: u64, invocations: u64| {
-            pass.set_pipeline(&self.pipeline);
+            pass.set_pipeline(&self.0.compiled().pipeline);
             for (group, bind_group) in &bindings.0 {
                 pass.set_bind_group(*group, bind_group, &[]);
             }
-            if self.can_be_cut {
+            if self.0.can_be_cut() {
                 pass.set_bind_group(PART_GROUP, &gpu.parts.from(gpu, first), &[]);
             }
             match arguments {
@@ -124,7 +166,7 @@ impl Kernel {
                 }
             }
         };
-        match self.can_be_cut {
+        match self.0.can_be_cut() {
             true => commands.dispatch(stem, most, record),
             false => {
                 assert_eq!(most, 1, "{stem}: a kernel without invocation_index is a single invocation");
@@ -137,7 +179,7 @@ impl Kernel {
 /// Says where a part of a dispatch begins.
 #[derive(Debug)]
 pub(super) struct Parts {
-    layout: wgpu::BindGroupLayout,
+    pub(super) layout: wgpu::BindGroupLayout,
     /// That of all dispatches that are not cut.
     whole: wgpu::BindGroup,
 }
@@ -189,11 +231,11 @@ fn fold(workgroups: u64) -> (u32, u32) {
 }
 
 /// Layout of one group of a kernel; `None` if the kernel does not use the group.
-fn group_layout(gpu: &Gpu, shader: &Shader, group: u32) -> Option<wgpu::BindGroupLayout> {
+fn group_layout(device: &wgpu::Device, shader: &Shader, group: u32) -> Option<wgpu::BindGroupLayout> {
     let entries: Vec<_> =
         shader.bindings.iter().filter(|b| b.group == group).map(|b| layout_entry(b.index, b.kind)).collect();
     let describe = |entries| {
-        gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(shader.stem), entries })
+        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(shader.stem), entries })
     };
     (!entries.is_empty()).then(|| describe(&entries))
 }

@@ -3,6 +3,7 @@
 mod adapter;
 mod buffer;
 mod commands;
+mod compiler;
 mod fault;
 mod kernel;
 mod pace;
@@ -28,6 +29,7 @@ use crate::{
     error::{Error, Result},
     memory::available,
 };
+use compiler::Compiler;
 use fault::Faults;
 use kernel::Parts;
 use pace::Pace;
@@ -48,6 +50,7 @@ pub struct Gpu {
     pace: Pace,
     timer: Option<Timer>,
     parts: Parts,
+    compiler: Compiler,
     dispatches: AtomicU64,
 }
 
@@ -102,6 +105,7 @@ impl Gpu {
             pace: Pace::new(pacing),
             timer,
             parts,
+            compiler: Compiler::new(),
             dispatches,
         })
     }

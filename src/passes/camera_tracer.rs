@@ -37,14 +37,34 @@ pub struct Tile {
     pub samples: u32,
 }
 
-/// Kernels and buffers of the camera pass.
+/// Kernels of the camera pass.
 #[derive(Debug)]
-pub struct CameraTracer {
+pub struct CameraKernels {
     start: Kernel,
     advance: Kernel,
     trace: Kernel,
     direct: DirectLighting,
     resolve: Kernel,
+}
+
+impl CameraKernels {
+    #[must_use]
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, settings: &Settings) -> Self {
+        let sees_lights = f64::from(u8::from(settings.mode.sees_lights()));
+        Self {
+            start: scene.kernel(gpu, "start_camera"),
+            advance: Kernel::new(gpu, "advance_queue", &[]),
+            trace: scene.kernel_with(gpu, "trace_camera", &[("SEES_LIGHTS", sees_lights)]),
+            direct: DirectLighting::new(gpu, scene, settings.light_samples),
+            resolve: Kernel::new(gpu, "resolve", &[]),
+        }
+    }
+}
+
+/// Kernels and buffers of the camera pass.
+#[derive(Debug)]
+pub struct CameraTracer {
+    kernels: CameraKernels,
     paths: Buffer,
     queues: [Buffer; 2],
     counters: Buffer,
@@ -88,15 +108,7 @@ impl CameraTracer {
         let offsets = settings.pixel_filter_offsets();
         let queue = || gpu.storage::<u32>("camera queue", TILE_POINTS);
         Ok(Self {
-            start: scene.kernel(gpu, "start_camera"),
-            advance: Kernel::new(gpu, "advance_queue", &[]),
-            trace: scene.kernel_with(
-                gpu,
-                "trace_camera",
-                &[("SEES_LIGHTS", f64::from(u8::from(settings.mode.sees_lights())))],
-            ),
-            direct: DirectLighting::new(gpu, scene, settings.light_samples),
-            resolve: Kernel::new(gpu, "resolve", &[]),
+            kernels: CameraKernels::new(gpu, scene, settings),
             paths: gpu.storage::<Path>("camera paths", TILE_POINTS)?,
             queues: [queue()?, queue()?],
             counters: gpu.storage::<Counters>("camera counters", 1)?,
@@ -184,7 +196,7 @@ impl CameraTracer {
     pub fn trace(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
         let own = [("tile", &uniform), ("points", &self.points), ("filter_table", &self.filter_table)];
-        self.follow(gpu, scene, (&self.start, &own, tile.pixels * tile.samples), (&self.trace, &own))
+        self.follow(gpu, scene, (&self.kernels.start, &own, tile.pixels * tile.samples), (&self.kernels.trace, &own))
     }
 
     /// Runs `start` in that many invocations and follows the paths that it starts with `trace`, each with its own buffers besides
@@ -208,7 +220,7 @@ impl CameraTracer {
             ];
             scene.with(&[&shared, own].concat())
         };
-        let advance = self.advance.bind(gpu, &named(0, &[]));
+        let advance = self.kernels.advance.bind(gpu, &named(0, &[]));
         let bindings = [0, 1].map(|input| trace.bind(gpu, &named(input, followed)));
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
@@ -218,7 +230,7 @@ impl CameraTracer {
         let mut surfaces = 0;
         loop {
             for _ in 0..BOUNCES_PER_SUBMISSION.min(self.view.max_bounces + 1 - surfaces) {
-                self.advance.dispatch(&mut encoder, &advance, 1);
+                self.kernels.advance.dispatch(&mut encoder, &advance, 1);
                 let bindings = &bindings[(surfaces % 2) as usize];
                 trace.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most);
                 surfaces += 1;
@@ -240,13 +252,13 @@ impl CameraTracer {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
         let buffers =
             [("tile", &uniform), ("points", &self.points), ("radiance", &self.radiance), ("counters", &self.counters)];
-        let (steps, points) = (self.direct.steps(scene), self.point_count(tile));
+        let (steps, points) = (self.kernels.direct.steps(scene), self.point_count(tile));
         let mut count = StepCount::default();
         for first in (0..steps).step_by(DIRECT_STEPS_PER_READ as usize) {
             let mut encoder = gpu.encoder();
             encoder.clear_buffer(&self.counters, 0, None);
             for step in first..steps.min(first + DIRECT_STEPS_PER_READ) {
-                self.direct.add(gpu, scene, &mut encoder, (step, points), &buffers);
+                self.kernels.direct.add(gpu, scene, &mut encoder, (step, points), &buffers);
             }
             gpu.submit(encoder);
             let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
@@ -261,7 +273,7 @@ impl CameraTracer {
     /// Faults of the driver.
     pub fn resolve(&self, gpu: &Gpu, tile: &Tile) -> Result<Vec<TilePixel>> {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
-        let bindings = self.resolve.bind(
+        let bindings = self.kernels.resolve.bind(
             gpu,
             &[
                 ("tile", &uniform),
@@ -271,7 +283,7 @@ impl CameraTracer {
             ],
         );
         let mut encoder = gpu.encoder();
-        self.resolve.dispatch(&mut encoder, &bindings, u64::from(tile.pixels));
+        self.kernels.resolve.dispatch(&mut encoder, &bindings, u64::from(tile.pixels));
         gpu.submit(encoder);
         gpu.read(&self.pixels, 0, u64::from(tile.pixels))
     }

@@ -122,6 +122,14 @@ struct Variant {
     counts: bool,
 }
 
+impl Variant {
+    fn of(settings: &GatherSettings, windows: u32) -> Self {
+        let polynomial = settings.density.polynomial();
+        let (moments, power) = (polynomial.moments, polynomial.power);
+        Self { windows, moments, power, counts: settings.radius.is_some() }
+    }
+}
+
 #[derive(Debug)]
 struct Compiled {
     search: Kernel,
@@ -157,6 +165,11 @@ impl<'s> Gather<'s> {
         let kernel = |stem| Kernel::new(gpu, stem, &[]);
         let (mark, key) = (kernel("mark_points"), kernel("key_points"));
         Self { options, scene, mark, key, radix: RadixSort::new(gpu), compiled: Vec::new(), scratch: None }
+    }
+
+    /// Has the kernels compiled for maps of one window, while others run.
+    pub fn compile_ahead(&mut self, gpu: &Gpu, settings: &GatherSettings) {
+        self.compile(gpu, Variant::of(settings, 1));
     }
 
     /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to `radiance` (`array<vec4f>`), and writes the
@@ -195,15 +208,7 @@ impl<'s> Gather<'s> {
         progress: &dyn Progress,
     ) -> Result<GatherStats> {
         let polynomial = settings.density.polynomial();
-        let compiled = self.compile(
-            gpu,
-            Variant {
-                windows: map.windows(),
-                moments: polynomial.moments,
-                power: polynomial.power,
-                counts: settings.radius.is_some(),
-            },
-        );
+        let compiled = self.compile(gpu, Variant::of(settings, map.windows()));
         if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
             self.scratch = Some(Scratch::new(gpu, count.min(BATCH), self.options.surveys())?);
         }

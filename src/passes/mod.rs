@@ -20,7 +20,7 @@ pub mod share_estimates;
 pub mod sort_photons;
 pub mod targets;
 
-pub use camera_tracer::{CameraTracer, StepCount, Tile};
+pub use camera_tracer::{CameraKernels, CameraTracer, StepCount, Tile};
 pub use final_gather::FinalGather;
 pub use gather::{Gather, GatherOptions, GatherSettings};
 pub use light_table::LightGroup;
