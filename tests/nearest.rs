@@ -423,7 +423,7 @@ fn the_sort_is_stable_at_every_size() {
         let mut random = Random(u64::from(count));
         let entries: Vec<[u32; 2]> = (0..count).map(|i| [random.next() as u32 & 0x3fff_0fff, i]).collect();
         let buffers = [gpu.storage_with("a", &entries).unwrap(), gpu.storage_with("b", &entries).unwrap()];
-        let sorted = radix.sort(&gpu, [&buffers[0], &buffers[1]], count, 30).unwrap();
+        let sorted = radix.sort(&gpu, [&buffers[0], &buffers[1]], count, 0..30).unwrap();
         let mut expected = entries.clone();
         expected.sort_by_key(|e| e[0]);
         let got: Vec<[u32; 2]> = gpu.read(&buffers[sorted], 0, count.into()).unwrap();

@@ -1,5 +1,7 @@
 //! Stable radix sort of (key, index) pairs, and prefix sums. Kernels: `count_digits`, `sum_spans`, `scan_spans`, `scatter_entries`.
 
+use std::ops::Range;
+
 use crate::{
     error::Result,
     gpu::{Buffer, Commands, Gpu, Kernel},
@@ -33,12 +35,12 @@ impl RadixSort {
         }
     }
 
-    /// Sorts the first `count` pairs of `entries[0]` by the low `bits` of their keys; equal keys keep their order.
+    /// Sorts the first `count` pairs of `entries[0]` by those bits of their keys, 0 the lowest; equal ones keep their order.
     /// Returns which of the two buffers holds the result; the other one is overwritten.
     ///
     /// # Errors
     /// [`crate::Error::Limit`] if the digit counts exceed a binding.
-    pub fn sort(&self, gpu: &Gpu, entries: [&Buffer; 2], count: u32, bits: u32) -> Result<usize> {
+    pub fn sort(&self, gpu: &Gpu, entries: [&Buffer; 2], count: u32, bits: Range<u32>) -> Result<usize> {
         if count < 2 {
             return Ok(0);
         }
@@ -48,7 +50,7 @@ impl RadixSort {
         let levels = scan_levels(gpu, u64::from(stride) * u64::from(DIGITS))?;
         let mut encoder = gpu.encoder();
         let mut from = 0;
-        for shift in (0..bits).step_by(DIGIT_BITS as usize) {
+        for shift in bits.step_by(DIGIT_BITS as usize) {
             let step = gpu.uniform("sort step", &SortStep { count, shift, stride, pad: 0 });
             let buffers = [
                 ("entries_in", entries[from]),

@@ -53,7 +53,7 @@ impl SortPhotons {
                 steps.push(step);
             }
             gpu.submit(encoder);
-            if radix.sort(gpu, [&entries[0], &entries[1]], count, KEY_BITS)? == 1 {
+            if radix.sort(gpu, [&entries[0], &entries[1]], count, 0..KEY_BITS)? == 1 {
                 entries.swap(0, 1);
             }
         }
