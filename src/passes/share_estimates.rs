@@ -7,8 +7,9 @@ use crate::{
     layout::{Gathered, ShareRound, VisiblePoint},
 };
 
-/// Pixels of a cell in each round. A coarser cell than 8 x 8 saves little: its points are few already.
-const ROUNDS: [u32; 4] = [64, 16, 4, 1];
+/// Pixels of a cell in each round. A coarser cell than 8 x 8 saves little, for its points are few already; so do sizes between these,
+/// for each round costs time of its own.
+const ROUNDS: [u32; 3] = [64, 4, 1];
 /// Samples that a cell has at least: of fewer, most would be queries themselves.
 const LEAST_CELL: u32 = 4;
 
@@ -33,7 +34,7 @@ pub struct Asked<'a> {
     pub points: &'a Buffer,
     pub count: u32,
     pub turn: u32,
-    /// What the estimates are added to, `vec4f`, and what is said of them, [`Gathered`].
+    /// What the estimates are added to, `vec4f` with the squared radius of the last in w, and what is said of them, [`Gathered`].
     pub radiance: &'a Buffer,
     pub gathered: &'a Buffer,
 }
@@ -110,8 +111,8 @@ impl EstimateSharing {
             ("round", &uniform),
             ("points", tile.points),
             ("queries", &scratch.queries),
+            ("query_rows", &scratch.queries),
             ("irradiance", &scratch.irradiance),
-            ("gathered", &scratch.gathered),
             ("radiance", tile.radiance),
         ];
         let mut encoder = gpu.encoder();

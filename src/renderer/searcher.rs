@@ -83,6 +83,7 @@ fn kd_estimates(gpu: &Gpu, tree: &KdMap, settings: &Settings, asked: &Asked, pro
         if points[i].valid != 0 {
             (0..3).for_each(|c| radiance[i][c] += estimate.radiance[c] as f32);
             let Estimate { radius_squared, count, fingerprint, .. } = estimate;
+            radiance[i][3] = radius_squared;
             gathered[i] = Gathered { radius_squared, count, fingerprint };
         }
     }
