@@ -273,7 +273,7 @@ fn shared_estimates_err_like_those_of_every_sample() {
         let settings = Settings { share_reach, ..settings.clone() };
         session.picture(&maps, &settings, &Silent).expect("a picture").frame.radiance
     };
-    let (shared, own) = (picture(&base, 1.0), picture(&base, 0.0));
+    let (shared, own) = (picture(&base, base.share_reach), picture(&base, 0.0));
     let error = |picture: &[[f32; 3]]| rel_mse(picture, &reference, None);
     assert!(error(&shared) < 1.03 * error(&own), "{} against {}", error(&shared), error(&own));
     let sum = |picture: &[[f32; 3]]| picture.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
