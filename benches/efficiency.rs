@@ -9,14 +9,11 @@ use caustica::image::{difference::rel_mse, read_exr};
 
 const RUNS: usize = 5;
 /// What is asked for, beside the size.
-const SETTINGS: [&str; 7] = [
+const SETTINGS: [&str; 4] = [
     "--photons 200k --spp 4",
     "--photons 200k --spp 4 --share 0",
-    "--photons 200k --spp 4 --raw-estimate",
-    "--photons 200k --spp 4 --raw-estimate --share 0",
-    "--photons 200k --spp 1 --raw-estimate --share 0",
-    "--global-photons 100k --caustic-photons 50k --spp 2 --raw-estimate -k 60",
-    "--photons 50k --spp 2 --raw-estimate -k 60",
+    "--global-photons 100k --caustic-photons 50k --spp 2 --raw-estimate -k 90 --max-bounces 12",
+    "--photons 70k --spp 2 --raw-estimate -k 70 --max-bounces 12",
 ];
 
 fn main() {
