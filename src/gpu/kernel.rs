@@ -259,7 +259,23 @@ fn layout_entry(binding: u32, kind: BindingKind) -> wgpu::BindGroupLayoutEntry {
 
 #[cfg(test)]
 mod tests {
-    use super::fold;
+    use std::sync::Arc;
+
+    use super::{Kernel, fold};
+    use crate::gpu::{Gpu, shaders::SHADERS};
+
+    #[test]
+    fn equal_kernels_are_compiled_once() {
+        let gpu = Gpu::open(None).expect("tests need an adapter");
+        let same = |a: &[(&str, f64)], b: &[(&str, f64)]| {
+            Arc::ptr_eq(&Kernel::new(&gpu, "gather", a).0, &Kernel::new(&gpu, "gather", b).0)
+        };
+        assert!(same(&[("WINDOWS", 1.0)], &[("NOT_OF_THIS_KERNEL", 3.0), ("WINDOWS", 1.0)]));
+        assert!(!same(&[("WINDOWS", 1.0)], &[("WINDOWS", 2.0)]), "control: constants matter");
+        // Those that were asked for and never used hold up nobody.
+        let all: Vec<_> = SHADERS.iter().map(|shader| Kernel::new(&gpu, shader.stem, &[])).collect();
+        drop((gpu, all));
+    }
 
     #[test]
     fn dispatches_fold_to_two_dimensions() {
