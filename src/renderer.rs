@@ -48,6 +48,7 @@ pub struct Render {
 pub fn render(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
     let start = Instant::now();
     let session = Session::open(gpu, scene, settings, progress)?;
+    session.compile_ahead(settings);
     let maps = session.photon_maps(settings, progress)?;
     let mut render = session.picture(&maps, settings, progress)?;
     render.stats.seconds.total = start.elapsed().as_secs_f64();
@@ -113,13 +114,12 @@ impl<'a> Session<'a> {
         let around = scene.cameras.iter().map(|camera| packed(&probe.at(camera.position.as_dvec3())));
         let (camera_media, fits): (Vec<Media>, Vec<bool>) = around.unzip();
         stats.warnings.extend(too_deep("cameras", fits.iter().filter(|fits| !**fits).count()));
-        let session = Self { gpu, scene, buffers, camera_media, stats };
-        session.compile_ahead(settings);
-        Ok(session)
+        Ok(Self { gpu, scene, buffers, camera_media, stats })
     }
 
-    /// Has the kernels compiled that a picture by these settings needs, in their order, while the first of them run.
-    fn compile_ahead(&self, settings: &Settings) {
+    /// Has the kernels compiled that a picture by these settings needs, in their order, while the first of them run. Those of final
+    /// gathering, and any that were not asked for here, are compiled when they are needed.
+    pub fn compile_ahead(&self, settings: &Settings) {
         let (gpu, scene) = (self.gpu, &self.buffers);
         if settings.mode.traces_photons() {
             drop((PhotonTracer::new(gpu, scene), MapKernels::new(gpu)));

@@ -19,9 +19,9 @@ use crate::{
 const BATCH: u32 = 32_768;
 /// Bits of a point's key: its place on the curve.
 const POINT_KEY_BITS: u32 = 30;
-/// Of how many of them, the highest, points are sorted, by the number of points at most: few points have few blocks of packets to be
-/// dealt to, and lie in the order of pixels, which near ones keep.
-const SORTED_BITS: [(u32, u32); 3] = [(4096, 8), (16_384, 16), (BATCH, POINT_KEY_BITS)];
+/// By how many of them, the highest, up to so many points are sorted: few points have few blocks of packets to be dealt to, and lie
+/// in the order of pixels, which near ones keep. More are sorted by all.
+const FEW_SORTED_BITS: [(u32, u32); 2] = [(4096, 8), (16_384, 16)];
 /// Queries of one invocation.
 const PACKET: u32 = 4;
 /// Packets that are searched or wait together.
@@ -333,7 +333,7 @@ impl<'s> Gather<'s> {
         gpu.submit(encoder);
         let waiting = gpu.read::<u32>(&marks[0], info.count.into(), 1)?[0];
         let entries = [&scratch.entries[0], &scratch.entries[1]];
-        let bits = SORTED_BITS.iter().find(|(most, _)| waiting <= *most).map_or(POINT_KEY_BITS, |(_, bits)| *bits);
+        let bits = FEW_SORTED_BITS.iter().find(|(most, _)| waiting <= *most).map_or(POINT_KEY_BITS, |(_, bits)| *bits);
         let sorted = self.radix.sort(gpu, entries, waiting, POINT_KEY_BITS - bits..POINT_KEY_BITS)?;
         Ok((&scratch.entries[sorted], waiting))
     }

@@ -176,6 +176,7 @@ impl Study<'_> {
 
     /// A tiny render before the first that is timed: drivers compile kernels when they are used first.
     fn warm_up(&self, session: &Session, settings: &Settings) -> Result<()> {
+        session.compile_ahead(settings);
         let tiny = Settings {
             global_photons: 64,
             caustic_photons: 64,
