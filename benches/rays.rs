@@ -1,24 +1,20 @@
-//! Incoherent rays: the kernel that traces camera paths against obvhs' BVH2 with rayon on the same cores.
+//! Incoherent rays: the traversal of all kernels, in one that does nothing else, against obvhs' BVH2 with rayon on the same cores.
 //!
-//! `cargo bench --bench rays`. Rays start at random points in a room and go in random directions; the geometry is a
-//! closed box that holds a wavy height field.
+//! `cargo bench --bench rays`. Both sides read rays from memory and write each ray's nearest hit. Rays start at random points
+//! in a room and go in random directions; the geometry is a closed box that holds a wavy height field.
 
 use std::time::Instant;
 
 use caustica::{
     bvh::Bvh,
-    gpu::{Gpu, Kernel},
-    layout::{self, CameraTile, Counters, FirstHit, VisiblePoint},
+    gpu::Gpu,
+    layout::{Ray, RayHit},
     passes::SceneBuffers,
     scene::{Material, Scene, Surface, Triangle},
     settings::Settings,
 };
 use glam::{Vec3, vec3};
-use obvhs::{
-    BvhBuildParams,
-    bvh2::builder::build_bvh2_from_tris,
-    ray::{Ray, RayHit},
-};
+use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris, ray};
 use rayon::prelude::*;
 
 const RAYS: usize = 1 << 20;
@@ -41,39 +37,14 @@ fn compare(gpu: &Gpu, scene: &Scene) {
     println!("{:>10} {a:>14.0} {b:>14.0} {:>8.2}", scene.triangles.len(), a / b);
 }
 
-/// Best of some runs of `trace_camera` over all rays, after one to warm up.
-fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[(Vec3, Vec3)]) -> f64 {
-    let bvh = Bvh::build(scene);
-    let buffers = SceneBuffers::new(gpu, scene, &bvh, &Settings::default()).expect("the scene fits");
-    let kernel: Kernel = buffers.kernel(gpu, "trace_camera");
-    let count = RAYS as u64;
-    let path = |(origin, direction): &(Vec3, Vec3)| layout::Path {
-        origin: origin.to_array(),
-        direction: direction.to_array(),
-        ..Default::default()
-    };
-    let paths = gpu.storage_with("paths", &rays.iter().map(path).collect::<Vec<_>>()).expect("fits");
-    let queue = gpu.storage_with("queue", &(0..RAYS as u32).collect::<Vec<_>>()).expect("fits");
-    let queue_out = gpu.storage::<u32>("queue out", count).expect("fits");
-    let counters =
-        gpu.storage_with("counters", &[Counters { current: RAYS as u32, ..Default::default() }]).expect("fits");
-    let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
-    let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
-    let radiance = gpu.storage::<[f32; 4]>("radiance", count).expect("fits");
-    let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..Default::default() });
-    let bindings = kernel.bind(
-        gpu,
-        &buffers.with(&[
-            ("tile", &tile),
-            ("paths", &paths),
-            ("queue_in", &queue),
-            ("queue_out", &queue_out),
-            ("counters", &counters),
-            ("points", &points),
-            ("first_hits", &first_hits),
-            ("radiance", &radiance),
-        ]),
-    );
+/// Best of some runs over all rays, after one to warm up.
+fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[Ray]) -> f64 {
+    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &Settings::default()).expect("the scene fits");
+    let kernel = buffers.kernel(gpu, "trace_rays");
+    let count = rays.len() as u64;
+    let rays = gpu.storage_with("rays", rays).expect("fits");
+    let hits = gpu.storage::<RayHit>("hits", count).expect("fits");
+    let bindings = kernel.bind(gpu, &buffers.with(&[("rays", &rays), ("hits", &hits)]));
     best_of(|| {
         let mut encoder = gpu.encoder();
         kernel.dispatch(&mut encoder, &bindings, count);
@@ -82,7 +53,7 @@ fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[(Vec3, Vec3)]) -> f64 {
     })
 }
 
-fn native_seconds(scene: &Scene, rays: &[(Vec3, Vec3)]) -> f64 {
+fn native_seconds(scene: &Scene, rays: &[Ray]) -> f64 {
     let triangle = |t: &Triangle| obvhs::triangle::Triangle {
         v0: t.positions[0].into(),
         v1: t.positions[1].into(),
@@ -91,21 +62,20 @@ fn native_seconds(scene: &Scene, rays: &[(Vec3, Vec3)]) -> f64 {
     let triangles: Vec<_> = scene.triangles.iter().map(triangle).collect();
     let bvh = build_bvh2_from_tris(&triangles, BvhBuildParams::medium_build(), &mut Default::default());
     let ordered: Vec<_> = bvh.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
-    best_of(|| {
-        let hits: usize = rays
-            .par_chunks(4096)
-            .map(|chunk| {
-                let hit = |(origin, direction): &(Vec3, Vec3)| {
-                    let mut hit = RayHit::none();
-                    let ray = Ray::new_inf((*origin).into(), (*direction).into());
-                    bvh.ray_traverse(ray, &mut hit, |ray, i| ordered[i].intersect(ray));
-                    usize::from(hit.t.is_finite())
-                };
-                chunk.iter().map(hit).sum::<usize>()
-            })
-            .sum();
-        assert!(hits > 0, "rays in a closed room hit something");
-    })
+    let nearest = |ray: &Ray| {
+        let mut hit = ray::RayHit::none();
+        let ray = ray::Ray::new_inf(ray.origin.into(), ray.direction.into());
+        bvh.ray_traverse(ray, &mut hit, |ray, i| ordered[i].intersect(ray));
+        hit
+    };
+    let mut hits = vec![ray::RayHit::none(); rays.len()];
+    let seconds = best_of(|| {
+        rays.par_chunks(4096).zip(hits.par_chunks_mut(4096)).for_each(|(rays, hits)| {
+            rays.iter().zip(hits).for_each(|(ray, hit)| *hit = nearest(ray));
+        });
+    });
+    assert!(hits.iter().any(|hit| hit.t.is_finite()), "rays in a closed room hit something");
+    seconds
 }
 
 fn best_of(mut work: impl FnMut()) -> f64 {
@@ -119,7 +89,7 @@ fn best_of(mut work: impl FnMut()) -> f64 {
 }
 
 /// Well-spread points and directions without order: additive recurrence over hashed indices.
-fn rays() -> Vec<(Vec3, Vec3)> {
+fn rays() -> Vec<Ray> {
     let unit = |i: u32, salt: u32| {
         let mut h = i.wrapping_mul(0x9e37_79b9) ^ salt.wrapping_mul(0x85eb_ca6b);
         h = (h ^ (h >> 16)).wrapping_mul(0x7feb_352d);
@@ -130,7 +100,7 @@ fn rays() -> Vec<(Vec3, Vec3)> {
         let origin = vec3(unit(i, 1), 0.3 + 0.7 * unit(i, 2), unit(i, 3)) * 1.98 - vec3(0.99, 0.0, 0.99);
         let (z, phi) = (1.0 - 2.0 * unit(i, 4), std::f32::consts::TAU * unit(i, 5));
         let r = (1.0 - z * z).max(0.0).sqrt();
-        (origin, vec3(r * phi.cos(), z, r * phi.sin()))
+        Ray { origin: origin.to_array(), direction: [r * phi.cos(), z, r * phi.sin()], ..Ray::default() }
     };
     (0..RAYS as u32).map(ray).collect()
 }

@@ -8,23 +8,51 @@ use bytemuck::{Pod, Zeroable};
 
 /// Invocations per workgroup, in every kernel.
 pub const WORKGROUP_SIZE: u32 = 64;
-/// Levels that a BVH traversal can postpone; [`crate::bvh`] builds no deeper tree.
-pub const BVH_STACK: usize = 32;
+/// Children of a BVH node at most.
+pub const BVH_WIDTH: usize = 4;
+/// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.
+pub const BVH_STACK: usize = 48;
+/// Those that a traversal with the short stack can postpone.
+pub const BVH_SHORT_STACK: usize = 20;
 /// Media that a path can be inside of at once.
 pub const MEDIA_DEPTH: usize = 4;
 
-/// One interior node of the binary BVH: both children's boxes and what they are, four words at a time as software
-/// Vulkan reads them fastest. Made by `BvhNode::new` in `src/bvh/node.rs`.
+/// One interior node of the BVH: its children's boxes and what they are, four words at a time as software Vulkan reads
+/// them fastest. Interior children come before leaves and lie side by side, as do the primitives of all its leaves. Made
+/// by `BvhNode::new` in `src/bvh/node.rs`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct BvhNode {
-    /// Bits of the lower corner of the left child's box, metres; then its node, or its first
-    /// primitive if it is a leaf.
-    pub left_low: [u32; 4],
-    /// Bits of its upper corner; then the primitives of a leaf, 0 for an interior node.
-    pub left_high: [u32; 4],
-    pub right_low: [u32; 4],
-    pub right_high: [u32; 4],
+    /// Bits of the lower corner of the box around all children, metres; then the shape: for each axis eight bits, the exponent of
+    /// a step as in a float's bits, and from bit 24 two bits for each child, the primitives of a leaf less one.
+    pub frame: [u32; 4],
+    /// For each axis the lower bounds of the children's boxes, eight bits each, in steps from the corner; then the first
+    /// interior child in 28 bits and how many there are.
+    pub low: [u32; 4],
+    /// The upper bounds; then the leaves' first primitive in 28 bits and the number of all children.
+    pub high: [u32; 4],
+}
+
+/// A ray for `shaders/trace_rays.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Ray {
+    /// Metres.
+    pub origin: [f32; 3],
+    pub pad0: u32,
+    /// Unit vector.
+    pub direction: [f32; 3],
+    pub pad1: u32,
+}
+
+/// What it meets first.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct RayHit {
+    /// Distance, metres, and the weights of a triangle's second and third corner.
+    pub tuv: [f32; 3],
+    /// Index among the tree's primitives; [`u32::MAX`] if there is no hit.
+    pub primitive: u32,
 }
 
 /// Set in [`Primitive::material`] when the primitive is a sphere.

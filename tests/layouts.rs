@@ -39,7 +39,9 @@ macro_rules! twins {
 
 fn twins() -> Vec<Twin> {
     twins! {
-        BvhNode { left_low, left_high, right_low, right_high }
+        BvhNode { frame, low, high }
+        Ray { origin, pad0, direction, pad1 }
+        RayHit { tuv, primitive }
         Primitive { v0, material, e1, id, e2, emitter }
         Normals { n0, n1, n2, flat_shaded }
         Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }
@@ -81,6 +83,8 @@ fn constants() -> Vec<(&'static str, u64)> {
     constants![
         WORKGROUP_SIZE,
         BVH_STACK,
+        BVH_SHORT_STACK,
+        BVH_WIDTH,
         MEDIA_DEPTH,
         SPHERE_BIT,
         DELTA_BIT,

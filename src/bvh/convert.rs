@@ -1,30 +1,32 @@
-//! From one box per node to both children's boxes in their parent, no deeper than a traversal's stack.
+//! From a tree of any depth to one of [`MAX_HEIGHT`] levels at most, whose nodes know the boxes of both children.
 
 use obvhs::bvh2::Bvh2;
 
 use super::{BvhChild, MAX_LEAF};
-use crate::layout::{BVH_STACK, BvhNode};
 use crate::scene::Bounds;
 
-/// A child before it is written into its parent.
-struct Child {
-    bounds: Bounds,
-    first: u32,
-    /// 0 for an interior node.
-    count: u32,
+/// Interior nodes on the longest way down.
+pub(super) const MAX_HEIGHT: u32 = 32;
+
+/// A binary tree. The first of a child's primitives is a place in `order`.
+pub(super) struct Binary {
+    /// Parents before children; node 0 is the root.
+    pub nodes: Vec<[BvhChild; 2]>,
+    /// The primitives' indices in the order of the leaves.
+    pub order: Vec<u32>,
 }
 
-/// Nodes, and the primitives' indices in the order of the leaves. Needs two primitives or more.
-pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds]) -> (Vec<BvhNode>, Vec<u32>) {
-    let mut converter =
-        Converter { tree, bounds, subtrees: measure(tree), nodes: Vec::new(), order: Vec::with_capacity(bounds.len()) };
+/// Needs two primitives or more.
+pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds]) -> Binary {
+    let made = Binary { nodes: Vec::new(), order: Vec::with_capacity(bounds.len()) };
+    let mut converter = Converter { tree, bounds, subtrees: measure(tree), made };
     let root = converter.tree_node(0, 0);
     if root.count > 0 {
         // All primitives fit in one leaf: the root still needs two children.
-        let mut all = std::mem::take(&mut converter.order);
+        let mut all = std::mem::take(&mut converter.made.order);
         converter.even_halves(&mut all, 0);
     }
-    (converter.nodes, converter.order)
+    converter.made
 }
 
 /// Size of the part of the tree below a node.
@@ -68,24 +70,22 @@ struct Converter<'a> {
     tree: &'a Bvh2,
     bounds: &'a [Bounds],
     subtrees: Vec<Subtree>,
-    nodes: Vec<BvhNode>,
-    order: Vec<u32>,
+    made: Binary,
 }
 
 impl Converter<'_> {
     /// Converts the subtree of a node of the tree, below `depth` interior nodes. A subtree that is too deep is kept
     /// as far as an even split further down still ends in time.
-    fn tree_node(&mut self, index: u32, depth: u32) -> Child {
+    fn tree_node(&mut self, index: u32, depth: u32) -> BvhChild {
         let node = &self.tree.nodes[index as usize];
         if node.is_leaf() {
             let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
             let leaf = self.tree.primitive_indices[range].to_vec();
             return self.leaf(&leaf);
         }
-        let limit = BVH_STACK as u32;
         let children = [node.first_index, node.first_index + 1];
-        let fits = depth + self.subtrees[index as usize].height <= limit;
-        let fits_later = |child: u32| depth + 1 + even_height(self.subtrees[child as usize].primitives) <= limit;
+        let fits = depth + self.subtrees[index as usize].height <= MAX_HEIGHT;
+        let fits_later = |child: u32| depth + 1 + even_height(self.subtrees[child as usize].primitives) <= MAX_HEIGHT;
         if !fits && !children.into_iter().all(fits_later) {
             let mut below = self.primitives_below(index);
             return self.even_node(&mut below, depth);
@@ -94,24 +94,20 @@ impl Converter<'_> {
     }
 
     /// Writes a node whose children `convert` makes.
-    fn interior(&mut self, convert: impl FnOnce(&mut Self) -> [Child; 2]) -> Child {
-        let index = self.nodes.len();
-        self.nodes.push(BvhNode::default());
-        let [left, right] = convert(self);
-        self.nodes[index] = BvhNode::new([&left, &right].map(|child| BvhChild {
-            min: child.bounds.min.to_array(),
-            max: child.bounds.max.to_array(),
-            first: child.first,
-            count: child.count,
-        }));
-        Child { bounds: left.bounds.union(right.bounds), first: index as u32, count: 0 }
+    fn interior(&mut self, convert: impl FnOnce(&mut Self) -> [BvhChild; 2]) -> BvhChild {
+        let index = self.made.nodes.len();
+        self.made.nodes.push([BvhChild { bounds: Bounds::EMPTY, first: 0, count: 0 }; 2]);
+        let children = convert(self);
+        self.made.nodes[index] = children;
+        let [left, right] = children.map(|child| child.bounds);
+        BvhChild { bounds: left.union(right), first: index as u32, count: 0 }
     }
 
-    fn leaf(&mut self, primitives: &[u32]) -> Child {
-        let first = self.order.len() as u32;
-        self.order.extend_from_slice(primitives);
+    fn leaf(&mut self, primitives: &[u32]) -> BvhChild {
+        let first = self.made.order.len() as u32;
+        self.made.order.extend_from_slice(primitives);
         let bounds = primitives.iter().map(|i| self.bounds[*i as usize]).fold(Bounds::EMPTY, Bounds::union);
-        Child { bounds, first, count: primitives.len() as u32 }
+        BvhChild { bounds, first, count: primitives.len() as u32 }
     }
 
     /// All primitives below a node of the tree.
@@ -130,7 +126,7 @@ impl Converter<'_> {
     }
 
     /// A leaf, or a node with half of the primitives on each side.
-    fn even_node(&mut self, primitives: &mut [u32], depth: u32) -> Child {
+    fn even_node(&mut self, primitives: &mut [u32], depth: u32) -> BvhChild {
         if primitives.len() <= MAX_LEAF as usize {
             return self.leaf(primitives);
         }
@@ -138,7 +134,7 @@ impl Converter<'_> {
     }
 
     /// A node with half of the primitives on each side of the middle of the longest axis.
-    fn even_halves(&mut self, primitives: &mut [u32], depth: u32) -> Child {
+    fn even_halves(&mut self, primitives: &mut [u32], depth: u32) -> BvhChild {
         let middle = |i: u32| self.bounds[i as usize].min + self.bounds[i as usize].max;
         let centers =
             primitives.iter().map(|i| middle(*i)).fold(Bounds::EMPTY, |b, p| b.union(Bounds { min: p, max: p }));

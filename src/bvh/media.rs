@@ -155,7 +155,7 @@ fn split(v: DVec3, axis: usize) -> (DVec2, f64) {
 /// Whether the line along the axis may pass through the box.
 fn is_on_line(child: &BvhChild, point: DVec3, axis: usize) -> bool {
     [(axis + 1) % 3, (axis + 2) % 3].into_iter().all(|k| {
-        let (min, max) = (f64::from(child.min[k]), f64::from(child.max[k]));
+        let (min, max) = (f64::from(child.bounds.min[k]), f64::from(child.bounds.max[k]));
         let slack = BOX_SLACK * min.abs().max(max.abs());
         (min - slack..=max + slack).contains(&point[k])
     })

@@ -1,8 +1,9 @@
-//! Binary bounding volume hierarchy in the layout that the shaders traverse.
+//! Bounding volume hierarchy in the layout that the shaders traverse: a binary tree whose levels are then joined to nodes
+//! of up to [`BVH_WIDTH`](crate::layout::BVH_WIDTH) children with their boxes in few bits, so that a ray loads little.
 //!
 //! Node 0 is the root and always there. A scene with fewer than two primitives is filled up with triangles without
-//! area, which no ray hits, so that both children of every node exist and no kernel has a special case. Following
-//! the far child later, a traversal postpones at most [`BVH_STACK`] children.
+//! area, which no ray hits, so that every node has two children and no kernel has a special case. Following
+//! farther children later, a traversal postpones at most [`BVH_STACK`] of them.
 
 use glam::Vec3;
 use obvhs::BvhBuildParams;
@@ -22,6 +23,7 @@ mod media;
 mod node;
 #[cfg(test)]
 mod tests;
+mod widen;
 
 /// Primitives of a leaf at most.
 pub const MAX_LEAF: u32 = 4;
@@ -53,7 +55,7 @@ impl Bvh {
         }
         primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
         let bounds: Vec<Bounds> = primitives.iter().map(bounds).collect();
-        let (nodes, order) = convert::convert(&build_binary(&bounds), &bounds);
+        let (nodes, order) = widen::widen(&convert::convert(&build_binary(&bounds), &bounds));
         let normals = |primitive: &Primitive| {
             scene.triangles.get(primitive.id as usize).map_or(Normals::default(), corner_normals)
         };
@@ -61,20 +63,19 @@ impl Bvh {
         Self { normals: primitives.iter().map(normals).collect(), nodes, primitives }
     }
 
-    /// Interior nodes on the longest way from the root to a leaf: what a traversal can postpone at most.
+    /// Children that a traversal postpones at most.
     #[must_use]
-    pub fn depth(&self) -> usize {
-        let mut depths = vec![1_usize; self.nodes.len()];
+    pub fn most_postponed(&self) -> usize {
+        // Those above each node.
+        let mut postponed = vec![0_usize; self.nodes.len()];
+        let mut most = 0;
         for (i, node) in self.nodes.iter().enumerate() {
-            for child in node.children() {
-                if child.count == 0 {
-                    depths[child.first as usize] = depths[i] + 1;
-                }
-            }
+            let here = postponed[i] + node.children().count() - 1;
+            node.children().filter(|child| child.count == 0).for_each(|child| postponed[child.first as usize] = here);
+            most = most.max(here);
         }
-        let depth = depths.into_iter().max().unwrap_or(0);
-        debug_assert!(depth <= BVH_STACK);
-        depth
+        debug_assert!(most <= BVH_STACK);
+        most
     }
 }
 

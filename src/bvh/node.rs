@@ -1,13 +1,23 @@
-//! Packing a node's children.
+//! Packing a node's children: corners of boxes in 8 bits each, as steps of a power of two from the node's lower corner
+//! (Ylitie, Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", section 3.1).
 
-use crate::layout::BvhNode;
+use glam::Vec3;
+
+use crate::layout::{BVH_WIDTH, BvhNode};
+use crate::scene::Bounds;
+
+/// Bits of a node's or a primitive's index; above them stands how many there are.
+const INDEX_BITS: u32 = 28;
+/// Largest number of steps.
+const MAX_STEPS: u32 = 255;
+/// Exponent bits of the largest finite number.
+const MAX_EXPONENT: u32 = 254;
 
 /// A child of a [`BvhNode`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BvhChild {
-    /// Corners of its box, metres.
-    pub min: [f32; 3],
-    pub max: [f32; 3],
+    /// Box around it, metres: no smaller than what it holds.
+    pub bounds: Bounds,
     /// Interior child: index of its node. Leaf: index of its first primitive.
     pub first: u32,
     /// Primitives of a leaf; 0 for an interior node.
@@ -15,26 +25,73 @@ pub struct BvhChild {
 }
 
 impl BvhNode {
+    /// From the boxes of its children, those of interior nodes before those of leaves, at most [`BVH_WIDTH`] in all; how many
+    /// primitives each leaf has, 1 to 4; and where its nodes and its primitives begin.
     #[must_use]
-    pub fn new([left, right]: [BvhChild; 2]) -> Self {
-        let pack = |[x, y, z]: [f32; 3], w: u32| [x.to_bits(), y.to_bits(), z.to_bits(), w];
-        Self {
-            left_low: pack(left.min, left.first),
-            left_high: pack(left.max, left.count),
-            right_low: pack(right.min, right.first),
-            right_high: pack(right.max, right.count),
+    pub fn new(boxes: &[Bounds], leaves: &[u32], first_node: u32, first_primitive: u32) -> Self {
+        debug_assert!(boxes.len() <= BVH_WIDTH && leaves.len() <= boxes.len());
+        let interior = boxes.len() - leaves.len();
+        let corner = boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(*b)).min;
+        let [x, y, z] = corner.to_array().map(f32::to_bits);
+        let mut node = Self {
+            frame: [x, y, z, 0],
+            low: [0, 0, 0, first_node | (interior as u32) << INDEX_BITS],
+            high: [0, 0, 0, first_primitive | (boxes.len() as u32) << INDEX_BITS],
+        };
+        for axis in 0..3 {
+            let highest = boxes.iter().map(|b| b.max[axis]).fold(corner[axis], f32::max);
+            let exponent = exponent(corner[axis], highest);
+            let at = |steps: u32| plane(corner[axis], exponent, steps);
+            let guess = |place: f32| ((place - corner[axis]) / step(exponent)) as u32;
+            node.frame[3] |= exponent << (8 * axis);
+            for (slot, b) in boxes.iter().enumerate() {
+                let below = (0..=guess(b.min[axis]).min(MAX_STEPS)).rev().find(|q| at(*q) <= b.min[axis]);
+                let above = (guess(b.max[axis]).min(MAX_STEPS)..=MAX_STEPS).find(|q| at(*q) >= b.max[axis]);
+                node.low[axis] |= below.unwrap_or(0) << (8 * slot);
+                node.high[axis] |= above.unwrap_or(MAX_STEPS) << (8 * slot);
+            }
         }
+        for (leaf, count) in leaves.iter().enumerate() {
+            node.frame[3] |= (count - 1) << (24 + 2 * (interior + leaf));
+        }
+        node
     }
 
-    /// Left and right child.
-    #[must_use]
-    pub fn children(&self) -> [BvhChild; 2] {
-        let corner = |[x, y, z, _]: [u32; 4]| [x, y, z].map(f32::from_bits);
-        [(self.left_low, self.left_high), (self.right_low, self.right_high)].map(|(low, high)| BvhChild {
-            min: corner(low),
-            max: corner(high),
-            first: low[3],
-            count: high[3],
+    /// Its children, in the order in which they were given.
+    pub fn children(&self) -> impl Iterator<Item = BvhChild> + use<> {
+        let Self { frame: [x, y, z, shape], low, high } = *self;
+        let corner = [x, y, z].map(f32::from_bits);
+        let place = move |axis: usize, words: [u32; 4], slot: u32| {
+            plane(corner[axis], (shape >> (8 * axis)) & 0xff, (words[axis] >> (8 * slot)) & 0xff)
+        };
+        let index = move |word: u32| word & ((1 << INDEX_BITS) - 1);
+        let mut first_primitive = index(high[3]);
+        (0..high[3] >> INDEX_BITS).map(move |slot| {
+            let at = |words| Vec3::from_array(std::array::from_fn(|axis| place(axis, words, slot)));
+            let bounds = Bounds { min: at(low), max: at(high) };
+            if slot < low[3] >> INDEX_BITS {
+                return BvhChild { bounds, first: index(low[3]) + slot, count: 0 };
+            }
+            let count = 1 + ((shape >> (24 + 2 * slot)) & 3);
+            first_primitive += count;
+            BvhChild { bounds, first: first_primitive - count, count }
         })
     }
+}
+
+/// The smallest exponent with which [`MAX_STEPS`] reach from `low` to `high`.
+fn exponent(low: f32, high: f32) -> u32 {
+    let too_small = ((high - low) / MAX_STEPS as f32).to_bits() >> 23;
+    let reaches = |exponent: &u32| plane(low, *exponent, MAX_STEPS) >= high;
+    (too_small.min(MAX_EXPONENT)..=MAX_EXPONENT).find(reaches).unwrap_or(MAX_EXPONENT)
+}
+
+/// Length of a step: a power of two, or 0 for an exponent of 0.
+fn step(exponent: u32) -> f32 {
+    f32::from_bits(exponent << 23)
+}
+
+/// A place that many steps from a node's corner; the shaders' arithmetic, bit for bit. The product is exact.
+fn plane(corner: f32, exponent: u32, steps: u32) -> f32 {
+    corner + steps as f32 * step(exponent)
 }

@@ -25,6 +25,8 @@ pub struct SceneBuffers {
     normals: Buffer,
     materials: Buffer,
     has_spheres: bool,
+    /// Whether the short stack is enough for the tree.
+    is_shallow: bool,
     sampler: Sampler,
     /// Some surface both reflects and transmits.
     pub has_dielectrics: bool,
@@ -55,6 +57,7 @@ impl SceneBuffers {
             materials: gpu.storage_with("materials", &materials)?,
             has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
             has_spheres: !scene.spheres.is_empty(),
+            is_shallow: bvh.most_postponed() <= layout::BVH_SHORT_STACK,
             sampler: settings.sampler,
             lights,
         })
@@ -72,6 +75,7 @@ impl SceneBuffers {
         let mut overrides = vec![
             ("SAMPLER", f64::from(self.sampler())),
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
+            ("SHALLOW", f64::from(u8::from(self.is_shallow))),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
             ("SPLIT", f64::from(u8::from(self.nodes.window + self.primitives.window > 0))),
             ("NODE_WINDOW", window_or_all(self.nodes.window)),

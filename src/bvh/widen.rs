@@ -1,0 +1,98 @@
+//! From a binary tree to nodes of up to [`BVH_WIDTH`] children.
+
+use super::{BvhChild, convert::Binary, convert::MAX_HEIGHT};
+use crate::layout::{BVH_STACK, BVH_WIDTH, BvhNode};
+use crate::scene::Bounds;
+
+// Two levels of the binary tree make one here, which postpones all children but one.
+const _: () = assert!(most_postponed(MAX_HEIGHT) <= BVH_STACK as u32 && BVH_WIDTH == 4);
+
+/// Nodes, parents before children, and the primitives' indices in the order of the leaves.
+pub(super) fn widen(binary: &Binary) -> (Vec<BvhNode>, Vec<u32>) {
+    let mut widener = Widener {
+        binary,
+        heights: heights(binary),
+        nodes: vec![BvhNode::default()],
+        order: Vec::with_capacity(binary.order.len()),
+    };
+    widener.node(0, 0, BVH_STACK as u32);
+    (widener.nodes, widener.order)
+}
+
+/// Interior nodes on the longest way down from each.
+fn heights(binary: &Binary) -> Vec<u32> {
+    let mut heights = vec![1; binary.nodes.len()];
+    for (i, children) in binary.nodes.iter().enumerate().rev() {
+        let below = children.iter().filter(|child| child.count == 0).map(|child| heights[child.first as usize]);
+        heights[i] += below.max().unwrap_or(0);
+    }
+    heights
+}
+
+/// Children that are postponed at most in a binary tree of a height, if two of its levels are always joined.
+const fn most_postponed(height: u32) -> u32 {
+    (BVH_WIDTH as u32 - 1) * height.div_ceil(2)
+}
+
+struct Widener<'a> {
+    binary: &'a Binary,
+    heights: Vec<u32>,
+    nodes: Vec<BvhNode>,
+    order: Vec<u32>,
+}
+
+impl Widener<'_> {
+    /// Writes a node of the binary tree, and all below it, to place `at`; `room` more children may be postponed.
+    fn node(&mut self, at: usize, index: usize, room: u32) {
+        let mut children = self.opened_by_area(index);
+        let fits = |child: &BvhChild| self.postponed_below(child) + children.len() as u32 - 1 <= room;
+        if !children.iter().all(fits) {
+            children = self.opened_by_level(index);
+        }
+        let room = room - (children.len() as u32 - 1);
+        children.sort_by_key(|child| child.count > 0);
+        let interior = children.iter().take_while(|child| child.count == 0).count();
+        let boxes: Vec<Bounds> = children.iter().map(|child| child.bounds).collect();
+        let leaves: Vec<u32> = children[interior..].iter().map(|leaf| leaf.count).collect();
+        let first_node = self.nodes.len();
+        self.nodes[at] = BvhNode::new(&boxes, &leaves, first_node as u32, self.order.len() as u32);
+        for leaf in &children[interior..] {
+            let range = leaf.first as usize..(leaf.first + leaf.count) as usize;
+            self.order.extend_from_slice(&self.binary.order[range]);
+        }
+        self.nodes.resize(first_node + interior, BvhNode::default());
+        for (i, child) in children[..interior].iter().enumerate() {
+            self.node(first_node + i, child.first as usize, room);
+        }
+    }
+
+    fn postponed_below(&self, child: &BvhChild) -> u32 {
+        if child.count > 0 { 0 } else { most_postponed(self.heights[child.first as usize]) }
+    }
+
+    /// Children of a node, the largest of them replaced by its own as long as there is place: most rays enter it.
+    fn opened_by_area(&self, index: usize) -> Vec<BvhChild> {
+        let mut children = self.binary.nodes[index].to_vec();
+        while children.len() < BVH_WIDTH {
+            let interior = children.iter().enumerate().filter(|(_, child)| child.count == 0);
+            let largest = interior.max_by(|a, b| half_area(a.1.bounds).total_cmp(&half_area(b.1.bounds)));
+            let Some((largest, child)) = largest else { break };
+            let opened = self.binary.nodes[child.first as usize];
+            children.splice(largest..=largest, opened);
+        }
+        children
+    }
+
+    /// The children's children.
+    fn opened_by_level(&self, index: usize) -> Vec<BvhChild> {
+        let open = |child: &BvhChild| {
+            if child.count > 0 { vec![*child] } else { self.binary.nodes[child.first as usize].to_vec() }
+        };
+        self.binary.nodes[index].iter().flat_map(open).collect()
+    }
+}
+
+fn half_area(bounds: Bounds) -> f32 {
+    let size = bounds.max - bounds.min;
+    size.x * size.y + size.y * size.z + size.z * size.x
+}
