@@ -3,6 +3,7 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | sampler | every prefix of a Sobol set is fair and spread: each 2^n-th of an axis has its share | independent numbers are fair and not spread |
+//! | matrices | the Sobol sequence's columns are those of the recurrences | the next column is not |
 //! | gain | integrals by Sobol sets err far less than by independent numbers | two sets of independent numbers err alike |
 //! | filters | offsets have the filter's moments and distribution, the mean of a picture stays | another filter's distribution |
 //! | lens | circles of confusion have the closed form's size | the sharp plane has none |
@@ -105,6 +106,30 @@ fn every_prefix_is_fair_and_spread() {
     }
     // A further seed is another set: the scrambling is no fixed table.
     assert_ne!(sobol, set(Sampler::Sobol, 1000, 6));
+}
+
+/// Columns of the matrices of x² + x + 1 and x³ + x + 1, 32 bits each, by the recurrences of Joe and Kuo 2008 from their
+/// first numbers.
+fn sobol_columns() -> Vec<[u32; 2]> {
+    let mut columns = vec![[0x8000_0000, 0x8000_0000], [0xc000_0000, 0xc000_0000], [0x6000_0000, 0x2000_0000]];
+    for i in 3..32 {
+        let ([_, a], [b, c], [d, _]) = (columns[i - 3], columns[i - 2], columns[i - 1]);
+        columns.push([d ^ b ^ (b >> 2), c ^ a ^ (a >> 3)]);
+    }
+    columns
+}
+
+#[test]
+fn matrices_follow_from_their_polynomials() {
+    let text = include_str!("../shaders/lib/sampler.wesl");
+    let is_there = |i: usize, [z, w]: [u32; 2]| {
+        let (z, w) = (z.reverse_bits(), w.reverse_bits());
+        text.contains(&format!("column(place, {:#x}u, vec2u({z:#x}u, {w:#x}u))", 1_u32 << i))
+    };
+    let columns = sobol_columns();
+    columns.iter().enumerate().for_each(|(i, column)| assert!(is_there(i, *column), "column {i}"));
+    assert_eq!(text.matches(" column(place, ").count(), columns.len(), "further columns");
+    assert!(!is_there(7, columns[8]), "control: any column passes");
 }
 
 #[test]
