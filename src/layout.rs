@@ -10,9 +10,11 @@ use bytemuck::{Pod, Zeroable};
 pub const WORKGROUP_SIZE: u32 = 64;
 /// Children of a BVH node at most.
 pub const BVH_WIDTH: usize = 4;
+/// Bits of the index of a node or a primitive where more stands above it.
+pub const BVH_INDEX_BITS: u32 = 28;
 /// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.
 pub const BVH_STACK: usize = 48;
-/// Those that a traversal with the short stack can postpone.
+/// Those that a traversal with the short stack can postpone: enough for scenes of some hundred primitives.
 pub const BVH_SHORT_STACK: usize = 20;
 /// Media that a path can be inside of at once.
 pub const MEDIA_DEPTH: usize = 4;
@@ -24,9 +26,9 @@ pub const MEDIA_DEPTH: usize = 4;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct BvhNode {
     /// Bits of the lower corner of the box around all children, metres; then the shape: for each axis eight bits, the exponent of
-    /// a step as in a float's bits, and from bit 24 two bits for each child, the primitives of a leaf less one.
-    pub frame: [u32; 4],
-    /// For each axis the lower bounds of the children's boxes, eight bits each, in steps from the corner; then the first
+    /// a unit as in a float's bits, and from bit 24 two bits for each child, the primitives of a leaf less one.
+    pub grid: [u32; 4],
+    /// For each axis the lower bounds of the children's boxes, eight bits each, in units from the corner; then the first
     /// interior child in 28 bits and how many there are.
     pub low: [u32; 4],
     /// The upper bounds; then the leaves' first primitive in 28 bits and the number of all children.

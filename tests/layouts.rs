@@ -39,7 +39,7 @@ macro_rules! twins {
 
 fn twins() -> Vec<Twin> {
     twins! {
-        BvhNode { frame, low, high }
+        BvhNode { grid, low, high }
         Ray { origin, pad0, direction, pad1 }
         RayHit { tuv, primitive }
         Primitive { v0, material, e1, id, e2, emitter }
@@ -82,6 +82,7 @@ macro_rules! constants {
 fn constants() -> Vec<(&'static str, u64)> {
     constants![
         WORKGROUP_SIZE,
+        BVH_INDEX_BITS,
         BVH_STACK,
         BVH_SHORT_STACK,
         BVH_WIDTH,

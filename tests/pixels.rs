@@ -3,7 +3,8 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | sampler | every prefix of a Sobol set is fair and spread: each 2^n-th of an axis has its share | independent numbers are fair and not spread |
-//! | matrices | the Sobol sequence's columns are those of the recurrences | the next column is not |
+//! | pairs | two dimensions of a Sobol set are spread together, in rectangles of every shape | independent numbers are not |
+//! | matrices | columns of the third and fourth dimension are those of the recurrences | the next column is not |
 //! | gain | integrals by Sobol sets err far less than by independent numbers | two sets of independent numbers err alike |
 //! | filters | offsets have the filter's moments and distribution, the mean of a picture stays | another filter's distribution |
 //! | lens | circles of confusion have the closed form's size | the sharp plane has none |
@@ -106,6 +107,26 @@ fn every_prefix_is_fair_and_spread() {
     }
     // A further seed is another set: the scrambling is no fixed table.
     assert_ne!(sobol, set(Sampler::Sobol, 1000, 6));
+}
+
+/// Over 256 places the first two dimensions have one point in each of 256 equal rectangles, whatever their shape.
+#[test]
+fn two_dimensions_are_spread_together() {
+    let spread = |points: &[DVec2]| {
+        (0..=8).all(|level| {
+            let (columns, rows) = (1 << level, 256 >> level);
+            let mut seen = vec![0; 256];
+            for p in points {
+                let place = |x: f64, parts: usize| (((x + 0.5) * parts as f64) as usize).min(parts - 1);
+                seen[place(p.x, columns) * rows + place(p.y, rows)] += 1;
+            }
+            seen.iter().all(|n| *n == 1)
+        })
+    };
+    for seed in 0..4 {
+        assert!(spread(&set(Sampler::Sobol, 256, seed)), "seed {seed}");
+        assert!(!spread(&set(Sampler::Random, 256, seed)), "control: independent numbers are spread");
+    }
 }
 
 /// Columns of the matrices of x² + x + 1 and x³ + x + 1, 32 bits each, by the recurrences of Joe and Kuo 2008 from their

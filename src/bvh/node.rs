@@ -1,15 +1,17 @@
-//! Packing a node's children: corners of boxes in 8 bits each, as steps of a power of two from the node's lower corner
+//! Packing a node's children: corners of boxes in 8 bits each, in units of a power of two from the node's lower corner
 //! (Ylitie, Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", section 3.1).
 
 use glam::Vec3;
 
-use crate::layout::{BVH_WIDTH, BvhNode};
+use super::MAX_LEAF;
+use crate::layout::{BVH_INDEX_BITS, BVH_WIDTH, BvhNode};
 use crate::scene::Bounds;
 
-/// Bits of a node's or a primitive's index; above them stands how many there are.
-const INDEX_BITS: u32 = 28;
-/// Largest number of steps.
-const MAX_STEPS: u32 = 255;
+// The primitives of a leaf less one have two bits.
+const _: () = assert!(MAX_LEAF <= 4);
+
+/// Largest number of units.
+const MAX_UNITS: u32 = 255;
 /// Exponent bits of the largest finite number.
 const MAX_EXPONENT: u32 = 254;
 
@@ -26,50 +28,51 @@ pub struct BvhChild {
 
 impl BvhNode {
     /// From the boxes of its children, those of interior nodes before those of leaves, at most [`BVH_WIDTH`] in all; how many
-    /// primitives each leaf has, 1 to 4; and where its nodes and its primitives begin.
+    /// primitives each leaf has, 1 to [`MAX_LEAF`]; and where its nodes and its primitives begin, below 2^28.
     #[must_use]
     pub fn new(boxes: &[Bounds], leaves: &[u32], first_node: u32, first_primitive: u32) -> Self {
         debug_assert!(boxes.len() <= BVH_WIDTH && leaves.len() <= boxes.len());
+        assert!((first_node | first_primitive) >> BVH_INDEX_BITS == 0, "a tree of more than 2^28 nodes or primitives");
         let interior = boxes.len() - leaves.len();
         let corner = boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(*b)).min;
         let [x, y, z] = corner.to_array().map(f32::to_bits);
         let mut node = Self {
-            frame: [x, y, z, 0],
-            low: [0, 0, 0, first_node | (interior as u32) << INDEX_BITS],
-            high: [0, 0, 0, first_primitive | (boxes.len() as u32) << INDEX_BITS],
+            grid: [x, y, z, 0],
+            low: [0, 0, 0, first_node | (interior as u32) << BVH_INDEX_BITS],
+            high: [0, 0, 0, first_primitive | (boxes.len() as u32) << BVH_INDEX_BITS],
         };
         for axis in 0..3 {
             let highest = boxes.iter().map(|b| b.max[axis]).fold(corner[axis], f32::max);
             let exponent = exponent(corner[axis], highest);
-            let at = |steps: u32| plane(corner[axis], exponent, steps);
-            let guess = |place: f32| ((place - corner[axis]) / step(exponent)) as u32;
-            node.frame[3] |= exponent << (8 * axis);
+            let at = |units: u32| plane(corner[axis], exponent, units);
+            let guess = |place: f32| ((place - corner[axis]) / unit(exponent)) as u32;
+            node.grid[3] |= exponent << (8 * axis);
             for (slot, b) in boxes.iter().enumerate() {
-                let below = (0..=guess(b.min[axis]).min(MAX_STEPS)).rev().find(|q| at(*q) <= b.min[axis]);
-                let above = (guess(b.max[axis]).min(MAX_STEPS)..=MAX_STEPS).find(|q| at(*q) >= b.max[axis]);
+                let below = (0..=guess(b.min[axis]).min(MAX_UNITS)).rev().find(|q| at(*q) <= b.min[axis]);
+                let above = (guess(b.max[axis]).min(MAX_UNITS)..=MAX_UNITS).find(|q| at(*q) >= b.max[axis]);
                 node.low[axis] |= below.unwrap_or(0) << (8 * slot);
-                node.high[axis] |= above.unwrap_or(MAX_STEPS) << (8 * slot);
+                node.high[axis] |= above.unwrap_or(MAX_UNITS) << (8 * slot);
             }
         }
         for (leaf, count) in leaves.iter().enumerate() {
-            node.frame[3] |= (count - 1) << (24 + 2 * (interior + leaf));
+            node.grid[3] |= (count - 1) << (24 + 2 * (interior + leaf));
         }
         node
     }
 
     /// Its children, in the order in which they were given.
     pub fn children(&self) -> impl Iterator<Item = BvhChild> + use<> {
-        let Self { frame: [x, y, z, shape], low, high } = *self;
+        let Self { grid: [x, y, z, shape], low, high } = *self;
         let corner = [x, y, z].map(f32::from_bits);
         let place = move |axis: usize, words: [u32; 4], slot: u32| {
             plane(corner[axis], (shape >> (8 * axis)) & 0xff, (words[axis] >> (8 * slot)) & 0xff)
         };
-        let index = move |word: u32| word & ((1 << INDEX_BITS) - 1);
+        let index = move |word: u32| word & ((1 << BVH_INDEX_BITS) - 1);
         let mut first_primitive = index(high[3]);
-        (0..high[3] >> INDEX_BITS).map(move |slot| {
+        (0..high[3] >> BVH_INDEX_BITS).map(move |slot| {
             let at = |words| Vec3::from_array(std::array::from_fn(|axis| place(axis, words, slot)));
             let bounds = Bounds { min: at(low), max: at(high) };
-            if slot < low[3] >> INDEX_BITS {
+            if slot < low[3] >> BVH_INDEX_BITS {
                 return BvhChild { bounds, first: index(low[3]) + slot, count: 0 };
             }
             let count = 1 + ((shape >> (24 + 2 * slot)) & 3);
@@ -79,19 +82,19 @@ impl BvhNode {
     }
 }
 
-/// The smallest exponent with which [`MAX_STEPS`] reach from `low` to `high`.
+/// The smallest exponent with which [`MAX_UNITS`] reach from `low` to `high`.
 fn exponent(low: f32, high: f32) -> u32 {
-    let too_small = ((high - low) / MAX_STEPS as f32).to_bits() >> 23;
-    let reaches = |exponent: &u32| plane(low, *exponent, MAX_STEPS) >= high;
+    let too_small = ((high - low) / MAX_UNITS as f32).to_bits() >> 23;
+    let reaches = |exponent: &u32| plane(low, *exponent, MAX_UNITS) >= high;
     (too_small.min(MAX_EXPONENT)..=MAX_EXPONENT).find(reaches).unwrap_or(MAX_EXPONENT)
 }
 
-/// Length of a step: a power of two, or 0 for an exponent of 0.
-fn step(exponent: u32) -> f32 {
+/// Length of a unit: a power of two, or 0 for an exponent of 0.
+fn unit(exponent: u32) -> f32 {
     f32::from_bits(exponent << 23)
 }
 
-/// A place that many steps from a node's corner; the shaders' arithmetic, bit for bit. The product is exact.
-fn plane(corner: f32, exponent: u32, steps: u32) -> f32 {
-    corner + steps as f32 * step(exponent)
+/// A place that many units from a node's corner; the shaders' arithmetic, bit for bit. The product is exact.
+fn plane(corner: f32, exponent: u32, units: u32) -> f32 {
+    corner + units as f32 * unit(exponent)
 }

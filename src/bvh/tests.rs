@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{Bvh, BvhChild, MAX_LEAF, bounds};
-use crate::layout::{BVH_STACK, BVH_WIDTH, Primitive, SPHERE_BIT};
+use crate::layout::{BVH_STACK, BVH_WIDTH, BvhNode, Primitive, SPHERE_BIT};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
 /// Random numbers in 0..1 (PCG hash, Jarzynski and Olano 2020).
@@ -160,6 +160,45 @@ fn holds_all_and_finds_what_brute_force_finds() {
     }
 }
 
+/// By how many units of its axis the box of the first child exceeds the given one at most on a side, and the unit; `None` if the
+/// box does not hold it. The second child spans the node: from `low` on over `extent`.
+fn looseness(node: &BvhNode, given: Bounds) -> Option<f32> {
+    let child = node.children().next().expect("it has two");
+    let holds = child.bounds.union(given) == child.bounds;
+    let unit = f32::from_bits((node.grid[3] & 0xff) << 23);
+    let beyond = (given.min.x - child.bounds.min.x).max(child.bounds.max.x - given.max.x);
+    // An ulp is as close as places lie together there.
+    let ulp = f32::EPSILON * given.max.abs().max(given.min.abs()).x;
+    holds.then_some((beyond - ulp).max(0.0) / unit.max(f32::MIN_POSITIVE))
+}
+
+#[test]
+fn boxes_in_few_bits_are_tight_and_hold_what_they_should() {
+    let along_x = |low: f32, high: f32| Bounds { min: Vec3::new(low, 0.0, 0.0), max: Vec3::new(high, 1.0, 1.0) };
+    let mut random = Random(3);
+    for corner in [0.0, 1.0, -1.0, 1e6, -1e6, 1e18] {
+        for extent in [0.0, 1e-40, 1e-20, 1e-6, 1.0, 3.0, 1e6, 1e18] {
+            for _ in 0..50 {
+                let (a, b) = (random.next(), random.next());
+                let all = along_x(corner, corner + extent);
+                let given = along_x(corner + a.min(b) * extent, corner + a.max(b) * extent);
+                let node = BvhNode::new(&[given, all], &[1, 1], 0, 0);
+                let what = format!("{given:?} in {all:?}");
+                assert!(looseness(&node, given).is_some_and(|units| units <= 1.0), "{what}");
+                // No more units than eight bits count, and half of these are needed.
+                let reach = (all.max.x - corner) / f32::from_bits((node.grid[3] & 0xff) << 23).max(f32::MIN_POSITIVE);
+                let counts = (127.0..=255.0).contains(&reach) || extent < 1e-36 || extent < corner.abs() * 1e-4;
+                assert!(counts, "{reach} units in {what}");
+            }
+        }
+    }
+    // Control: a lower bound one unit higher leaves something out.
+    let (given, all) = (along_x(0.3, 0.6), along_x(0.0, 1.0));
+    let node = BvhNode::new(&[given, all], &[1, 1], 0, 0);
+    let higher = BvhNode { low: [node.low[0] + 1, node.low[1], node.low[2], node.low[3]], ..node };
+    assert!(looseness(&node, given).is_some() && looseness(&higher, given).is_none());
+}
+
 /// Negative control: a box that has shrunk, and a primitive that is listed twice, are found.
 #[test]
 fn a_shrunken_box_is_found() {
@@ -178,7 +217,7 @@ fn a_shrunken_box_is_found() {
 
 /// Triangles that grow by a factor from one corner: the area heuristic peels one off at each level.
 #[test]
-fn depth_stays_within_the_stack() {
+fn what_is_postponed_stays_within_the_stack() {
     let mut scene = Scene::default();
     for i in 0..4000 {
         let s = 1.02_f32.powi(i - 2000);

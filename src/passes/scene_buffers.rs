@@ -12,7 +12,7 @@ use crate::{
     bvh::Bvh,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{self, BvhNode, DELTA_BIT, Primitive, SPHERE_BIT},
+    layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
     scene::{Material, Scene, Surface},
     settings::{LightUnit, Sampler, Settings},
 };
@@ -20,13 +20,13 @@ use crate::{
 /// The scene's buffers.
 #[derive(Debug)]
 pub struct SceneBuffers {
-    nodes: Windows,
+    nodes: Buffer,
     primitives: Windows,
     normals: Buffer,
     materials: Buffer,
     has_spheres: bool,
     /// Whether the short stack is enough for the tree.
-    is_shallow: bool,
+    short_stack: bool,
     sampler: Sampler,
     /// Some surface both reflects and transmits.
     pub has_dielectrics: bool,
@@ -46,18 +46,18 @@ impl SceneBuffers {
     /// Uploads the scene.
     ///
     /// # Errors
-    /// [`crate::Error::Limit`] if an array exceeds two bindings, or the normals one; as [`LightBuffers::new`].
+    /// [`crate::Error::Limit`] if the primitives exceed two bindings, or the nodes or normals one; as [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &Settings) -> Result<Self> {
         let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.light_unit)).collect();
         let lights = LightBuffers::new(gpu, scene, bvh, settings)?;
         Ok(Self {
-            nodes: Windows::new::<BvhNode>(gpu, "bvh nodes", &bvh.nodes)?,
+            nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
             primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &lights.table))?,
             normals: gpu.storage_with("normals", &bvh.normals)?,
             materials: gpu.storage_with("materials", &materials)?,
             has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
             has_spheres: !scene.spheres.is_empty(),
-            is_shallow: bvh.most_postponed() <= layout::BVH_SHORT_STACK,
+            short_stack: bvh.most_postponed() <= layout::BVH_SHORT_STACK,
             sampler: settings.sampler,
             lights,
         })
@@ -75,10 +75,9 @@ impl SceneBuffers {
         let mut overrides = vec![
             ("SAMPLER", f64::from(self.sampler())),
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
-            ("SHALLOW", f64::from(u8::from(self.is_shallow))),
+            ("SHORT_STACK", f64::from(u8::from(self.short_stack))),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
-            ("SPLIT", f64::from(u8::from(self.nodes.window + self.primitives.window > 0))),
-            ("NODE_WINDOW", window_or_all(self.nodes.window)),
+            ("SPLIT", f64::from(u8::from(self.primitives.window > 0))),
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
         ];
         overrides.extend_from_slice(others);
@@ -96,8 +95,7 @@ impl SceneBuffers {
     #[must_use]
     pub fn with<'a>(&'a self, others: &[(&'a str, &'a Buffer)]) -> Vec<(&'a str, &'a Buffer)> {
         let mut all = vec![
-            ("nodes", &self.nodes.low),
-            ("nodes_high", &self.nodes.high),
+            ("nodes", &self.nodes),
             ("primitives", &self.primitives.low),
             ("primitives_high", &self.primitives.high),
             ("normals", &self.normals),

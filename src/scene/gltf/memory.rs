@@ -3,7 +3,7 @@
 use super::fault::{Read, fault};
 use crate::memory::available;
 
-/// Triangles that a scene may have, so that all counts of nodes and corners fit into 32 bits with room to spare.
+/// Triangles that a scene may have, so that numbers of nodes and primitives fit into 28 bits, and those of corners into 32.
 const MAX_TRIANGLES: usize = 100_000_000;
 
 /// Memory that a triangle takes from mesh to hierarchy, bytes.
