@@ -8,8 +8,6 @@ use bytemuck::{Pod, Zeroable};
 
 /// Invocations per workgroup, in every kernel.
 pub const WORKGROUP_SIZE: u32 = 64;
-/// Children of a BVH node at most.
-pub const BVH_WIDTH: usize = 4;
 /// Bits of the index of a node or a primitive where more stands above it.
 pub const BVH_INDEX_BITS: u32 = 28;
 /// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.

@@ -85,7 +85,6 @@ fn constants() -> Vec<(&'static str, u64)> {
         BVH_INDEX_BITS,
         BVH_STACK,
         BVH_SHORT_STACK,
-        BVH_WIDTH,
         MEDIA_DEPTH,
         SPHERE_BIT,
         DELTA_BIT,

@@ -1,9 +1,9 @@
 //! Bounding volume hierarchy in the layout that the shaders traverse: a binary tree whose levels are then joined to nodes
-//! of up to [`BVH_WIDTH`](crate::layout::BVH_WIDTH) children with their boxes in few bits, so that a ray loads little.
+//! of up to [`WIDTH`] children with their boxes in few bits, so that a ray loads little.
 //!
 //! Node 0 is the root and always there: a scene with fewer than two primitives, of which no binary tree can be made, is filled
-//! up with triangles without area, which no ray hits. Following
-//! farther children later, a traversal postpones at most [`BVH_STACK`] of them.
+//! up with triangles without area, which no ray hits. Following farther children later, a traversal postpones at most
+//! [`BVH_STACK`] of them.
 
 use glam::Vec3;
 use obvhs::BvhBuildParams;
@@ -25,6 +25,9 @@ mod node;
 mod tests;
 mod widen;
 
+/// Children of a node at most.
+pub const WIDTH: usize = 4;
+
 /// Primitives of a leaf at most.
 pub const MAX_LEAF: u32 = 4;
 
@@ -45,6 +48,9 @@ pub struct Bvh {
 impl Bvh {
     /// Builds the tree over all triangles and spheres: PLOC with reinsertion (Meister and Bittner 2018, 2021). The
     /// same scene gives the same tree, on any number of threads.
+    ///
+    /// # Panics
+    /// With 2^28 triangles and spheres or more; files are refused long before.
     #[must_use]
     pub fn build(scene: &Scene) -> Self {
         let mut primitives: Vec<Primitive> = Vec::with_capacity(scene.triangles.len() + scene.spheres.len());
@@ -131,8 +137,7 @@ fn build_binary(bounds: &[Bounds]) -> Bvh2 {
         post_collapse_reinsertion_batch_ratio_multiplier: 2.0,
         sort_precision: SortPrecision::U64,
         max_prims_per_leaf: MAX_LEAF,
-        // In tests of a primitive; for a level of the binary tree, two of which are visited at once. From 0.5 to 1.5 rays took
-        // equally long, with 4 longer.
+        // In tests of a primitive, for a level of the binary tree.
         collapse_traversal_cost: 1.5,
     };
     let build = || build_bvh2(&boxes, parameters, &mut std::time::Duration::default());

@@ -3,8 +3,8 @@
 
 use glam::Vec3;
 
-use super::MAX_LEAF;
-use crate::layout::{BVH_INDEX_BITS, BVH_WIDTH, BvhNode};
+use super::{MAX_LEAF, WIDTH};
+use crate::layout::{BVH_INDEX_BITS, BvhNode};
 use crate::scene::Bounds;
 
 // The primitives of a leaf less one have two bits.
@@ -27,11 +27,14 @@ pub struct BvhChild {
 }
 
 impl BvhNode {
-    /// From the boxes of its children, those of interior nodes before those of leaves, at most [`BVH_WIDTH`] in all; how many
-    /// primitives each leaf has, 1 to [`MAX_LEAF`]; and where its nodes and its primitives begin, below 2^28.
+    /// From the boxes of its children, those of interior nodes before those of leaves, at most [`WIDTH`] in all; how many
+    /// primitives each leaf has, 1 to [`MAX_LEAF`]; and where its nodes and its primitives begin.
+    ///
+    /// # Panics
+    /// If one of these is not below 2^28.
     #[must_use]
     pub fn new(boxes: &[Bounds], leaves: &[u32], first_node: u32, first_primitive: u32) -> Self {
-        debug_assert!(boxes.len() <= BVH_WIDTH && leaves.len() <= boxes.len());
+        debug_assert!(boxes.len() <= WIDTH && leaves.len() <= boxes.len());
         assert!((first_node | first_primitive) >> BVH_INDEX_BITS == 0, "a tree of more than 2^28 nodes or primitives");
         let interior = boxes.len() - leaves.len();
         let corner = boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(*b)).min;

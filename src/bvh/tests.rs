@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::{Bvh, BvhChild, MAX_LEAF, bounds};
-use crate::layout::{BVH_STACK, BVH_WIDTH, BvhNode, Primitive, SPHERE_BIT};
+use super::{Bvh, BvhChild, MAX_LEAF, WIDTH, bounds};
+use crate::layout::{BVH_STACK, BvhNode, Primitive, SPHERE_BIT};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
 /// Random numbers in 0..1 (PCG hash, Jarzynski and Olano 2020).
@@ -116,7 +116,7 @@ fn fault(bvh: &Bvh) -> Option<String> {
     let mut held = vec![Bounds::EMPTY; bvh.nodes.len()];
     for (i, node) in bvh.nodes.iter().enumerate().rev() {
         let count = node.children().count();
-        if !(2..=BVH_WIDTH).contains(&count) {
+        if !(2..=WIDTH).contains(&count) {
             return Some(format!("node {i} has {count} children"));
         }
         for BvhChild { bounds: outer, first, count } in node.children() {

@@ -1,11 +1,11 @@
-//! From a binary tree to nodes of up to [`BVH_WIDTH`] children.
+//! From a binary tree to nodes of up to [`WIDTH`] children.
 
-use super::{BvhChild, convert::Binary, convert::MAX_HEIGHT};
-use crate::layout::{BVH_STACK, BVH_WIDTH, BvhNode};
+use super::{BvhChild, WIDTH, convert::Binary, convert::MAX_HEIGHT};
+use crate::layout::{BVH_STACK, BvhNode};
 use crate::scene::Bounds;
 
 // Two levels of the binary tree make one here, which postpones all children but one.
-const _: () = assert!(most_postponed(MAX_HEIGHT) <= BVH_STACK as u32 && BVH_WIDTH == 4);
+const _: () = assert!(most_postponed(MAX_HEIGHT) <= BVH_STACK as u32 && WIDTH == 4);
 
 /// Nodes, parents before children, and the primitives' indices in the order of the leaves.
 pub(super) fn widen(binary: &Binary) -> (Vec<BvhNode>, Vec<u32>) {
@@ -31,7 +31,7 @@ fn heights(binary: &Binary) -> Vec<u32> {
 
 /// Children that are postponed at most in a binary tree of a height, if two of its levels are always joined.
 const fn most_postponed(height: u32) -> u32 {
-    (BVH_WIDTH as u32 - 1) * height.div_ceil(2)
+    (WIDTH as u32 - 1) * height.div_ceil(2)
 }
 
 struct Widener<'a> {
@@ -73,7 +73,7 @@ impl Widener<'_> {
     /// Children of a node, the largest of them replaced by its own as long as there is place: most rays enter it.
     fn opened_by_area(&self, index: usize) -> Vec<BvhChild> {
         let mut children = self.binary.nodes[index].to_vec();
-        while children.len() < BVH_WIDTH {
+        while children.len() < WIDTH {
             let interior = children.iter().enumerate().filter(|(_, child)| child.count == 0);
             let largest = interior.max_by(|a, b| half_area(a.1.bounds).total_cmp(&half_area(b.1.bounds)));
             let Some((largest, child)) = largest else { break };
