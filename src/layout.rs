@@ -645,7 +645,7 @@ pub const SEARCH_STATE_BYTES: usize = 64;
 /// Bytes of `Disc` in the shaders: the surface around a query.
 pub const DISC_BYTES: usize = 48;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
-pub const GATHER_STATE_BYTES: usize = 576;
+pub const GATHER_STATE_BYTES: usize = 1072;
 
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of
 /// Efficient Representations for Independent Unit Vectors"); x in the low half. Twin of `encode_octahedral` in
