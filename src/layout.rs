@@ -12,8 +12,6 @@ pub const WORKGROUP_SIZE: u32 = 64;
 pub const BVH_INDEX_BITS: u32 = 28;
 /// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.
 pub const BVH_STACK: usize = 48;
-/// Those that a traversal with the short stack can postpone: enough for scenes of some hundred primitives.
-pub const BVH_SHORT_STACK: usize = 20;
 /// Media that a path can be inside of at once.
 pub const MEDIA_DEPTH: usize = 4;
 

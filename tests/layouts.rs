@@ -84,7 +84,6 @@ fn constants() -> Vec<(&'static str, u64)> {
         WORKGROUP_SIZE,
         BVH_INDEX_BITS,
         BVH_STACK,
-        BVH_SHORT_STACK,
         MEDIA_DEPTH,
         SPHERE_BIT,
         DELTA_BIT,

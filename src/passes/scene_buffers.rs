@@ -25,8 +25,8 @@ pub struct SceneBuffers {
     normals: Buffer,
     materials: Buffer,
     has_spheres: bool,
-    /// Whether the short stack is enough for the tree.
-    short_stack: bool,
+    /// Children that a traversal can postpone.
+    stack: usize,
     sampler: Sampler,
     /// Some surface both reflects and transmits.
     pub has_dielectrics: bool,
@@ -57,7 +57,8 @@ impl SceneBuffers {
             materials: gpu.storage_with("materials", &materials)?,
             has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
             has_spheres: !scene.spheres.is_empty(),
-            short_stack: bvh.most_postponed() <= layout::BVH_SHORT_STACK,
+            // In steps, so that few variants of a kernel are compiled.
+            stack: bvh.most_postponed().max(1).next_multiple_of(16),
             sampler: settings.sampler,
             lights,
         })
@@ -75,7 +76,7 @@ impl SceneBuffers {
         let mut overrides = vec![
             ("SAMPLER", f64::from(self.sampler())),
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
-            ("SHORT_STACK", f64::from(u8::from(self.short_stack))),
+            ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
             ("SPLIT", f64::from(u8::from(self.primitives.window > 0))),
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
