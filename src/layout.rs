@@ -384,7 +384,8 @@ pub struct CameraTile {
     pub focus: f32,
     /// Entries of the pixel filter's table, less 1.
     pub filter_steps: u32,
-    pub pad: u32,
+    /// Samples in the tile's margin: they follow those of its pixels.
+    pub margin: u32,
     /// Media around the lens, as in [`Light::media`].
     pub media: [u32; MEDIA_DEPTH],
 }
@@ -540,6 +541,11 @@ pub struct Gathered {
     pub fingerprint: u32,
 }
 
+/// Pixels along the side of a cell of a tile's margin; see `shaders/lib/margin.wesl`.
+pub const MARGIN_CELL: u32 = 8;
+/// Camera samples of such a cell.
+pub const MARGIN_SAMPLES: u32 = 16;
+
 /// One round in which points of a tile share estimates; see `shaders/lib/share.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -550,12 +556,15 @@ pub struct ShareRound {
     pub cell_pixels: u32,
     /// Samples of each pixel in the tile.
     pub samples: u32,
-    /// The samples of a pixel of which a query is chosen.
+    /// The samples of a pixel of which a query is chosen, and in which of the cell's pixels: every step-th.
     pub candidates: u32,
+    pub step: u32,
+    /// Cells of the tile's margin that take part.
+    pub margin: u32,
     pub branches: u32,
     /// Square of the distance within which a point takes a query's estimate, over that of the estimate's radius.
     pub reach_squared: f32,
-    /// Visible points of the tile.
+    /// Visible points of the tile, without its margin.
     pub points: u32,
     /// As in [`GatherInfo`].
     pub turn: u32,

@@ -54,7 +54,7 @@ fn twins() -> Vec<Twin> {
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
         Store { staged, first_photon, photons, map_bit }
-        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, pad, media }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media }
         FinalStep { ray, rays, points, pad }
         FirstHit { normal, depth, albedo, alpha }
         TilePixel { radiance, alpha, normal, depth, albedo, non_finite }
@@ -66,7 +66,7 @@ fn twins() -> Vec<Twin> {
         MapInfo { count, levels, split, pad }
         GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, turn, pad0, pad1 }
         Gathered { radius_squared, count, fingerprint }
-        ShareRound { cells, cell_pixels, samples, candidates, branches, reach_squared, points, turn }
+        ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, turn }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
         KeyStep { count, window_first, window_count, fine }
@@ -85,6 +85,8 @@ fn constants() -> Vec<(&'static str, u64)> {
         BVH_INDEX_BITS,
         BVH_STACK,
         MEDIA_DEPTH,
+        MARGIN_CELL,
+        MARGIN_SAMPLES,
         SPHERE_BIT,
         DELTA_BIT,
         DIFFUSE,

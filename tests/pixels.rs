@@ -11,6 +11,7 @@
 //! | parallel | an orthographic camera shows true sizes at every distance | a perspective one does not |
 //! | crop | a part of a picture has the whole's bits | a part one pixel farther has not |
 //! | sharing | shared estimates err like estimates for every sample | other photons change more; a brighter picture errs more |
+//! | borders | shared estimates go on across the borders of tiles | a right half a little brighter does not |
 
 mod common;
 
@@ -330,4 +331,30 @@ fn shared_estimates_err_like_those_of_every_sample() {
     assert!(change > 0.0 && change < 0.5 * other, "{change} against {other}");
     let brighter: Vec<_> = shared.iter().map(|p| p.map(|x| 1.08 * x)).collect();
     assert!(error(&brighter) > 1.03 * error(&own), "control: a picture 8 % brighter errs as little");
+}
+
+/// Largest change from one column of a picture to the next, root mean square over the rows of the back wall, over the median of all
+/// columns there: at the borders of tiles, every `side` pixels.
+fn step_at_borders(radiance: &[[f32; 3]], width: usize, side: usize) -> f64 {
+    let (rows, columns) = (width / 5..2 * width / 5, width / 5..4 * width / 5);
+    let light = |x: usize, y: usize| f64::from(Vec3::from(radiance[y * width + x]).element_sum()).ln();
+    let step = |x: usize| rows.clone().map(|y| (light(x, y) - light(x - 1, y)).powi(2)).sum::<f64>().sqrt();
+    let mut all: Vec<f64> = columns.clone().map(step).collect();
+    all.sort_by(f64::total_cmp);
+    let at_borders = columns.filter(|x| x % side == 0).map(step).fold(0.0, f64::max);
+    at_borders / all[all.len() / 2]
+}
+
+#[test]
+fn shared_estimates_go_on_across_the_borders_of_tiles() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/diffuse.gltf");
+    let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
+    let asked = Settings { spp: 4, ..settings(Mode::IndirectPhotons, 20_000, 256) };
+    let mut radiance = render_scene(&scene, &asked).frame.radiance;
+    let step = step_at_borders(&radiance, 256, 128);
+    assert!(step < 2.0, "light changes {step} times as much where tiles meet as elsewhere");
+    let right = radiance.chunks_mut(256).flat_map(|row| &mut row[128..]).flatten();
+    right.for_each(|value| *value *= 1.04);
+    let step = step_at_borders(&radiance, 256, 128);
+    assert!(step > 2.0, "control: a right half 4 % brighter changes as little: {step}");
 }

@@ -6,12 +6,12 @@ use crate::{
     bvh::Media,
     error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CameraTile, Counters, FirstHit, Gathered, Path, TilePixel, VisiblePoint},
+    layout::{CameraTile, Counters, FirstHit, Gathered, MARGIN_CELL, MARGIN_SAMPLES, Path, TilePixel, VisiblePoint},
     scene::{Camera, Projection},
     settings::{Crop, Settings},
 };
 
-/// Visible points that a tile has room for.
+/// Visible points that a tile has room for, without its margin.
 const TILE_POINTS: u64 = 1 << 16;
 /// Places for paths of a sample where the scene has dielectrics: both ways are followed at the first two interfaces.
 const BRANCHES: u32 = 4;
@@ -106,25 +106,27 @@ impl CameraTracer {
     ) -> Result<Self> {
         let branches = if scene.has_dielectrics { BRANCHES } else { 1 };
         let offsets = settings.pixel_filter_offsets();
-        let queue = || gpu.storage::<u32>("camera queue", TILE_POINTS);
+        let view =
+            CameraTile { branches, filter_steps: offsets.len() as u32 - 1, media, ..view(camera, size, settings)? };
+        let has_margin = settings.share_reach > 0.0 && settings.mode.traces_photons();
+        // Estimates that are shared need the cells around a tile.
+        let margin = if has_margin { margin_cells(tile_sides(&view)) * MARGIN_SAMPLES } else { 0 };
+        let samples = TILE_POINTS / u64::from(branches) + u64::from(margin);
+        let places = samples * u64::from(branches);
+        let queue = || gpu.storage::<u32>("camera queue", places);
         Ok(Self {
             kernels: CameraKernels::new(gpu, scene, settings),
-            paths: gpu.storage::<Path>("camera paths", TILE_POINTS)?,
+            paths: gpu.storage::<Path>("camera paths", places)?,
             queues: [queue()?, queue()?],
             counters: gpu.storage::<Counters>("camera counters", 1)?,
             dispatch_arguments: gpu.storage::<[u32; 3]>("camera dispatch arguments", 1)?,
-            points: gpu.storage::<VisiblePoint>("visible points", TILE_POINTS)?,
-            radiance: gpu.storage::<[f32; 4]>("radiance", TILE_POINTS)?,
+            points: gpu.storage::<VisiblePoint>("visible points", places)?,
+            radiance: gpu.storage::<[f32; 4]>("radiance", places)?,
             gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
-            first_hits: gpu.storage::<FirstHit>("first hits", TILE_POINTS / u64::from(branches))?,
+            first_hits: gpu.storage::<FirstHit>("first hits", samples)?,
             pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
-            view: CameraTile {
-                branches,
-                filter_steps: offsets.len() as u32 - 1,
-                media,
-                ..view(camera, size, settings)?
-            },
+            view: CameraTile { margin, ..view },
             window: settings.window(size),
         })
     }
@@ -134,11 +136,7 @@ impl CameraTracer {
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
-        let pixels = (TILE_POINTS as u32 / (self.view.branches * samples)).max(MIN_TILE_PIXELS);
-        let side_bits = |side: u32| side.next_power_of_two().ilog2();
-        let needed = 2 * side_bits(self.view.width.max(self.view.height)).max(MIN_TILE_PIXELS.ilog2() / 2);
-        let bits = pixels.ilog2().min(needed);
-        let (width, height) = (1_u32 << bits.div_ceil(2), 1_u32 << (bits / 2));
+        let (width, height) = tile_sides(&self.view);
         let mut tiles = Vec::new();
         for first_row in (0..self.view.height).step_by(height as usize) {
             for first_column in (0..self.view.width).step_by(width as usize) {
@@ -147,20 +145,20 @@ impl CameraTracer {
                 }
                 for first_sample in (0..self.view.spp).step_by(samples as usize) {
                     let samples = samples.min(self.view.spp - first_sample);
-                    tiles.push(Tile { pixels: 1 << bits, first_column, first_row, first_sample, samples });
+                    tiles.push(Tile { pixels: width * height, first_column, first_row, first_sample, samples });
                 }
             }
         }
         tiles
     }
 
-    /// Visible points of a tile, at most.
+    /// Visible points of a tile, at most, without its margin.
     #[must_use]
     pub fn point_count(&self, tile: &Tile) -> u32 {
         self.view.branches * tile.pixels * tile.samples
     }
 
-    /// Visible points that any tile has at most.
+    /// Visible points that any tile has at most, without its margin.
     #[must_use]
     pub fn room(&self) -> u64 {
         TILE_POINTS
@@ -174,6 +172,7 @@ impl CameraTracer {
             pixels: tile.pixels,
             samples: tile.samples,
             branches: self.view.branches,
+            margin: self.view.margin / MARGIN_SAMPLES,
             radiance: &self.radiance,
             gathered: &self.gathered,
         }
@@ -196,7 +195,12 @@ impl CameraTracer {
     pub fn trace(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
         let own = [("tile", &uniform), ("points", &self.points), ("filter_table", &self.filter_table)];
-        self.follow(gpu, scene, (&self.kernels.start, &own, tile.pixels * tile.samples), (&self.kernels.trace, &own))
+        self.follow(
+            gpu,
+            scene,
+            (&self.kernels.start, &own, tile.pixels * tile.samples + self.view.margin),
+            (&self.kernels.trace, &own),
+        )
     }
 
     /// Runs `start` in that many invocations and follows the paths that it starts with `trace`, each with its own buffers besides
@@ -225,7 +229,8 @@ impl CameraTracer {
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
         start.dispatch(&mut encoder, &start.bind(gpu, &named(1, started)), invocations.into());
-        let most = (u64::from(invocations) * u64::from(self.view.branches)).min(TILE_POINTS);
+        let most = (u64::from(invocations) * u64::from(self.view.branches))
+            .min(TILE_POINTS + u64::from(self.view.margin * self.view.branches));
         // The surface that ends the chain comes after max_bounces delta surfaces.
         let mut surfaces = 0;
         loop {
@@ -318,6 +323,20 @@ impl From<Counters> for StepCount {
             non_finite: u64::from(counters.non_finite),
         }
     }
+}
+
+/// Pixels along the sides of each tile, powers of 2.
+fn tile_sides(view: &CameraTile) -> (u32, u32) {
+    let pixels = (TILE_POINTS as u32 / (view.branches * view.spp.min(PIXEL_SAMPLES))).max(MIN_TILE_PIXELS);
+    let side_bits = |side: u32| side.next_power_of_two().ilog2();
+    let needed = 2 * side_bits(view.width.max(view.height)).max(MIN_TILE_PIXELS.ilog2() / 2);
+    let bits = pixels.ilog2().min(needed);
+    (1 << bits.div_ceil(2), 1 << (bits / 2))
+}
+
+/// Cells around a tile.
+fn margin_cells((width, height): (u32, u32)) -> u32 {
+    2 * (width / MARGIN_CELL + 2) + 2 * (height / MARGIN_CELL)
 }
 
 /// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows from the aspect.

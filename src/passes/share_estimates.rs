@@ -4,7 +4,7 @@
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{Gathered, ShareRound, VisiblePoint},
+    layout::{MARGIN_CELL, MARGIN_SAMPLES, ShareRound, VisiblePoint},
 };
 
 /// Pixels of a cell in each round. A coarser cell than 8 x 8 saves little, for its points are few already; so do sizes between these,
@@ -12,17 +12,22 @@ use crate::{
 const ROUNDS: [u32; 3] = [64, 4, 1];
 /// Samples that a cell has at least: of fewer, most would be queries themselves.
 const LEAST_CELL: u32 = 4;
+/// Of the pixels of a cell of the first round, one in so many has a sample from which its query is chosen.
+const FIRST_STEP: u32 = ROUNDS[0] / MARGIN_SAMPLES;
+const _: () = assert!(ROUNDS[0] == MARGIN_CELL * MARGIN_CELL);
 
 /// What of a tile is shared.
 #[derive(Debug)]
 pub struct SharedPoints<'a> {
-    /// [`VisiblePoint`]s: for each pixel, in Morton order, its samples, each with its branches.
+    /// [`VisiblePoint`]s: for each pixel, in Morton order, its samples, each with its branches; then those of the margin.
     pub points: &'a Buffer,
     /// A power of 2, at least 64.
     pub pixels: u32,
     pub samples: u32,
     pub branches: u32,
-    /// Radiance from each point, `vec4f`, and what was found there, [`Gathered`].
+    /// Cells of the margin.
+    pub margin: u32,
+    /// Radiance from each point, `vec4f`, and room for what gathers find, [`Gathered`](crate::layout::Gathered).
     pub radiance: &'a Buffer,
     pub gathered: &'a Buffer,
 }
@@ -34,7 +39,7 @@ pub struct Asked<'a> {
     pub points: &'a Buffer,
     pub count: u32,
     pub turn: u32,
-    /// What the estimates are added to, `vec4f` with the squared radius of the last in w, and what is said of them, [`Gathered`].
+    /// What the estimates are added to, `vec4f` with the squared radius of the last in w, and what is said of them, [`Gathered`](crate::layout::Gathered).
     pub radiance: &'a Buffer,
     pub gathered: &'a Buffer,
 }
@@ -57,7 +62,6 @@ struct Scratch {
     capacity: u32,
     queries: Buffer,
     irradiance: Buffer,
-    gathered: Buffer,
 }
 
 impl EstimateSharing {
@@ -79,11 +83,14 @@ impl EstimateSharing {
             if self.reach == 0.0 || cell_pixels * tile.samples < LEAST_CELL {
                 break;
             }
+            let is_first = cell_pixels == ROUNDS[0];
             let round = ShareRound {
                 cells: tile.pixels / cell_pixels,
                 cell_pixels,
                 samples: tile.samples,
                 candidates: if cell_pixels > 1 { 1 } else { tile.samples },
+                step: if is_first { FIRST_STEP } else { 1 },
+                margin: if is_first { tile.margin } else { 0 },
                 branches: tile.branches,
                 reach_squared: self.reach * self.reach,
                 points: count,
@@ -101,7 +108,7 @@ impl EstimateSharing {
         tile: &SharedPoints,
         estimates: &mut Estimates,
     ) -> Result<()> {
-        let queries = round.cells * round.branches;
+        let queries = (round.cells + round.margin) * round.branches;
         if self.scratch.as_ref().is_none_or(|s| s.capacity < queries) {
             self.scratch = Some(Scratch::new(gpu, queries)?);
         }
@@ -118,7 +125,8 @@ impl EstimateSharing {
         let mut encoder = gpu.encoder();
         self.choose.dispatch(&mut encoder, &self.choose.bind(gpu, &buffers), queries.into());
         gpu.submit(encoder);
-        let (radiance, gathered) = (&scratch.irradiance, &scratch.gathered);
+        // There are fewer queries than points.
+        let (radiance, gathered) = (&scratch.irradiance, tile.gathered);
         estimates(&Asked { points: &scratch.queries, count: queries, turn: 1, radiance, gathered })?;
         let mut encoder = gpu.encoder();
         self.share.dispatch(&mut encoder, &self.share.bind(gpu, &buffers), round.points.into());
@@ -133,7 +141,6 @@ impl Scratch {
             capacity,
             queries: gpu.storage::<VisiblePoint>("queries", capacity.into())?,
             irradiance: gpu.storage::<[f32; 4]>("irradiance at queries", capacity.into())?,
-            gathered: gpu.storage::<Gathered>("gathered at queries", capacity.into())?,
         })
     }
 }
