@@ -8,6 +8,9 @@ use crate::{
     pixel_filter::PixelFilter,
 };
 
+/// Largest radius of an estimate, metres: its square is far from the largest float.
+const MAX_RADIUS: f32 = 1e18;
+
 /// Which light reaches the picture, and by which way (the report's five modes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -288,16 +291,16 @@ impl Settings {
         if !(self.cone_constant >= 1.0 && self.cone_constant.is_finite()) {
             return fail("cone-constant", self.cone_constant.to_string(), "must be at least 1");
         }
-        if let Some(r) = self.max_radius.filter(|r| !(*r > 0.0 && r.is_finite())) {
-            return fail("max-radius", r.to_string(), "must be above 0");
+        if let Some(r) = self.max_radius.filter(|r| !(*r > 0.0 && *r <= MAX_RADIUS)) {
+            return fail("max-radius", r.to_string(), "must be above 0, at most 1e18");
         }
         if !(0.0..=2.0).contains(&self.share_reach) {
             return fail("share", self.share_reach.to_string(), "must be from 0 to 2");
         }
         match (self.search, self.radius) {
             (Search::Radius, None) => return fail("search", "radius".to_string(), "needs a radius"),
-            (Search::Radius, Some(r)) if !(r > 0.0 && r.is_finite()) => {
-                return fail("radius", r.to_string(), "must be above 0");
+            (Search::Radius, Some(r)) if !(r > 0.0 && r <= MAX_RADIUS) => {
+                return fail("radius", r.to_string(), "must be above 0, at most 1e18");
             }
             (Search::Radius, Some(_)) | (_, None) => {}
             (_, Some(r)) => return fail("radius", r.to_string(), "goes with the search by radius only"),

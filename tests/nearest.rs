@@ -331,16 +331,22 @@ fn a_tiny_budget_goes_on_in_further_dispatches_with_the_same_bits() {
     let mut bench = Bench::open();
     let mut random = Random(6);
     let photons = caustic_box(&mut random, 30_000, 0.3, 1e-2);
-    let points: Vec<_> = (0..200).map(|_| point(&mut random, false)).collect();
+    // Enough for pilots of both strides; these lie far apart.
+    let points: Vec<_> = (0..2500).map(|_| point(&mut random, false)).collect();
     let map = bench.map(&photons);
-    let whole = bench.ask(true, &map, &points, &settings(200));
-    let mut tiny = Gather::new(&bench.gpu, GatherOptions { step_budget: 3, ..GatherOptions::default() });
-    let pieces = run(&bench.gpu, &mut tiny, &map, &points, &settings(200));
-    assert!(pieces.stats.dispatches > 2 * whole.stats.dispatches, "{:?} {:?}", pieces.stats, whole.stats);
-    assert_eq!(pieces.gathered, whole.gathered);
-    assert_eq!(pieces.radiance, whole.radiance);
-    // Control: the answer depends on what is asked.
-    assert_ne!(bench.ask(true, &map, &points, &settings(199)).gathered, whole.gathered);
+    for (budget, k, count) in
+        [(3, 200, 200), (100, 20, 2500), (1000, 200, 2500), (1000, 1000, 2500), (5000, 1000, 2500)]
+    {
+        let whole = bench.ask(true, &map, &points[..count], &settings(k));
+        let mut tiny = Gather::new(&bench.gpu, GatherOptions { step_budget: budget, ..GatherOptions::default() });
+        let pieces = run(&bench.gpu, &mut tiny, &map, &points[..count], &settings(k));
+        assert!(pieces.stats.dispatches > 2 * whole.stats.dispatches, "{:?} {:?}", pieces.stats, whole.stats);
+        assert!(pieces.gathered == whole.gathered, "other sets: budget {budget}, k = {k}");
+        assert!(pieces.radiance == whole.radiance, "other bits: budget {budget}, k = {k}");
+        // Control: the answer depends on what is asked.
+        let other = bench.ask(true, &map, &points[..count], &settings(k - 1));
+        assert!(other.gathered != whole.gathered, "the control");
+    }
 }
 
 #[test]

@@ -26,8 +26,8 @@ const FEW_SORTED_BITS: [(u32, u32); 2] = [(4096, 8), (16_384, 16)];
 const PACKET: u32 = 4;
 /// Packets that are searched or wait together.
 const BLOCK: u64 = 8;
-/// Of how many blocks of packets one is searched in each dispatch of the search: pilots first, the others start from
-/// their radius.
+/// Of how many blocks of packets one is searched in each dispatch of the search: pilots first, the others start from the radii of
+/// these. Twins of those in `shaders/lib/budget.wesl`.
 const STRIDES: [u32; 3] = [64, 8, 1];
 
 /// The radiance estimate that is asked for.
