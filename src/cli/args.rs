@@ -12,7 +12,7 @@ use super::{
     loading::LoadingOptions,
     options::{RenderOptions, SearchArg},
     study_args::StudyArgs,
-    values::{output, radius, share_reach, tolerance},
+    values::{output, radius, share_reach, tolerance, whole},
 };
 
 /// Caustica renders glTF scenes by photon mapping on the GPU, without a screen.
@@ -54,7 +54,7 @@ Examples:
   caustica render scene.glb -o out.exr --stats out.json -q --seed 7";
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct RenderArgs {
     /// glTF 2.0 file, .gltf or .glb
     pub scene: PathBuf,
@@ -77,7 +77,7 @@ pub struct RenderArgs {
     pub radius: Option<f32>,
 
     /// Rays of final gathering per visible point: light over other surfaces is what these see of the global map; 0 is none
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=65_536))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = |text: &str| whole(text, 0, 65_536))]
     #[arg(help_heading = "Estimate")]
     pub final_gather: u32,
 
@@ -99,7 +99,7 @@ Examples:
   caustica compare scene.glb -o comparison --size 128x128 --spp 1 -k 500 --photons 1M -q";
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = COMPARE_EXAMPLES)]
+#[command(after_help = COMPARE_EXAMPLES, allow_negative_numbers = true)]
 pub struct CompareArgs {
     /// glTF 2.0 file, .gltf or .glb
     pub scene: PathBuf,

@@ -25,7 +25,7 @@ pub struct EnvironmentOptions {
 
     /// Turns --env about the vertical, degrees counterclockwise as seen from above
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = rotation, help_heading = "Light")]
-    #[arg(requires = "env", conflicts_with = "background", allow_negative_numbers = true)]
+    #[arg(requires = "env", conflicts_with = "background")]
     pub env_rotation: f32,
 
     /// The same light from all around: radiance in W/(m² sr)

@@ -6,17 +6,21 @@ use caustica::{
     pixel_filter::PixelFilter,
     settings::{Crop, Emission, LightSampling, LightUnit, Mode, Sampler, Search, Settings},
 };
-use clap::ValueEnum;
+use clap::{
+    ValueEnum,
+    builder::{EnumValueParser, PossibleValue, TypedValueParser},
+    error::{ContextKind, ContextValue},
+};
 
 use super::environment::EnvironmentOptions;
 use super::loading::LoadingOptions;
-use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, size};
+use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, size, whole};
 
 /// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
 pub struct RenderOptions {
     /// Which light reaches the picture and how, by name or number
-    #[arg(long, value_enum, default_value = "hybrid", help_heading = "Light")]
+    #[arg(long, value_parser = ModeParser, default_value = "hybrid", help_heading = "Light")]
     pub mode: ModeArg,
 
     /// Photons that each map can hold, as 100000, 200k or 1.5M [default: 100k]
@@ -33,7 +37,7 @@ pub struct RenderOptions {
 
     /// Neighbours in the radiance estimate, 1 to 1000
     #[arg(short = 'k', long, value_name = "K", default_value_t = 100, help_heading = "Estimate")]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(value_parser = |text: &str| whole(text, 1, 1000))]
     pub neighbors: u32,
 
     #[command(flatten)]
@@ -54,7 +58,7 @@ pub struct SharedOptions {
 
     /// Samples of the direct light of emissive surfaces and the environment per visible point
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Light")]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(value_parser = |text: &str| whole(text, 1, 4096))]
     pub light_samples: u32,
 
     /// Where photon paths are sent
@@ -71,14 +75,15 @@ pub struct SharedOptions {
     #[command(flatten)]
     pub loading: LoadingOptions,
 
-    /// Photon paths emitted at most [default: 100 times the capacity]
+    /// Photon paths emitted at most, for each map by itself where paths are aimed at mirrors and glass [default: 100 times the
+    /// capacity]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
     pub max_paths: Option<u64>,
 
-    /// Longest photon path, and longest chain of mirrors and glass on a camera path, in surfaces; 0 leaves the end
-    /// of paths to Russian roulette
+    /// Longest photon path, and longest chain of mirrors and glass on a camera path, in surfaces, up to 65535;
+    /// 0 leaves the end of paths to Russian roulette
     #[arg(long, value_name = "B", default_value_t = 20, help_heading = "Photons")]
-    #[arg(value_parser = clap::value_parser!(u32).range(0..=65535))]
+    #[arg(value_parser = |text: &str| whole(text, 0, 65535))]
     pub max_bounces: u32,
 
     /// Kernel that weighs the photons by their distance; each integrates to 1 over its disc
@@ -98,7 +103,7 @@ pub struct SharedOptions {
     pub max_radius: Option<f32>,
 
     /// Camera samples per pixel, spread over the pixel filter; 1 is the pixel's centre [default: 4]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Picture")]
+    #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1, u32::MAX), help_heading = "Picture")]
     pub spp: Option<u32>,
 
     /// Size in pixels; the vertical angle of view stays [default: 512 high, as wide as the camera says or square]
@@ -127,7 +132,6 @@ pub struct SharedOptions {
 
     /// Brightens the PNG by this many stops
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, help_heading = "Picture")]
-    #[arg(allow_negative_numbers = true)]
     pub exposure: f32,
 
     /// Tone curve of the PNG
@@ -138,8 +142,9 @@ pub struct SharedOptions {
     #[arg(long, value_name = "HOW", value_enum, default_value = "sobol", help_heading = "Run")]
     pub sampler: SamplerArg,
 
-    /// One number that decides all randomness
+    /// One number that decides all randomness, 0 to 4294967295
     #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Run")]
+    #[arg(value_parser = |text: &str| whole(text, 0, u32::MAX))]
     pub seed: u32,
 
     /// Adapter, by a part of its name or by the index that `caustica devices` shows [default: the best real GPU,
@@ -232,6 +237,31 @@ value_enum!(ModeArg => Mode {
     #[value(alias = "4")]
     IndirectPhotons,
 });
+
+/// Modes by name or number; says so where the text is neither.
+#[derive(Clone, Copy, Debug)]
+pub struct ModeParser;
+
+impl TypedValueParser for ModeParser {
+    type Value = ModeArg;
+
+    fn parse_ref(
+        &self,
+        command: &clap::Command,
+        arg: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<ModeArg, clap::Error> {
+        EnumValueParser::new().parse_ref(command, arg, value).map_err(|mut error| {
+            let tip = "the numbers 0 to 4 stand for these, in this order";
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+            error
+        })
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(ModeArg::value_variants().iter().filter_map(ModeArg::to_possible_value)))
+    }
+}
 
 value_enum!(LightSamplingArg => LightSampling {
     /// In proportion to power

@@ -1,12 +1,13 @@
 //! How far a render is, on stderr: a bar on a terminal, plain lines elsewhere.
 
 use std::{
+    fmt::Write,
     io::IsTerminal,
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
 use caustica::progress::{Progress, Stage};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::{say::say, signals};
 
@@ -32,7 +33,7 @@ impl Display {
         } else if plain || !std::io::stderr().is_terminal() {
             Target::Lines(Mutex::default())
         } else {
-            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()).with_style(words());
             Target::Bar(bar, Mutex::default())
         })
     }
@@ -79,13 +80,18 @@ impl Progress for Display {
                 }
             }
             Target::Bar(bar, shown) => {
-                if lock(shown).replace(stage) != Some(stage) {
-                    bar.reset();
-                    bar.set_style(style(stage));
+                let is_new = lock(shown).replace(stage) != Some(stage);
+                if is_new {
+                    // What is drawn before the numbers are the stage's holds none.
+                    bar.set_style(words());
                     bar.set_message(name(stage));
+                    bar.reset();
                 }
                 bar.set_length(total);
                 bar.set_position(done);
+                if is_new {
+                    bar.set_style(style(stage));
+                }
             }
         }
     }
@@ -135,12 +141,21 @@ fn unit(stage: Stage) -> Option<&'static str> {
     }
 }
 
+/// Without numbers.
+fn words() -> ProgressStyle {
+    ProgressStyle::with_template("{msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
 fn style(stage: Stage) -> ProgressStyle {
-    let template = match unit(stage) {
-        Some(unit) => format!("{{msg:8}} {{bar:32}} {{human_pos}} of {{human_len}} {unit}, {{eta}} left"),
-        None => "{msg}".to_string(),
-    };
-    ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar())
+    let Some(unit) = unit(stage) else { return words() };
+    let template = format!("{{msg:8}} {{bar:32}} {{human_pos}} of {{human_len}} {unit}{{left}}");
+    let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    style.with_key("left", |state: &ProgressState, text: &mut dyn Write| {
+        // Nothing is known of the time before something is done.
+        if state.pos() > 0 {
+            let _ = write!(text, ", {:#} left", HumanDuration(state.eta()));
+        }
+    })
 }
 
 fn study_style() -> ProgressStyle {

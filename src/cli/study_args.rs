@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 
 use super::{
-    options::{ModeArg, SharedOptions},
-    values::{photons, scale},
+    options::{ModeArg, ModeParser, SharedOptions},
+    values::{photons, scale, whole},
 };
 
 const EXAMPLES: &str = "\
@@ -20,7 +20,7 @@ Examples:
   caustica study --preset report -o report";
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct StudyArgs {
     /// glTF 2.0 file, .gltf or .glb; with --preset the folder of scenes [default: scenes]
     #[arg(required_unless_present = "preset")]
@@ -37,18 +37,18 @@ pub struct StudyArgs {
 
     /// Neighbours in the radiance estimate, 1 to 1000: several, as 1,10,100
     #[arg(short = 'k', long, value_name = "K,K…", value_delimiter = ',', help_heading = "Study")]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(value_parser = |text: &str| whole(text, 1, 1000))]
     #[arg(required_unless_present = "preset", conflicts_with = "preset")]
     pub neighbors: Vec<u32>,
 
     /// Modes by name or number: several, as 0,1 or hybrid,photons
-    #[arg(long, value_name = "MODE,MODE…", value_delimiter = ',', value_enum, default_value = "hybrid")]
+    #[arg(long, value_name = "MODE,MODE…", value_delimiter = ',', value_parser = ModeParser, default_value = "hybrid")]
     #[arg(conflicts_with = "preset", help_heading = "Study")]
     pub modes: Vec<ModeArg>,
 
     /// Renders of each combination with seeds of their own, 1 to 1000; noise and bias need two [default: 1, of the
     /// preset's plane of n and k 2]
-    #[arg(long, value_name = "R", value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Study")]
+    #[arg(long, value_name = "R", value_parser = |text: &str| whole(text, 1, 1000), help_heading = "Study")]
     pub repeat: Option<u32>,
 
     /// What pictures are measured against: an EXR file of their size, or auto for a much finer render [default: none]

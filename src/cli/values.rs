@@ -28,6 +28,12 @@ pub fn count(text: &str) -> Result<u64, String> {
     }
 }
 
+/// A whole number in a range.
+pub fn whole(text: &str, least: u32, most: u32) -> Result<u32, String> {
+    let number = text.parse::<u32>().ok().filter(|n| (least..=most).contains(n));
+    number.ok_or_else(|| format!("a whole number from {least} to {most}"))
+}
+
 /// A count that a photon map can be asked to hold.
 pub fn photons(text: &str) -> Result<u32, String> {
     u32::try_from(count(text)?).map_err(|_| format!("too large; at most {}", u32::MAX))
@@ -47,7 +53,9 @@ pub fn cone_constant(text: &str) -> Result<f32, String> {
 
 /// A radius in metres.
 pub fn radius(text: &str) -> Result<f32, String> {
-    number(text).filter(|r| *r > 0.0).ok_or_else(|| "a length in metres, more than 0".to_string())
+    number(text)
+        .filter(|r| *r > 0.0 && *r <= 1e18)
+        .ok_or_else(|| "a length in metres, more than 0, at most 1e18".to_string())
 }
 
 /// `X,Y,W,H` in pixels.

@@ -95,8 +95,9 @@ impl RawMap {
             return None;
         }
         self.open = false;
+        let photons = if gained == 1 { "photon" } else { "photons" };
         Some(format!(
-            "the {name} map hardly grows: {gained} photons from the last {window} paths; it stays at {} of {} photons",
+            "the {name} map hardly grows: {gained} {photons} from the last {window} paths; it stays at {} of {} photons",
             self.stored, self.capacity
         ))
     }
