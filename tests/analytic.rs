@@ -50,6 +50,12 @@ fn closed_sphere_has_the_radiance_of_the_series() {
             let wrong = direct * series(ALBEDO, BOUNCES - 1);
             assert!(within(measured, right, 0.015), "{mode:?}, k = {neighbors}: {measured} instead of {right}");
             assert!(!within(measured, wrong, 0.015), "{mode:?}, k = {neighbors}: control {wrong} passes");
+            // The default sampler stays within what its photons' distances may cost.
+            let spread = mean(&render_scene(&scene, &Settings { sampler: Sampler::Sobol, ..settings }));
+            let least = right * (1.0 - 0.5 / f64::from(neighbors));
+            let fits = |mean: f64| mean > 0.995 * least && mean < 1.005 * right;
+            assert!(fits(spread), "{mode:?}, k = {neighbors}: {spread} is not from {least} to {right}");
+            assert!(!fits(1.06 * spread) && !fits(0.94 * spread), "{mode:?}, k = {neighbors}: control");
         }
     }
 }

@@ -7,6 +7,7 @@
 //! | photons | maps that no buffers hold are refused before anything is done for them | maps that buffers hold |
 //! | budget | a ray that outruns its loop budget is counted, not lost in silence | the full budget counts none |
 //! | memory | the peak is at most 96 bytes a photon of capacity and 32 MiB | a tenth of that does not hold it |
+//! | maps | a finished map keeps at most 48 bytes a photon | 32 bytes do not hold it |
 //! | tiles | device memory does not grow with samples or size | it grows with photons |
 
 mod common;
@@ -16,7 +17,7 @@ use caustica::{
     Error,
     gpu::Gpu,
     progress::Silent,
-    renderer::render,
+    renderer::{Session, render},
     scene::Scene,
     settings::{Mode, Settings},
 };
@@ -125,4 +126,19 @@ fn memory_is_bounded_by_photons_alone() {
     let (large, deep) = (peak(1000, 300, 1), peak(1000, 64, 16));
     assert!(large <= full_tile && deep <= full_tile, "device memory grows: {large} by --size, {deep} by --spp");
     assert!(full_tile <= bound(1000), "{full_tile} bytes for 1 k photons");
+}
+
+#[test]
+fn a_finished_map_keeps_48_bytes_a_photon() {
+    let (scene, gpu) = (room(8), Gpu::open(None).expect("tests need an adapter"));
+    for photons in [20_000, 500_000] {
+        let settings = settings(Mode::Photons, photons, 16);
+        let session = Session::open(&gpu, &scene, &settings, &Silent).expect("the scene fits");
+        let before = gpu.memory.now();
+        let maps = session.photon_maps(&settings, &Silent).expect("photons");
+        let (kept, stored) = (gpu.memory.now() - before, maps.maps().iter().map(|m| u64::from(m.count())).sum::<u64>());
+        assert!(stored >= u64::from(photons) * 9 / 10, "{stored} photons stored");
+        assert!(kept <= 48 * stored + 1024, "{kept} bytes for {stored} photons");
+        assert!(kept > 32 * stored, "control: {kept} bytes are too few to be true");
+    }
 }

@@ -77,7 +77,7 @@ fn final_gathering_has_the_mean_of_the_estimate() {
 fn hybrid_and_photons_agree_in_the_limit() {
     let scene = room();
     let [hybrid, photons] =
-        [Mode::Hybrid, Mode::Photons].map(|mode| mean(&render_scene(&scene, &settings(mode, 400_000, 32))));
+        [Mode::Hybrid, Mode::Photons].map(|mode| mean(&render_scene(&scene, &settings(mode, 1_000_000, 32))));
     assert!(within(photons, hybrid, 0.01), "mode 1 has mean {photons}, mode 0 has {hybrid}");
     assert!(!within(1.02 * photons, hybrid, 0.01), "control: a picture 2 % brighter passes");
 }

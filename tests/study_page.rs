@@ -37,7 +37,7 @@ fn wrong_lists_are_exit_code_2() {
         ("a.gltf --photons 1k,,2k -k 1", "1.5M"),
         ("a.gltf --photons 1k,0 -k 1", "at least 1"),
         ("a.gltf --photons 1k -k 1,1001", "a whole number from 1 to 1000"),
-        ("a.gltf --photons 1k -k 1,x", "invalid digit"),
+        ("a.gltf --photons 1k -k 1,x", "a whole number from 1 to 1000"),
         ("a.gltf --photons 1k -k 1 --modes 0,7", "direct-rays"),
         ("a.gltf --photons 1k -k 1 --repeat 0", "a whole number from 1 to 1000"),
         ("a.gltf --photons 1k -k 1 --reference a.png", ".exr"),
