@@ -144,7 +144,7 @@ pub struct Settings {
     pub global_photons: u32,
     /// Photons that the caustic map can hold, ≥ 1.
     pub caustic_photons: u32,
-    /// Photon paths emitted at most; `None`: 100 times the larger capacity.
+    /// Photon paths emitted at most, for each map by itself unless emission is unaimed; `None`: 100 times the larger capacity.
     pub max_paths: Option<u64>,
     /// Neighbours in the radiance estimate, 1 to 1000.
     pub neighbors: u32,

@@ -75,7 +75,7 @@ pub struct SharedOptions {
     #[command(flatten)]
     pub loading: LoadingOptions,
 
-    /// Photon paths emitted at most, for each map by itself where paths are aimed at mirrors and glass [default: 100 times the
+    /// Photon paths emitted at most, for each map by itself unless --emission unaimed [default: 100 times the larger
     /// capacity]
     #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
     pub max_paths: Option<u64>,
