@@ -29,7 +29,8 @@ pub struct EnvironmentOptions {
     pub env_rotation: f32,
 
     /// The same light from all around: radiance in W/(m² sr)
-    #[arg(long, value_name = "R,G,B", value_parser = color, help_heading = "Light", conflicts_with = "env")]
+    #[arg(long, value_name = "R,G,B", value_parser = color, allow_hyphen_values = true, help_heading = "Light")]
+    #[arg(conflicts_with = "env")]
     pub background: Option<[f32; 3]>,
 
     /// What lights a scene that has no light and is given none

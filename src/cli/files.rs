@@ -54,7 +54,7 @@ fn refused(path: &Path, what: &str) -> Result<()> {
 }
 
 /// The same for all ways to write the path of one file, whether it exists or not.
-fn identity(path: &Path) -> PathBuf {
+pub(super) fn identity(path: &Path) -> PathBuf {
     let of_new_file = || {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Some(folder.canonicalize().ok()?.join(path.file_name()?))

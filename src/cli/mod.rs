@@ -31,6 +31,9 @@ use args::{Args, Command};
 /// stopped.
 pub fn run() -> ExitCode {
     let args = Args::parse();
+    if let Command::Render(args) = &args.command {
+        render::check(args).unwrap_or_else(|error| error.exit());
+    }
     signals::watch();
     let error = match bugs::caught(|| work(args.command)) {
         Ok(Ok(())) => return ExitCode::SUCCESS,

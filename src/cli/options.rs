@@ -24,15 +24,15 @@ pub struct RenderOptions {
     pub mode: ModeArg,
 
     /// Photons that each map can hold, as 100000, 200k or 1.5M [default: 100k]
-    #[arg(long, value_name = "N", value_parser = photons, help_heading = "Photons")]
+    #[arg(long, value_name = "N", value_parser = photons, allow_hyphen_values = true, help_heading = "Photons")]
     pub photons: Option<u32>,
 
     /// Photons that the global map can hold [default: --photons]
-    #[arg(long, value_name = "N", value_parser = photons, help_heading = "Photons")]
+    #[arg(long, value_name = "N", value_parser = photons, allow_hyphen_values = true, help_heading = "Photons")]
     pub global_photons: Option<u32>,
 
     /// Photons that the caustic map can hold [default: --photons]
-    #[arg(long, value_name = "N", value_parser = photons, help_heading = "Photons")]
+    #[arg(long, value_name = "N", value_parser = photons, allow_hyphen_values = true, help_heading = "Photons")]
     pub caustic_photons: Option<u32>,
 
     /// Neighbours in the radiance estimate, 1 to 1000
@@ -77,7 +77,7 @@ pub struct SharedOptions {
 
     /// Photon paths emitted at most, for each map by itself unless --emission unaimed [default: 100 times the larger
     /// capacity]
-    #[arg(long, value_name = "N", value_parser = count, help_heading = "Photons")]
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true, help_heading = "Photons")]
     pub max_paths: Option<u64>,
 
     /// Longest photon path, and longest chain of mirrors and glass on a camera path, in surfaces, up to 65535;
@@ -107,7 +107,7 @@ pub struct SharedOptions {
     pub spp: Option<u32>,
 
     /// Size in pixels; the vertical angle of view stays [default: 512 high, as wide as the camera says or square]
-    #[arg(long, value_name = "WxH", value_parser = size, help_heading = "Picture")]
+    #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true, help_heading = "Picture")]
     pub size: Option<(u32, u32)>,
 
     /// Camera of the file, by name or by index from 0 [default: the first]
@@ -115,7 +115,7 @@ pub struct SharedOptions {
     pub camera: Option<String>,
 
     /// Part of the picture to render: column and row of its upper left pixel, width, height
-    #[arg(long, value_name = "X,Y,W,H", value_parser = crop, help_heading = "Picture")]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crop, allow_hyphen_values = true, help_heading = "Picture")]
     pub crop: Option<Crop>,
 
     /// How the light around a pixel's centre is weighed

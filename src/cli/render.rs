@@ -1,6 +1,6 @@
 //! `caustica render`.
 
-use std::{io, path::Path, time::Instant};
+use std::{collections::HashSet, io, path::Path, time::Instant};
 
 use caustica::{
     Error, Result,
@@ -13,7 +13,25 @@ use caustica::{
     stats::{Stats, timed},
 };
 
-use super::{args::RenderArgs, files::Files, progress::Display, values::extension};
+use clap::{CommandFactory, error::ErrorKind};
+
+use super::{
+    args::{Args, RenderArgs},
+    files::{Files, identity},
+    progress::Display,
+    values::extension,
+};
+
+/// Wrong usage that no argument shows by itself: two outputs are one file.
+pub fn check(args: &RenderArgs) -> std::result::Result<(), clap::Error> {
+    let mut known = HashSet::new();
+    let twice = args.outputs.iter().chain(&args.stats).find(|path| !known.insert(identity(path)));
+    let Some(path) = twice else { return Ok(()) };
+    let mut command = Args::command();
+    command.build();
+    let usage_of = command.find_subcommand_mut("render").expect("this is its check");
+    Err(usage_of.error(ErrorKind::ArgumentConflict, format!("{} is another output as well", path.display())))
+}
 
 /// Loads, renders and writes.
 pub fn render(args: &RenderArgs) -> Result<()> {

@@ -32,13 +32,13 @@ pub struct StudyArgs {
 
     /// Photons that each map can hold: several, as 1k,10k,1.5M
     #[arg(long, value_name = "N,N…", value_delimiter = ',', value_parser = photons, help_heading = "Study")]
-    #[arg(required_unless_present = "preset", conflicts_with = "preset")]
+    #[arg(allow_hyphen_values = true, required_unless_present = "preset", conflicts_with = "preset")]
     pub photons: Vec<u32>,
 
     /// Neighbours in the radiance estimate, 1 to 1000: several, as 1,10,100
     #[arg(short = 'k', long, value_name = "K,K…", value_delimiter = ',', help_heading = "Study")]
     #[arg(value_parser = |text: &str| whole(text, 1, 1000))]
-    #[arg(required_unless_present = "preset", conflicts_with = "preset")]
+    #[arg(allow_hyphen_values = true, required_unless_present = "preset", conflicts_with = "preset")]
     pub neighbors: Vec<u32>,
 
     /// Modes by name or number: several, as 0,1 or hybrid,photons
