@@ -54,10 +54,12 @@ impl Display {
             Target::Lines(_) if new => say(line),
             Target::Lines(_) => {}
             Target::Bar(bar, _) => {
-                bar.set_style(study_style());
-                bar.set_length(1000);
-                bar.set_position((1000.0 * done) as u64);
                 bar.set_message(line.to_string());
+                bar.set_style(study_style());
+                bar.update(|state| {
+                    state.set_len(1000);
+                    state.set_pos((1000.0 * done) as u64);
+                });
             }
         }
     }
@@ -81,16 +83,19 @@ impl Progress for Display {
             }
             Target::Bar(bar, shown) => {
                 let is_new = lock(shown).replace(stage) != Some(stage);
-                if is_new {
+                let unit = unit(stage, total);
+                if is_new || unit.is_none() {
                     // What is drawn before the numbers are the stage's holds none.
                     bar.set_style(words());
                     bar.set_message(name(stage));
+                }
+                if is_new {
                     bar.reset();
                 }
                 bar.set_length(total);
                 bar.set_position(done);
-                if is_new {
-                    bar.set_style(style(stage));
+                if let Some(unit) = unit {
+                    bar.set_style(style(unit));
                 }
             }
         }
@@ -107,17 +112,18 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// The line to write now: the first of a stage, then one whenever a further tenth is done.
 fn next_line(told: &mut Vec<(Stage, u64)>, stage: Stage, done: u64, total: u64) -> Option<String> {
+    let unit = unit(stage, total);
     let part = |units: u64| (u128::from(done.min(total)) * u128::from(units) / u128::from(total.max(1))) as u64;
-    let tenth = part(10);
+    let tenth = unit.map_or(0, |_| part(10));
     match told.iter_mut().find(|(s, _)| *s == stage) {
         Some((_, last)) if tenth <= *last => return None,
         Some((_, last)) => *last = tenth,
         None => told.push((stage, tenth)),
     }
     let (name, percent) = (name(stage), part(100));
-    Some(match unit(stage) {
-        Some(unit) if total > 0 => format!("{name}: {percent} % of {total} {unit}"),
-        _ => name.to_string(),
+    Some(match unit {
+        Some(unit) => format!("{name}: {percent} % of {total} {unit}"),
+        None => name.to_string(),
     })
 }
 
@@ -132,9 +138,10 @@ fn name(stage: Stage) -> &'static str {
     }
 }
 
-/// What a stage is counted in; `None`: it is not counted.
-fn unit(stage: Stage) -> Option<&'static str> {
+/// What a stage of so many is counted in; `None`: it is not counted, as one or none would say nothing.
+fn unit(stage: Stage, total: u64) -> Option<&'static str> {
     match stage {
+        _ if total < 2 => None,
         Stage::Photons => Some("photons"),
         Stage::Camera | Stage::Compare => Some("tiles"),
         Stage::Load | Stage::Bvh | Stage::Grid => None,
@@ -146,14 +153,14 @@ fn words() -> ProgressStyle {
     ProgressStyle::with_template("{msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
-fn style(stage: Stage) -> ProgressStyle {
-    let Some(unit) = unit(stage) else { return words() };
+fn style(unit: &str) -> ProgressStyle {
     let template = format!("{{msg:8}} {{bar:32}} {{human_pos}} of {{human_len}} {unit}{{left}}");
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
     style.with_key("left", |state: &ProgressState, text: &mut dyn Write| {
-        // Nothing is known of the time before something is done.
-        if state.pos() > 0 {
-            let _ = write!(text, ", {:#} left", HumanDuration(state.eta()));
+        // It is zero too where nothing is known of it yet.
+        let left = state.eta();
+        if left.as_secs() > 0 {
+            let _ = write!(text, ", {:#} left", HumanDuration(left));
         }
     })
 }
@@ -184,6 +191,16 @@ mod tests {
         assert!(line(Stage::Grid, 0).is_none());
         assert!(line(Stage::Camera, 20).is_none());
         assert!(line(Stage::Camera, 61).is_some());
+    }
+
+    #[test]
+    fn what_is_one_or_none_is_not_counted() {
+        for (stage, total) in [(Stage::Camera, 1), (Stage::Photons, 1), (Stage::Photons, 0)] {
+            let mut told = Vec::new();
+            assert_eq!(next_line(&mut told, stage, 0, total).as_deref(), Some(name(stage)));
+            assert_eq!(next_line(&mut told, stage, total, total), None);
+        }
+        assert_eq!(next_line(&mut Vec::new(), Stage::Camera, 0, 2).as_deref(), Some("camera: 0 % of 2 tiles"));
     }
 
     #[test]

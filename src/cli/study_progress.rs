@@ -29,7 +29,8 @@ impl Watch for StudyDisplay<'_> {
 
 fn line(state: &State) -> String {
     let kept = if state.kept > 0 { format!(", {} kept", state.kept) } else { String::new() };
-    let left = state.seconds_left.map(|s| format!(", {} left", duration(s))).unwrap_or_default();
+    let known = state.seconds_left.filter(|s| *s >= 0.5);
+    let left = known.map(|s| format!(", {} left", duration(s))).unwrap_or_default();
     format!("study: {:.0} %{left}; cell {} of {}{kept}: {}", 100.0 * state.done, state.number, state.total, state.cell)
 }
 
@@ -60,6 +61,8 @@ mod tests {
         assert_eq!(line(&state), "study: 25 %, 75 s left; cell 3 of 8: a.gltf, hybrid");
         (state.kept, state.seconds_left) = (2, None);
         assert_eq!(line(&state), "study: 25 %; cell 3 of 8, 2 kept: a.gltf, hybrid");
+        state.seconds_left = Some(0.2);
+        assert!(!line(&state).contains("left"), "{}", line(&state));
         assert_eq!([91.0, 3500.0, 12_000.0].map(duration), ["2 min", "58 min", "3 h 20 min"]);
     }
 }
