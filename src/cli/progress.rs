@@ -114,7 +114,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 fn next_line(told: &mut Vec<(Stage, u64)>, stage: Stage, done: u64, total: u64) -> Option<String> {
     let unit = unit(stage, total);
     let part = |units: u64| (u128::from(done.min(total)) * u128::from(units) / u128::from(total.max(1))) as u64;
-    let tenth = unit.map_or(0, |_| part(10));
+    let tenth = part(10);
     match told.iter_mut().find(|(s, _)| *s == stage) {
         Some((_, last)) if tenth <= *last => return None,
         Some((_, last)) => *last = tenth,
@@ -123,6 +123,7 @@ fn next_line(told: &mut Vec<(Stage, u64)>, stage: Stage, done: u64, total: u64) 
     let (name, percent) = (name(stage), part(100));
     Some(match unit {
         Some(unit) => format!("{name}: {percent} % of {total} {unit}"),
+        None if total == 1 && is_counted(stage) => format!("{name}: {percent} %"),
         None => name.to_string(),
     })
 }
@@ -140,12 +141,12 @@ fn name(stage: Stage) -> &'static str {
 
 /// What a stage of so many is counted in; `None`: it is not counted, as one or none would say nothing.
 fn unit(stage: Stage, total: u64) -> Option<&'static str> {
-    match stage {
-        _ if total < 2 => None,
-        Stage::Photons => Some("photons"),
-        Stage::Camera | Stage::Compare => Some("tiles"),
-        Stage::Load | Stage::Bvh | Stage::Grid => None,
-    }
+    let unit = if stage == Stage::Photons { "photons" } else { "tiles" };
+    (total > 1 && is_counted(stage)).then_some(unit)
+}
+
+fn is_counted(stage: Stage) -> bool {
+    matches!(stage, Stage::Photons | Stage::Camera | Stage::Compare)
 }
 
 /// Without numbers.
@@ -195,11 +196,11 @@ mod tests {
 
     #[test]
     fn what_is_one_or_none_is_not_counted() {
-        for (stage, total) in [(Stage::Camera, 1), (Stage::Photons, 1), (Stage::Photons, 0)] {
-            let mut told = Vec::new();
-            assert_eq!(next_line(&mut told, stage, 0, total).as_deref(), Some(name(stage)));
-            assert_eq!(next_line(&mut told, stage, total, total), None);
-        }
+        let mut told = Vec::new();
+        let mut line = |stage, done, total| next_line(&mut told, stage, done, total);
+        assert_eq!(line(Stage::Camera, 0, 1).as_deref(), Some("camera: 0 %"));
+        assert_eq!(line(Stage::Camera, 1, 1).as_deref(), Some("camera: 100 %"));
+        assert_eq!(line(Stage::Photons, 0, 0).as_deref(), Some("photons"));
         assert_eq!(next_line(&mut Vec::new(), Stage::Camera, 0, 2).as_deref(), Some("camera: 0 % of 2 tiles"));
     }
 
