@@ -90,8 +90,12 @@ fn grid_rate(
     k: u32,
 ) -> (f64, Vec<f32>) {
     let count = QUERIES as u32;
-    let settings =
-        GatherSettings { neighbors: k, radius: None, max_radius: None, density: Settings::default().density() };
+    let settings = GatherSettings {
+        neighbors: k,
+        radius: None,
+        max_radius: None,
+        density: Settings::default().estimate.density(),
+    };
     let radiance = gpu.storage::<[f32; 4]>("radiance", count.into()).expect("it fits");
     let gathered = gathered_buffer(gpu, count).expect("it fits");
     let start = Instant::now();

@@ -16,10 +16,11 @@ use std::f64::consts::PI;
 use caustica::{
     bvh::Bvh,
     layout::Photon,
-    passes::{PhotonTracer, SceneBuffers, TracedPhotons},
+    passes::{PhotonTracer, TracedPhotons},
     progress::Silent,
     scene::Scene,
     settings::{Mode, Sampler, Settings},
+    upload::SceneBuffers,
 };
 use common::*;
 use glam::{Vec3, vec3};
@@ -44,14 +45,18 @@ fn closed_sphere_has_the_radiance_of_the_series() {
         for neighbors in [10, 100] {
             // Independent photons: those of a Sobol sequence keep a distance, which makes the (k+1)-th lie farther by up to 1/(2k).
             let sampler = Sampler::Random;
-            let settings = Settings { neighbors, max_bounces: BOUNCES, sampler, ..settings(mode, 150_000, 64) };
+            let settings = settings(mode, 150_000, 64).with(|s| {
+                s.estimate.neighbors = neighbors;
+                s.photons.max_bounces = BOUNCES;
+                s.photons.sampler = sampler;
+            });
             let measured = mean(&render_scene(&scene, &settings));
             let right = direct * series(ALBEDO, BOUNCES);
             let wrong = direct * series(ALBEDO, BOUNCES - 1);
             assert!(within(measured, right, 0.015), "{mode:?}, k = {neighbors}: {measured} instead of {right}");
             assert!(!within(measured, wrong, 0.015), "{mode:?}, k = {neighbors}: control {wrong} passes");
             // The default sampler stays within what its photons' distances may cost.
-            let spread = mean(&render_scene(&scene, &Settings { sampler: Sampler::Sobol, ..settings }));
+            let spread = mean(&render_scene(&scene, &settings.with(|s| s.photons.sampler = Sampler::Sobol)));
             let least = right * (1.0 - 0.5 / f64::from(neighbors));
             let fits = |mean: f64| mean > 0.995 * least && mean < 1.005 * right;
             assert!(fits(spread), "{mode:?}, k = {neighbors}: {spread} is not from {least} to {right}");
@@ -69,7 +74,10 @@ fn final_gathering_adds_the_bounce_that_its_rays_make() {
     scene.cameras.push(camera(vec3(0.5, 0.0, 0.0), vec3(-1.0, 0.2, 0.3), 100.0));
     let direct = ALBEDO / PI * f64::from(intensity) / f64::from(radius * radius);
     for (mode, first) in [(Mode::Hybrid, 0.0), (Mode::IndirectPhotons, 1.0)] {
-        let settings = Settings { max_bounces: BOUNCES, final_gather: 8, ..settings(mode, 50_000, 32) };
+        let settings = settings(mode, 50_000, 32).with(|s| {
+            s.photons.max_bounces = BOUNCES;
+            s.photons.final_gather = 8;
+        });
         let measured = mean(&render_scene(&scene, &settings));
         let right = direct * (series(ALBEDO, BOUNCES + 1) - first);
         let wrong = direct * (series(ALBEDO, BOUNCES) - first);
@@ -97,7 +105,7 @@ fn closed_box_stores_the_flux_of_the_series() {
     let mut scene = scene(&[caustica::scene::Surface::Diffuse { albedo }]);
     add_box(&mut scene, vec3(-1.0, -1.0, -1.0), vec3(1.0, 2.0, 1.5), 0);
     scene.lights.push(point_light(vec3(0.2, 0.3, -0.1), 5.0));
-    let settings = Settings { max_bounces: BOUNCES, ..settings(Mode::Photons, 300_000, 1) };
+    let settings = settings(Mode::Photons, 300_000, 1).with(|s| s.photons.max_bounces = BOUNCES);
     let (traced, flux) = trace_photons(&scene, &settings);
     let power = 4.0 * PI * 5.0;
     for channel in 0..3 {
@@ -118,7 +126,7 @@ fn roulette_alone_ends_paths() {
     let mut scene = scene(&[diffuse(0.9)]);
     add_box(&mut scene, Vec3::splat(-1.0), Vec3::splat(1.0), 0);
     scene.lights.push(point_light(vec3(0.2, 0.3, -0.1), 1.0));
-    let settings = Settings { max_bounces: 0, ..settings(Mode::Photons, 200_000, 1) };
+    let settings = settings(Mode::Photons, 200_000, 1).with(|s| s.photons.max_bounces = 0);
     let (traced, flux) = trace_photons(&scene, &settings);
     let right = 4.0 * PI / (1.0 - 0.9);
     assert!(within(flux[0], right, 0.02), "{} instead of {right}", flux[0]);
@@ -141,7 +149,10 @@ fn light_falls_with_the_square_of_the_distance() {
     for (mode, tolerance) in [(Mode::DirectRays, 0.005), (Mode::DirectPhotons, 0.03)] {
         for height in [1.0, 2.0] {
             let one = |seed| {
-                let settings = Settings { neighbors: 250, seed, ..settings(mode, 200_000, 16) };
+                let settings = settings(mode, 200_000, 16).with(|s| {
+                    s.estimate.neighbors = 250;
+                    s.photons.seed = seed;
+                });
                 mean(&render_scene(&floor_under_light(height), &settings))
             };
             let measured = (0..SEEDS).map(one).sum::<f64>() / f64::from(SEEDS);

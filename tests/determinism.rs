@@ -14,8 +14,8 @@ use std::{fs, path::Path, process::Command};
 use caustica::{
     bvh::Bvh,
     layout::{self, Counters, PhotonBatch},
-    passes::SceneBuffers,
     settings::{Mode, Sampler, Settings},
+    upload::SceneBuffers,
 };
 use common::*;
 use glam::{Vec3, vec3};
@@ -29,7 +29,10 @@ fn two_renders_are_equal() {
     scene.lights.push(point_light(vec3(-0.5, 0.5, 0.1), 0.3));
     scene.cameras.push(camera(vec3(0.0, 0.0, 0.99), Vec3::ZERO, 80.0));
     let picture = |seed| {
-        let settings = Settings { seed, spp: 2, ..settings(Mode::Hybrid, 20_000, 40) };
+        let settings = settings(Mode::Hybrid, 20_000, 40).with(|s| {
+            s.photons.seed = seed;
+            s.picture.spp = 2;
+        });
         render_scene(&scene, &settings).frame
     };
     assert_eq!(picture(7), picture(7));
@@ -67,7 +70,7 @@ fn emitted_directions(first: u64, count: u32, sampler: Sampler, turns: u32) -> V
     scene.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
     scene.lights.push(point_light(Vec3::ZERO, 1.0));
     let bvh = Bvh::build(&scene);
-    let settings = Settings { sampler, ..Settings::default() };
+    let settings = Settings::default().with(|s| s.photons.sampler = sampler);
     let buffers = SceneBuffers::new(gpu, &scene, &bvh, &settings).expect("the scene fits");
     let emit = buffers.kernel(gpu, "emit_photons");
     let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns, target_count: 1, ..Default::default() };

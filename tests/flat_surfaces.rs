@@ -43,8 +43,8 @@ fn where_solids_touch_few_photons_are_as_bright_as_many() {
     let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
     let picture = |photons, neighbors, seed| {
         let mut settings = settings(Mode::IndirectPhotons, photons, 128);
-        settings.neighbors = neighbors;
-        settings.seed = seed;
+        settings.estimate.neighbors = neighbors;
+        settings.photons.seed = seed;
         render_scene(&scene, &settings)
     };
     let right = picture(400_000, 100, 0);

@@ -59,15 +59,27 @@ fn hybrid_is_direct_rays_plus_indirect_photons() {
 #[test]
 fn final_gathering_has_the_mean_of_the_estimate() {
     let scene = room();
-    let settings = Settings { max_bounces: 0, spp: 1, ..settings(Mode::Hybrid, 50_000, 24) };
+    let settings = settings(Mode::Hybrid, 50_000, 24).with(|s| {
+        s.photons.max_bounces = 0;
+        s.picture.spp = 1;
+    });
     let plain = mean(&render_scene(&scene, &settings));
     for emission in [Emission::Aimed, Emission::Unaimed] {
-        let gathered = mean(&render_scene(&scene, &Settings { final_gather: 6, emission, ..settings.clone() }));
+        let gathered = mean(&render_scene(
+            &scene,
+            &settings.clone().with(|s| {
+                s.photons.final_gather = 6;
+                s.photons.emission = emission;
+            }),
+        ));
         assert!(within(gathered, plain, 0.015), "{emission:?}: {gathered} instead of {plain}");
         assert!(!within(1.03 * gathered, plain, 0.015), "control: a picture 3 % brighter passes");
     }
     for mode in [Mode::Photons, Mode::DirectPhotons, Mode::DirectRays] {
-        let wrong = Settings { mode, final_gather: 1, ..settings.clone() };
+        let wrong = settings.clone().with(|s| {
+            s.photons.mode = mode;
+            s.photons.final_gather = 1;
+        });
         let refused = render(gpu(), &scene, &wrong, &Silent).map(drop).expect_err("the mode has no final gathering");
         assert!(refused.to_string().contains("final-gather"), "{refused}");
     }
@@ -110,7 +122,7 @@ fn coarse_ball(smooth: bool) -> Scene {
 #[test]
 fn modes_agree_on_a_smooth_shaded_ball() {
     let picture = |mode, smooth| {
-        let settings = Settings { neighbors: 150, ..settings(mode, 100_000, 40) };
+        let settings = settings(mode, 100_000, 40).with(|s| s.estimate.neighbors = 150);
         render_scene(&coarse_ball(smooth), &settings)
     };
     // Means over blocks of 4 x 4 pixels, against noise; away from the shadow's edge, where the disc of the estimate
@@ -150,7 +162,7 @@ fn a_full_map_is_normalised_by_its_own_paths() {
             ..settings(Mode::Photons, 1, 32)
         };
         let full = render_scene(&scene, &small);
-        let open = render_scene(&scene, &Settings { global_photons: 250_000, ..small.clone() });
+        let open = render_scene(&scene, &small.clone().with(|s| s.photons.global = 250_000));
         let (global, caustic) = (full.stats.photons.global, full.stats.photons.caustic);
         assert!(global.stored > 4_900, "the global map holds only {} photons", global.stored);
         assert!(caustic.emitted > 20 * global.emitted, "the global map was full after {} paths", global.emitted);

@@ -85,8 +85,8 @@ fn differences(
     let positions: Vec<Vec3> = places.iter().map(|p| p.position.into()).collect();
     let wrong = |(i, point): (usize, &VisiblePoint)| {
         let accepted = |p: usize| !side_test || usable(&places[p], point);
-        let k = settings.radius.map_or(settings.neighbors, |_| u32::MAX);
-        let bound = settings.radius.or(settings.max_radius);
+        let k = settings.estimate.radius.map_or(settings.estimate.neighbors, |_| u32::MAX);
+        let bound = settings.estimate.radius.or(settings.estimate.max_radius);
         let found = brute_force(&positions, point.position.into(), k, bound, accepted);
         let flat = VisiblePoint { ns: point.ng, ..*point };
         let expected = if side_test { *point } else { flat };
@@ -111,7 +111,7 @@ fn check(bench: &mut Bench, photons: &[Photon], points: &[VisiblePoint], setting
     let (places, fluxes) = map.read(&bench.gpu).unwrap();
     let wrong = differences(&answer, (&places, &fluxes), points, settings, side_test);
     assert_eq!(wrong, 0, "{} photons, {settings:?}, side test {side_test}", photons.len());
-    if photons.len() > 1 && settings.radius.or(settings.max_radius).is_none() {
+    if photons.len() > 1 && settings.estimate.radius.or(settings.estimate.max_radius).is_none() {
         let last = points.iter().rfind(|p| p.valid != 0).unwrap();
         let distance = |p: &PhotonPlace| Vec3::from(p.position).distance(last.position.into());
         let lost = (0..places.len())

@@ -58,14 +58,13 @@ pub fn places(count: usize) -> Vec<Place> {
 pub fn estimates(gpu: &Gpu, place: &Place, seeds: u32) -> [Vec<f64>; 4] {
     let mut sums = ways().map(|_| vec![0.0; place.points.len()]);
     for seed in 0..seeds {
-        let settings = Settings {
-            mode: Mode::Photons,
-            global_photons: place.photons,
-            max_bounces: 1,
-            neighbors: place.neighbors,
-            seed,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|s| {
+            s.photons.mode = Mode::Photons;
+            s.photons.global = place.photons;
+            s.photons.max_bounces = 1;
+            s.estimate.neighbors = place.neighbors;
+            s.photons.seed = seed;
+        });
         let buffers = SceneBuffers::new(gpu, &place.scene, &Bvh::build(&place.scene), &settings).expect("it fits");
         let tracer = PhotonTracer::new(gpu, &buffers);
         let traced = tracer.trace(gpu, &buffers, &settings, false, &Silent).expect("photons").global;
