@@ -1,12 +1,8 @@
 //! Errors of the estimate where surfaces end, meet or curve, against closed forms: `cargo bench --bench estimators`. What its options
 //! cost is in `cargo bench --bench options`.
 
-#[path = "../tests/photons/mod.rs"]
-mod photons;
-#[path = "../tests/surfaces/mod.rs"]
-mod surfaces;
-
 use caustica::gpu::Gpu;
+use support::surfaces;
 
 fn main() {
     let gpu = Gpu::open(None).expect("an adapter");

@@ -3,25 +3,22 @@
 //! denser; queries: points seen on the same surfaces, in Morton order for both. Neither side's building is counted;
 //! ours includes the sum over the photons found. Medians of rounds, in each of which both sides run.
 
-#[path = "../tests/photons/mod.rs"]
-mod photons;
-
 use std::{num::NonZero, time::Instant};
 
 use caustica::{
     gpu::Gpu,
     layout::{Gathered, VisiblePoint},
     passes::{
-        gather::{Gather, GatherOptions, GatherSettings, gathered_buffer},
-        photon_map::{MapKernels, PhotonMap, PhotonStore},
+        estimate::gather::{Gather, GatherOptions, GatherSettings, gathered_buffer},
+        maps::photon_map::{MapKernels, PhotonMap, PhotonStore},
     },
     progress::Silent,
     settings::Settings,
 };
 use glam::Vec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use photons::{Random, caustic_box, in_caustic, on_walls};
 use rayon::prelude::*;
+use support::photons::{Random, caustic_box, in_caustic, on_walls};
 
 const QUERIES: usize = 262_144;
 const ROUNDS: usize = 5;

@@ -1,6 +1,6 @@
 //! Every struct that crosses to the GPU, in one file.
 //!
-//! Each struct here has a twin of the same name in `shaders/`; `tests/layouts.rs` reflects the shaders and compares
+//! Each struct here has a twin of the same name in `shaders/`; `tests/house/layouts.rs` reflects the shaders and compares
 //! names, order, offsets and sizes. Vectors are arrays so that `repr(C)` and WGSL agree on alignment: a `[f32; 3]`
 //! is followed by a 4-byte field, as WGSL places a `vec3f`.
 

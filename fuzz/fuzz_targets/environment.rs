@@ -3,9 +3,6 @@
 
 use libfuzzer_sys::fuzz_target;
 
-#[path = "../../tests/assets/any_environment.rs"]
-mod any_environment;
-
 fuzz_target!(|bytes: &[u8]| {
-    let _ = any_environment::check(bytes);
+    let _ = support::any_environment::check(bytes);
 });

@@ -6,13 +6,11 @@ use libfuzzer_sys::{fuzz_mutator, fuzz_target};
 
 #[path = "../src/gltf_mutator.rs"]
 mod gltf_mutator;
-#[path = "../../tests/assets/any_scene.rs"]
-mod any_scene;
 
 fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
     gltf_mutator::mutate(data, size, max_size, seed)
 });
 
 fuzz_target!(|bytes: &[u8]| {
-    let _ = any_scene::check(bytes);
+    let _ = support::any_scene::check(bytes);
 });

@@ -166,7 +166,7 @@ mod tests {
     /// What is counted when the grid has summed these photons of a line, with the estimate's radiance times `factor`.
     fn counted(distances: &[f32], summed: &[u32], factor: f32) -> Measure {
         let (map, point) = line(distances);
-        let estimate = map.estimate(&point, &SETTINGS());
+        let estimate = map.estimate(&point, &SETTINGS().estimate);
         let gathered = Gathered {
             radius_squared: estimate.radius_squared,
             count: summed.len() as u32,

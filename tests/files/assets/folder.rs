@@ -1,0 +1,175 @@
+//! The folder of public assets that `CAUSTICA_ASSETS` names: `assets.json` in it says what is to come of each file.
+//!
+//! Without the variable there is nothing to try, which is said. `CAUSTICA_ASSETS_BYTES` leaves out scenes whose folder is
+//! larger, where time is short.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use caustica::{
+    Error,
+    scene::{Environment, Scene},
+    settings::Mode,
+};
+use serde_json::Value;
+
+use super::{Ended, render_with_command};
+
+/// What the README of the assets asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Expected {
+    /// A picture.
+    Render,
+    /// It is read, and nothing in it can be drawn.
+    Empty,
+    /// Exit code 1 and one line.
+    Refuse,
+    /// One of the two.
+    Either,
+}
+
+/// The folder, if the variable names one.
+fn assets() -> Option<(PathBuf, Vec<Value>)> {
+    let Some(folder) = std::env::var_os("CAUSTICA_ASSETS").map(PathBuf::from) else {
+        println!("CAUSTICA_ASSETS names no folder: nothing is tried");
+        return None;
+    };
+    let text = fs::read(folder.join("assets.json")).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let list: Value = serde_json::from_slice(&text).expect("assets.json is JSON");
+    Some((folder, list.as_array().expect("assets.json is a list").clone()))
+}
+
+fn text<'a>(asset: &'a Value, key: &str) -> &'a str {
+    asset[key].as_str().unwrap_or("")
+}
+
+fn expected(asset: &Value) -> Expected {
+    // Draco's is a required extension that a renderer may lack; the two of Compatibility are said in words only.
+    match text(asset, "id") {
+        "DracoSparseMesh" | "handmade__png_bomb_30000x30000" => return Expected::Either,
+        "AG/Compatibility_04" | "AG/Compatibility_05" => return Expected::Refuse,
+        _ => {}
+    }
+    match (text(asset, "group"), text(asset, "expect"), text(asset, "drawable"), asset["triangles"].as_u64()) {
+        ("handmade", ..) | (_, "REFUSE", ..) => Expected::Refuse,
+        (_, "EITHER", ..) => Expected::Either,
+        (_, "LOAD", "no" | "mesh only", _) | (_, "", _, Some(0)) => Expected::Empty,
+        _ => Expected::Render,
+    }
+}
+
+/// Bytes of all files beside the scene.
+fn size_with_neighbours(path: &Path) -> u64 {
+    let entries = fs::read_dir(path.parent().expect("a folder")).expect("can be listed");
+    entries.map(|entry| entry.expect("an entry").metadata().expect("its size").len()).sum()
+}
+
+/// The scene as the command reads it.
+fn load(path: &Path) -> Result<Scene, String> {
+    let mut scene = Scene::load(path).map_err(|error| error.to_string())?;
+    scene.add_default_light();
+    Ok(scene)
+}
+
+/// Renders in this process; says what is wrong with the picture.
+fn render(path: &Path) -> Result<(), String> {
+    let scene = load(path)?;
+    let settings = support::settings(Mode::Hybrid, 500, 16).with(|s| s.estimate.neighbors = 10);
+    let silent = caustica::progress::Silent;
+    let render = caustica::renderer::render(support::gpu(), &scene, &settings, &silent).map_err(|e| e.to_string())?;
+    let pixels = render.frame.radiance.as_flattened();
+    if !pixels.iter().all(|x| x.is_finite() && *x >= 0.0) {
+        return Err("a pixel is no finite number".to_owned());
+    }
+    if pixels.iter().all(|x| *x == 0.0) {
+        return Err("the picture is black".to_owned());
+    }
+    Ok(())
+}
+
+/// What the command makes of a file that may be refused; `true` if it is.
+fn refused_or_rendered(path: &Path) -> Result<bool, String> {
+    let ended: Ended = render_with_command(path);
+    if ended.code == Some(0) && ended.wrote {
+        return render(path).map(|()| false).or_else(|what| if what.contains("black") { Ok(false) } else { Err(what) });
+    }
+    ended.refusal(path).map(|_| true)
+}
+
+fn outcome(path: &Path, expected: Expected) -> Result<(), String> {
+    match expected {
+        Expected::Render => render(path),
+        Expected::Either => refused_or_rendered(path).map(|_| ()),
+        Expected::Refuse => match refused_or_rendered(path) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err("was rendered".to_owned()),
+            Err(what) => Err(what),
+        },
+        Expected::Empty => {
+            let scene = load(path)?;
+            match scene.check_renderable() {
+                Err(Error::Scene { problem, .. }) if problem.contains("nothing to draw") => Ok(()),
+                other => Err(format!("{other:?}")),
+            }
+        }
+    }
+}
+
+#[test]
+fn every_scene_behaves_as_the_readme_of_the_assets_says() {
+    let Some((folder, assets)) = assets() else { return };
+    let most = std::env::var("CAUSTICA_ASSETS_BYTES").map_or(u64::MAX, |n| n.parse().expect("a number of bytes"));
+    let (mut wrong, mut counts, mut left_out) = (Vec::new(), [0; 4], Vec::new());
+    for asset in assets.iter().filter(|asset| text(asset, "group") != "image") {
+        let (path, expected) = (folder.join(text(asset, "file")), expected(asset));
+        if size_with_neighbours(&path) > most {
+            left_out.push(text(asset, "id"));
+            continue;
+        }
+        let start = std::time::Instant::now();
+        counts[expected as usize] += 1;
+        if let Err(what) = outcome(&path, expected) {
+            wrong.push(format!("{} is to {expected:?}: {what}", path.display()));
+        }
+        println!("{:6.2} s  {expected:?}  {}", start.elapsed().as_secs_f64(), text(asset, "id"));
+    }
+    println!("render, empty, refuse, either: {counts:?}; too large: {left_out:?}");
+    assert!(wrong.is_empty(), "{} scenes:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(counts.iter().all(|count| *count > 0), "no scene of some kind: {counts:?}");
+}
+
+#[test]
+fn every_environment_is_read_or_refused() {
+    let Some((folder, assets)) = assets() else { return };
+    let images: Vec<&Value> = assets.iter().filter(|asset| text(asset, "group") == "image").collect();
+    assert!(images.len() >= 10, "{}", images.len());
+    for image in images {
+        let path = folder.join(text(image, "file"));
+        // The damaged ones have names that no reader would open by.
+        let damaged = path.extension().is_none();
+        match Environment::load(&path, 1.0, 0.0) {
+            Ok(map) => {
+                assert!(!damaged, "{} is damaged and was read", path.display());
+                assert!(map.pixels.as_flattened().iter().all(|x| x.is_finite()), "{}", path.display());
+            }
+            Err(error) => {
+                assert!(damaged, "{error}");
+                assert!(!error.to_string().contains('\n'), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wrong_outcome_is_told() {
+    let scene = |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hostile").join(name);
+    let wrong = [("bad_base64.gltf", Expected::Render), ("bad_base64.gltf", Expected::Empty)];
+    for (name, expected) in wrong {
+        assert!(outcome(&scene(name), expected).is_err(), "{name} {expected:?}");
+    }
+    let box_ = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references/S1.glb");
+    assert!(outcome(&box_, Expected::Render).is_ok());
+    assert!(outcome(&box_, Expected::Refuse).is_err() && outcome(&box_, Expected::Empty).is_err());
+}

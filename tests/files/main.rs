@@ -1,0 +1,9 @@
+//! Files that are read and written: scenes, environment maps, pictures; good, bad and hostile ones.
+
+mod assets;
+mod gltf_compressed;
+mod gltf_files;
+mod loading;
+mod loading_geometry;
+mod loading_values;
+mod outputs;

@@ -1,0 +1,321 @@
+//! Every struct that crosses to the GPU has the same fields in the same places on both sides, and every shared
+//! constant the same value: the shaders are reflected with naga and compared with `layout.rs`.
+
+use std::{any::type_name, mem::offset_of};
+
+use caustica::{gpu::shaders::SHADERS, layout};
+use naga::{AddressSpace, ArraySize, Expression, Handle, Literal, Module, ScalarKind, Type, TypeInner};
+
+/// Name, byte offset and type of a field, in Rust's words.
+type Field = (String, u32, String);
+
+/// A struct of `layout.rs`.
+struct Twin {
+    name: &'static str,
+    size: u32,
+    fields: Vec<Field>,
+}
+
+/// Describes structs of `layout.rs`; a field that is left out does not compile.
+macro_rules! twins {
+    ($($name:ident { $($field:ident),+ $(,)? })+) => {
+        vec![$({
+            fn type_of<F>(_: impl Fn(layout::$name) -> F) -> String {
+                type_name::<F>().replace("caustica::layout::", "")
+            }
+            let _all = |layout::$name { $($field: _),+ }: layout::$name| ();
+            Twin {
+                name: stringify!($name),
+                size: size_of::<layout::$name>() as u32,
+                fields: vec![$((
+                    stringify!($field).to_string(),
+                    offset_of!(layout::$name, $field) as u32,
+                    type_of(|value| value.$field),
+                )),+],
+            }
+        }),+]
+    };
+}
+
+fn twins() -> Vec<Twin> {
+    twins! {
+        BvhNode { grid, low, high }
+        Ray { origin, pad0, direction, pad1 }
+        RayHit { tuv, primitive }
+        Primitive { v0, material, e1, id, e2, emitter }
+        Normals { n0, n1, n2, flat_shaded }
+        Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }
+        Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
+        LightChoice { cdf, probability }
+        Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
+        Path { origin, flags, direction, bounces, beta, media_count, media }
+        Photon { position, wi, flux, normal }
+        VisiblePoint { position, valid, weight, offset, ng, media_outer, ns, media_inner }
+        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high }
+        PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
+        Store { staged, first_photon, photons, map_bit }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media }
+        FinalStep { ray, rays, points, pad }
+        FirstHit { normal, depth, albedo, alpha }
+        TilePixel { radiance, alpha, normal, depth, albedo, non_finite }
+        DirectLight { light, points, pad0, pad1 }
+        EmitterSample { points, sample, samples, light_count }
+        Cell { lo, wi_lo, hi, wi_hi }
+        PhotonPlace { position, wi }
+        PhotonFlux { flux, normal }
+        MapInfo { count, levels, split, pad }
+        GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, turn, pad0, pad1 }
+        Gathered { radius_squared, count, fingerprint }
+        ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, turn }
+        SortStep { count, shift, stride, pad }
+        BoundStep { count, first_box }
+        KeyStep { count, window_first, window_count, fine }
+        MoveStep { sorted_first, sorted_count, window_first, window_count }
+        GridStep { photons, level, base, finer_base, finer_count, first_cell, cell_count, pad }
+    }
+}
+
+macro_rules! constants {
+    ($($name:ident),+ $(,)?) => { [$((stringify!($name), layout::$name as u64)),+] };
+}
+
+fn constants() -> Vec<(&'static str, u64)> {
+    constants![
+        WORKGROUP_SIZE,
+        BVH_INDEX_BITS,
+        BVH_STACK,
+        MEDIA_DEPTH,
+        MARGIN_CELL,
+        MARGIN_SAMPLES,
+        SPHERE_BIT,
+        DELTA_BIT,
+        DIFFUSE,
+        MIRROR,
+        GLASS,
+        PANE,
+        POINT_LIGHT,
+        SPOT_LIGHT,
+        DIRECTIONAL_LIGHT,
+        TRIANGLE_LIGHT,
+        SPHERE_LIGHT,
+        ENVIRONMENT_LIGHT,
+        STREAM_PHOTON,
+        STREAM_CAUSTIC,
+        STORE_GLOBAL,
+        STORE_DIRECT,
+        STORE_CAUSTIC,
+        FOLLOW_DIFFUSE,
+        AIM,
+        CAUSTICS_APART,
+        GROUP_SHIFT,
+        MAX_TARGETS,
+        CAUSTIC_BIT,
+        SAMPLER_RANDOM,
+        SAMPLER_SOBOL,
+        CELL_PHOTONS,
+        CELL_FAN,
+        RADIX_CHUNK,
+        RADIX_DIGITS,
+        SCAN_SPAN,
+        BOUND_LANES,
+        SEARCH_STATE_BYTES,
+        DISC_BYTES,
+        GATHER_STATE_BYTES
+    ]
+    .to_vec()
+}
+
+/// Structs that only the device fills and reads, and the bytes that the host allots them.
+const OPAQUE: [(&str, usize); 3] = [
+    ("SearchState", layout::SEARCH_STATE_BYTES),
+    ("GatherState", layout::GATHER_STATE_BYTES),
+    ("Disc", layout::DISC_BYTES),
+];
+
+fn opaque_bytes(name: Option<&str>) -> Option<u32> {
+    OPAQUE.iter().find(|(n, _)| Some(*n) == name).map(|(_, bytes)| *bytes as u32)
+}
+
+/// What of a kernel's text disagrees with `layout.rs`, one line each.
+fn disagreements(wgsl: &str) -> Vec<String> {
+    let module = naga::front::wgsl::parse_str(wgsl).expect("composed shaders are valid");
+    let mut found = Vec::new();
+    for handle in bound_structs(&module) {
+        found.extend(compare_struct(&module, handle));
+    }
+    for (name, value) in named_values(&module) {
+        if let Some((_, expected)) = constants().iter().find(|(n, _)| *n == name)
+            && value != Some(*expected)
+        {
+            found.push(format!("{name} is {value:?} in the shader and {expected} in layout.rs"));
+        }
+    }
+    for entry in &module.entry_points {
+        // A single invocation is launched as such, not through the folded dispatch.
+        if ![[layout::WORKGROUP_SIZE, 1, 1], [1, 1, 1]].contains(&entry.workgroup_size) {
+            found.push(format!("{} has workgroups of {:?}", entry.name, entry.workgroup_size));
+        }
+    }
+    found
+}
+
+/// Structs that lie in storage or uniform buffers, also inside of others.
+fn bound_structs(module: &Module) -> Vec<Handle<Type>> {
+    let in_buffer = |space| matches!(space, AddressSpace::Storage { .. } | AddressSpace::Uniform);
+    let mut open: Vec<_> =
+        module.global_variables.iter().filter(|(_, v)| in_buffer(v.space)).map(|(_, v)| v.ty).collect();
+    let mut found = Vec::new();
+    while let Some(handle) = open.pop() {
+        match &module.types[handle].inner {
+            TypeInner::Array { base, .. } => open.push(*base),
+            TypeInner::Struct { members, .. } if !found.contains(&handle) => {
+                found.push(handle);
+                if opaque_bytes(module.types[handle].name.as_deref()).is_none() {
+                    open.extend(members.iter().map(|m| m.ty));
+                }
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+fn compare_struct(module: &Module, handle: Handle<Type>) -> Vec<String> {
+    let Type { name, inner: TypeInner::Struct { members, span } } = &module.types[handle] else { return Vec::new() };
+    if let Some(bytes) = opaque_bytes(name.as_deref()) {
+        let line = format!("{name:?} takes {span} bytes in the shader and {bytes} in layout.rs");
+        return if bytes == *span { Vec::new() } else { vec![line] };
+    }
+    let name = name.as_deref().unwrap_or("a nameless struct");
+    let Some(twin) = twins().into_iter().find(|t| t.name == name) else {
+        return vec![format!("{name} lies in a buffer and is not among the twins of this test")];
+    };
+    let field = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), m.offset, rust_type(module, m.ty));
+    let fields: Vec<Field> = members.iter().map(field).collect();
+    let mut found = Vec::new();
+    if fields != twin.fields {
+        found.push(format!("{name} is {fields:?} in the shader and {:?} in layout.rs", twin.fields));
+    }
+    if *span != twin.size {
+        found.push(format!("{name} takes {span} bytes in the shader and {} in layout.rs", twin.size));
+    }
+    found
+}
+
+/// The Rust type that holds a WGSL type of a buffer.
+fn rust_type(module: &Module, handle: Handle<Type>) -> String {
+    let scalar = |s: naga::Scalar| {
+        let kind = match s.kind {
+            ScalarKind::Float => "f",
+            ScalarKind::Uint => "u",
+            ScalarKind::Sint => "i",
+            _ => "?",
+        };
+        format!("{kind}{}", s.width * 8)
+    };
+    match &module.types[handle].inner {
+        TypeInner::Scalar(s) | TypeInner::Atomic(s) => scalar(*s),
+        TypeInner::Vector { size, scalar: s } => format!("[{}; {}]", scalar(*s), *size as u32),
+        TypeInner::Array { base, size: ArraySize::Constant(n), .. } => format!("[{}; {n}]", rust_type(module, *base)),
+        TypeInner::Struct { .. } => module.types[handle].name.clone().unwrap_or_default(),
+        other => format!("{other:?}"),
+    }
+}
+
+/// Constants and overrides of the module with their whole-number values; `None` where the value is none.
+fn named_values(module: &Module) -> Vec<(String, Option<u64>)> {
+    let number = |init: Handle<Expression>| match module.global_expressions[init] {
+        Expression::Literal(Literal::U32(n)) => Some(u64::from(n)),
+        Expression::Literal(Literal::I32(n)) => u64::try_from(n).ok(),
+        Expression::Literal(Literal::AbstractInt(n)) => u64::try_from(n).ok(),
+        _ => None,
+    };
+    let constants = module.constants.iter().map(|(_, c)| (c.name.clone(), number(c.init)));
+    let overrides = module.overrides.iter().map(|(_, o)| (o.name.clone(), o.init.and_then(number)));
+    constants.chain(overrides).filter_map(|(name, value)| Some((name?, value))).collect()
+}
+
+#[test]
+fn shaders_and_host_agree() {
+    assert!(!SHADERS.is_empty());
+    let lines = |s: &caustica::gpu::shaders::Shader| {
+        disagreements(s.wgsl).into_iter().map(|line| format!("{}: {line}", s.stem)).collect::<Vec<_>>()
+    };
+    let found: Vec<_> = SHADERS.iter().flat_map(lines).collect();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn this_test_knows_every_struct_and_constant_of_the_host() {
+    let source = include_str!("../../src/layout.rs");
+    let named = |prefix: &str, end: char| -> Vec<&str> {
+        source.lines().filter_map(|l| l.strip_prefix(prefix)?.split_once(end)).map(|(name, _)| name.trim()).collect()
+    };
+    let (structs, values) = (named("pub struct ", '{'), named("pub const ", ':'));
+    assert!(structs.len() > 5 && values.len() > 5, "{structs:?} {values:?}");
+    let missing: Vec<_> = structs
+        .into_iter()
+        .filter(|name| twins().iter().all(|t| t.name != *name))
+        .chain(values.into_iter().filter(|name| constants().iter().all(|(n, _)| n != name)))
+        .collect();
+    assert!(missing.is_empty(), "add to this test: {missing:?}");
+}
+
+#[test]
+fn every_struct_of_the_host_lies_in_some_kernels_buffer() {
+    let bound: Vec<String> = SHADERS.iter().flat_map(|s| bound_names(s.wgsl)).collect();
+    let unused: Vec<_> = twins().into_iter().map(|t| t.name).filter(|name| !bound.iter().any(|b| b == name)).collect();
+    assert!(unused.is_empty(), "no kernel binds {unused:?}");
+    assert_eq!(bound_names(GOOD), ["Path", "Photon"]);
+}
+
+/// Names of the structs that a kernel's buffers hold, sorted.
+fn bound_names(wgsl: &str) -> Vec<String> {
+    let module = naga::front::wgsl::parse_str(wgsl).expect("composed shaders are valid");
+    let mut names: Vec<_> =
+        bound_structs(&module).into_iter().filter_map(|handle| module.types[handle].name.clone()).collect();
+    names.sort();
+    names
+}
+
+/// A kernel that agrees with the host.
+const GOOD: &str = "
+    const WORKGROUP_SIZE: u32 = 64u;
+    const SPHERE_BIT = 1u << 31u;
+    struct Photon { position: vec3f, wi: u32, flux: vec3f, normal: u32 }
+    struct Path {
+        origin: vec3f, flags: u32, direction: vec3f, bounces: u32, beta: vec3f, media_count: u32, media: array<u32, 4>,
+    }
+    @group(1) @binding(0) var<storage, read> photons: array<Photon>;
+    @group(2) @binding(0) var<storage, read_write> paths: array<Path>;
+    @compute @workgroup_size(WORKGROUP_SIZE)
+    fn probe() { paths[0].flags = photons[0].normal | SPHERE_BIT; }
+";
+
+#[test]
+fn a_kernel_that_agrees_passes() {
+    assert_eq!(disagreements(GOOD), Vec::<String>::new());
+}
+
+#[test]
+fn each_kind_of_disagreement_is_reported() {
+    for (from, to, said) in [
+        ("position: vec3f, wi: u32, flux: vec3f", "flux: vec3f, wi: u32, position: vec3f", "Photon is"),
+        ("wi: u32", "wi: f32", "Photon is"),
+        ("flux: vec3f", "flow: vec3f", "Photon is"),
+        ("flux: vec3f", "flux: vec4f", "Photon takes"),
+        ("media: array<u32, 4>", "media: array<u32, 8>", "Path takes"),
+        (", normal: u32 }", ", normal: u32, more: u32 }", "Photon takes"),
+        ("SPHERE_BIT = 1u << 31u", "SPHERE_BIT = 1u << 30u", "SPHERE_BIT is"),
+        ("= 64u", "= 32u", "WORKGROUP_SIZE is"),
+        ("@workgroup_size(WORKGROUP_SIZE)", "@workgroup_size(8, 8)", "workgroups of"),
+        ("media: array<u32, 4>", "media: array<Medium, 4>", "Medium lies in a buffer"),
+        ("struct Photon", "@group(2) @binding(1) var<storage> s: array<SearchState>; struct Photon", "SearchState"),
+    ] {
+        assert!(GOOD.contains(from));
+        let bad =
+            format!("struct Medium {{ material: u32 }} struct SearchState {{ a: u32 }}\n{}", GOOD.replace(from, to));
+        let found = disagreements(&bad);
+        assert!(found.iter().any(|line| line.contains(said)), "{to}: {found:?}");
+    }
+}

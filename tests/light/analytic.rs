@@ -1,0 +1,179 @@
+//! Scenes whose light is known in closed form.
+//!
+//! | test | closed form | negative control |
+//! |---|---|---|
+//! | closed sphere | L = ρ/π · I/R² · (1 − ρ^B)/(1 − ρ) | the same with B − 1 |
+//! | final gathering | the same series with one bounce more | with B |
+//! | closed box | stored flux = Φ (1 − ρ^B)/(1 − ρ) | the same with B − 1 |
+//! | bounce limit | stored flux · (1 − ρ) + lost flux = Φ | without the lost flux |
+//! | inverse-square law | L = ρ/π · I/d² | 1/d |
+//! | thin wall | black behind | lit in front |
+
+use std::f64::consts::PI;
+
+use caustica::{
+    bvh::Bvh,
+    layout::Photon,
+    passes::{PhotonTracer, TracedPhotons},
+    progress::Silent,
+    scene::Scene,
+    settings::{Mode, Sampler, Settings},
+    upload::SceneBuffers,
+};
+use glam::{Vec3, vec3};
+use support::*;
+
+const ALBEDO: f64 = 0.6;
+const BOUNCES: u32 = 3;
+
+/// Sum of the powers of ρ that B surfaces make.
+fn series(albedo: f64, bounces: u32) -> f64 {
+    (1.0 - albedo.powi(bounces as i32)) / (1.0 - albedo)
+}
+
+#[test]
+fn closed_sphere_has_the_radiance_of_the_series() {
+    let (radius, intensity) = (2.0, 5.0);
+    let mut scene = scene(&[diffuse(ALBEDO as f32)]);
+    scene.spheres.push(sphere(Vec3::ZERO, radius, 0));
+    scene.lights.push(point_light(Vec3::ZERO, intensity));
+    scene.cameras.push(camera(vec3(0.5, 0.0, 0.0), vec3(-1.0, 0.2, 0.3), 100.0));
+    let direct = ALBEDO / PI * f64::from(intensity) / f64::from(radius * radius);
+    for mode in [Mode::Photons, Mode::Hybrid] {
+        for neighbors in [10, 100] {
+            // Independent photons: those of a Sobol sequence keep a distance, which makes the (k+1)-th lie farther by up to 1/(2k).
+            let sampler = Sampler::Random;
+            let settings = settings(mode, 150_000, 64).with(|s| {
+                s.estimate.neighbors = neighbors;
+                s.photons.max_bounces = BOUNCES;
+                s.photons.sampler = sampler;
+            });
+            let measured = mean(&render_scene(&scene, &settings));
+            let right = direct * series(ALBEDO, BOUNCES);
+            let wrong = direct * series(ALBEDO, BOUNCES - 1);
+            assert!(within(measured, right, 0.015), "{mode:?}, k = {neighbors}: {measured} instead of {right}");
+            assert!(!within(measured, wrong, 0.015), "{mode:?}, k = {neighbors}: control {wrong} passes");
+            // The default sampler stays within what its photons' distances may cost.
+            let spread = mean(&render_scene(&scene, &settings.with(|s| s.photons.sampler = Sampler::Sobol)));
+            let least = right * (1.0 - 0.5 / f64::from(neighbors));
+            let fits = |mean: f64| mean > 0.995 * least && mean < 1.005 * right;
+            assert!(fits(spread), "{mode:?}, k = {neighbors}: {spread} is not from {least} to {right}");
+            assert!(!fits(1.06 * spread) && !fits(0.94 * spread), "{mode:?}, k = {neighbors}: control");
+        }
+    }
+}
+
+#[test]
+fn final_gathering_adds_the_bounce_that_its_rays_make() {
+    let (radius, intensity) = (2.0, 5.0);
+    let mut scene = scene(&[diffuse(ALBEDO as f32)]);
+    scene.spheres.push(sphere(Vec3::ZERO, radius, 0));
+    scene.lights.push(point_light(Vec3::ZERO, intensity));
+    scene.cameras.push(camera(vec3(0.5, 0.0, 0.0), vec3(-1.0, 0.2, 0.3), 100.0));
+    let direct = ALBEDO / PI * f64::from(intensity) / f64::from(radius * radius);
+    for (mode, first) in [(Mode::Hybrid, 0.0), (Mode::IndirectPhotons, 1.0)] {
+        let settings = settings(mode, 50_000, 32).with(|s| {
+            s.photons.max_bounces = BOUNCES;
+            s.photons.final_gather = 8;
+        });
+        let measured = mean(&render_scene(&scene, &settings));
+        let right = direct * (series(ALBEDO, BOUNCES + 1) - first);
+        let wrong = direct * (series(ALBEDO, BOUNCES) - first);
+        assert!(within(measured, right, 0.015), "{mode:?}: {measured} instead of {right}");
+        assert!(!within(measured, wrong, 0.015), "{mode:?}: control {wrong} passes");
+    }
+}
+
+/// Traces photons in mode 1 and returns them with the sum of their flux per channel, W.
+fn trace_photons(scene: &Scene, settings: &Settings) -> (TracedPhotons, [f64; 3]) {
+    let gpu = gpu();
+    let bvh = Bvh::build(scene);
+    let buffers = SceneBuffers::new(gpu, scene, &bvh, settings).expect("the scene fits");
+    let tracer = PhotonTracer::new(gpu, &buffers);
+    let traced = tracer.trace(gpu, &buffers, settings, scene.has_delta(), &Silent).expect("photons trace");
+    let photons: Vec<Photon> = traced.global.read(gpu).expect("photons read back");
+    let sum = |c: usize| photons.iter().map(|p| f64::from(p.flux[c])).sum::<f64>() / traced.global.emitted as f64;
+    let flux = [0, 1, 2].map(sum);
+    (traced, flux)
+}
+
+#[test]
+fn closed_box_stores_the_flux_of_the_series() {
+    let albedo = vec3(0.8, 0.5, 0.2);
+    let mut scene = scene(&[caustica::scene::Surface::Diffuse { albedo }]);
+    add_box(&mut scene, vec3(-1.0, -1.0, -1.0), vec3(1.0, 2.0, 1.5), 0);
+    scene.lights.push(point_light(vec3(0.2, 0.3, -0.1), 5.0));
+    let settings = settings(Mode::Photons, 300_000, 1).with(|s| s.photons.max_bounces = BOUNCES);
+    let (traced, flux) = trace_photons(&scene, &settings);
+    let power = 4.0 * PI * 5.0;
+    for channel in 0..3 {
+        let rho = f64::from(albedo[channel]);
+        let (right, wrong) = (power * series(rho, BOUNCES), power * series(rho, BOUNCES - 1));
+        assert!(within(flux[channel], right, 0.01), "channel {channel}: {} instead of {right}", flux[channel]);
+        assert!(!within(flux[channel], wrong, 0.01), "channel {channel}: control {wrong} passes");
+    }
+    // What is neither absorbed nor cut off would be missing: Σ over channels of stored · (1 − ρ) + lost = Φ.
+    let absorbed: f64 = (0..3).map(|c| flux[c] * (1.0 - f64::from(albedo[c]))).sum::<f64>() / 3.0;
+    assert!(within(absorbed + traced.lost, power, 0.01), "{absorbed} + {} instead of {power}", traced.lost);
+    assert!(!within(absorbed, power, 0.01), "control: nothing was lost to the bounce limit");
+    assert_eq!((traced.unfinished, traced.media_overflows), (0, 0));
+}
+
+#[test]
+fn roulette_alone_ends_paths() {
+    let mut scene = scene(&[diffuse(0.9)]);
+    add_box(&mut scene, Vec3::splat(-1.0), Vec3::splat(1.0), 0);
+    scene.lights.push(point_light(vec3(0.2, 0.3, -0.1), 1.0));
+    let settings = settings(Mode::Photons, 200_000, 1).with(|s| s.photons.max_bounces = 0);
+    let (traced, flux) = trace_photons(&scene, &settings);
+    let right = 4.0 * PI / (1.0 - 0.9);
+    assert!(within(flux[0], right, 0.02), "{} instead of {right}", flux[0]);
+    assert!(!within(flux[0], 4.0 * PI * series(0.9, 20), 0.02), "control: a limit of 20 bounces passes");
+    assert_eq!(traced.lost, 0.0);
+}
+
+/// A floor at height 0 under a light, seen from above over a small field.
+fn floor_under_light(height: f32) -> Scene {
+    let mut scene = scene(&[diffuse(0.5)]);
+    add_quad(&mut scene, vec3(-10.0, 0.0, 10.0), vec3(20.0, 0.0, 0.0), vec3(0.0, 0.0, -20.0), 0);
+    scene.lights.push(point_light(vec3(0.0, height, 0.0), 7.0));
+    scene.cameras.push(camera(vec3(0.0, 5.0, 0.001), Vec3::ZERO, 1.0));
+    scene
+}
+
+#[test]
+fn light_falls_with_the_square_of_the_distance() {
+    const SEEDS: u32 = 8;
+    for (mode, tolerance) in [(Mode::DirectRays, 0.005), (Mode::DirectPhotons, 0.03)] {
+        for height in [1.0, 2.0] {
+            let one = |seed| {
+                let settings = settings(mode, 200_000, 16).with(|s| {
+                    s.estimate.neighbors = 250;
+                    s.photons.seed = seed;
+                });
+                mean(&render_scene(&floor_under_light(height), &settings))
+            };
+            let measured = (0..SEEDS).map(one).sum::<f64>() / f64::from(SEEDS);
+            let right = 0.5 / PI * 7.0 / f64::from(height * height);
+            assert!(within(measured, right, tolerance), "{mode:?} at {height} m: {measured} instead of {right}");
+            let wrong = 0.5 / PI * 7.0 / f64::from(height);
+            assert!(height == 1.0 || !within(measured, wrong, tolerance), "{mode:?}: control 1/d passes");
+        }
+    }
+}
+
+#[test]
+fn a_thin_wall_is_black_behind() {
+    let wall = |eye: f32| {
+        let mut scene = scene(&[diffuse(0.5)]);
+        add_quad(&mut scene, vec3(-1.0, -1.0, 0.0), vec3(2.0, 0.0, 0.0), vec3(0.0, 2.0, 0.0), 0);
+        scene.lights.push(point_light(vec3(0.0, 0.0, 1.0), 5.0));
+        scene.cameras.push(camera(vec3(0.0, 0.0, eye), Vec3::ZERO, 30.0));
+        scene
+    };
+    for mode in [Mode::DirectRays, Mode::Photons] {
+        let settings = settings(mode, 20_000, 16);
+        assert_eq!(mean(&render_scene(&wall(-2.0), &settings)), 0.0, "{mode:?}: light came through the wall");
+        assert!(mean(&render_scene(&wall(2.0), &settings)) > 0.1, "{mode:?}: control, the lit side is dark");
+    }
+}

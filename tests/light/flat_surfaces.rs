@@ -1,0 +1,59 @@
+//! The estimate where the surface around a point is no whole flat disc, against closed forms.
+//!
+//! | place | negative control |
+//! |---|---|
+//! | box corner, table edge, both sides of a thin wall, small spheres | the raw estimate, rejection alone, correction alone |
+//! | a ball that touches a floor, under few photons: against many | one pixel too bright, all a tenth too bright |
+
+use std::path::Path;
+
+use caustica::{renderer::Render, scene::Scene, settings::Mode};
+use support::surfaces::{bias, estimates, places};
+use support::{gpu, mean, render_scene, settings};
+
+#[test]
+fn rejection_and_correction_are_right_together_and_wrong_alone() {
+    for place in places(400) {
+        let [raw, rejects, corrects, both] = estimates(gpu(), &place, 3).map(|found| bias(&place, &found));
+        let found =
+            format!("{}: raw {raw:.3}, rejection {rejects:.3}, correction {corrects:.3}, both {both:.3}", place.name);
+        assert!(both.abs() < 0.06, "{found}");
+        assert!(raw.abs() > 0.15, "control: {found}");
+        assert!(rejects.abs().max(corrects.abs()) > 0.15, "control: {found}");
+    }
+}
+
+/// What is amiss with the light of a picture, if another one is right.
+fn amiss(found: &Render, right: &Render) -> Option<String> {
+    let largest = |r: &Render| r.frame.radiance.iter().flatten().copied().fold(0.0, f32::max);
+    let ratios = [mean(found) / mean(right), f64::from(largest(found) / largest(right))];
+    let plausible = (ratios[0] - 1.0).abs() < 0.06 && ratios[1] < 1.5;
+    (!plausible).then(|| format!("mean and largest pixel, over those of many photons: {ratios:.3?}"))
+}
+
+/// Discs of a few photons reach through the floor that the ball stands on.
+#[test]
+fn where_solids_touch_few_photons_are_as_bright_as_many() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/diffuse.gltf");
+    let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
+    let picture = |photons, neighbors, seed| {
+        let mut settings = settings(Mode::IndirectPhotons, photons, 128);
+        settings.estimate.neighbors = neighbors;
+        settings.photons.seed = seed;
+        render_scene(&scene, &settings)
+    };
+    let right = picture(400_000, 100, 0);
+    for (photons, neighbors) in [(2000, 50), (2000, 100), (5000, 100), (20_000, 500)] {
+        for seed in [0, 1] {
+            let found = picture(photons, neighbors, seed);
+            let amiss = amiss(&found, &right);
+            assert!(amiss.is_none(), "{photons} photons, k = {neighbors}, seed {seed}: {amiss:?}");
+        }
+    }
+    let mut brighter = picture(400_000, 100, 0);
+    brighter.frame.radiance.iter_mut().flatten().for_each(|value| *value *= 1.1);
+    assert!(amiss(&brighter, &right).is_some(), "control");
+    let mut dotted = picture(400_000, 100, 0);
+    dotted.frame.radiance[100] = [60.0; 3];
+    assert!(amiss(&dotted, &right).is_some(), "control");
+}

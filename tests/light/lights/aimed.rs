@@ -1,0 +1,157 @@
+//! Emission aimed at mirrors and glass.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | flux | aimed and unaimed caustic maps hold the same flux, all over the scene, for every kind of light | 30 % more |
+//! | picture | aimed and unaimed give the same picture | general paths keep L S+ D as well |
+//! | paths | aimed, a caustic photon takes far fewer paths | the unaimed count |
+
+use caustica::{
+    layout::Photon,
+    renderer::Render,
+    scene::{Environment, Light, LightKind, Material, Scene, Surface},
+    settings::{Emission, Mode},
+    stats::Stats,
+};
+use glam::{Vec3, vec3};
+
+use support::*;
+
+use super::{flux, spot, traced};
+
+/// A floor with three balls of glass and mirror, two of them close to each other.
+fn balls() -> Scene {
+    let mut scene = scene(&[diffuse(0.5), glass(), Surface::Mirror { tint: Vec3::splat(0.9) }]);
+    add_quad(&mut scene, vec3(-3.0, 0.0, 3.0), vec3(6.0, 0.0, 0.0), vec3(0.0, 0.0, -6.0), 0);
+    scene.spheres.push(sphere(vec3(-1.5, 0.5, 0.0), 0.4, 1));
+    scene.spheres.push(sphere(vec3(1.2, 0.5, 0.0), 0.4, 1));
+    add_box(&mut scene, vec3(1.4, 0.3, -0.6), vec3(1.6, 0.5, 0.6), 2);
+    scene
+}
+
+/// The balls under each kind of light.
+fn lit_balls() -> Vec<(&'static str, Scene)> {
+    let lit = |change: &dyn Fn(&mut Scene)| {
+        let mut scene = balls();
+        change(&mut scene);
+        scene
+    };
+    let direction = vec3(0.3, -2.0, 0.5).normalize();
+    let sun = Light { kind: LightKind::Directional, direction, ..point_light(Vec3::ZERO, 3.0) };
+    let lamp = |scene: &mut Scene, double_sided| {
+        scene.materials.push(emissive("lamp", 0.0, 2.0, double_sided));
+        add_quad(scene, vec3(-0.5, 2.0, -0.5), Vec3::X, vec3(0.0, 0.3, 0.9), 3);
+    };
+    vec![
+        ("point", lit(&|s| s.lights.push(point_light(vec3(0.0, 2.0, 0.5), 3.0)))),
+        ("point inside a target", lit(&|s| s.lights.push(point_light(vec3(1.3, 0.95, 0.1), 3.0)))),
+        ("spot", lit(&|s| s.lights.push(spot(vec3(0.0, 2.0, 0.5), vec3(0.9, -1.5, 0.0), 3.0, 0.2, 0.5)))),
+        ("directional", lit(&|s| s.lights.push(sun.clone()))),
+        ("surface", lit(&|s| lamp(s, false))),
+        ("double-sided surface", lit(&|s| lamp(s, true))),
+        (
+            "sphere",
+            lit(&|s| {
+                s.materials.push(emissive("bulb", 0.0, 2.0, false));
+                s.spheres.push(sphere(vec3(0.0, 1.5, 0.3), 0.3, 3));
+            }),
+        ),
+        (
+            "glowing glass",
+            lit(&|s| {
+                s.materials.push(Material { emission: Vec3::ONE, ..s.materials[1].clone() });
+                s.spheres.push(sphere(vec3(0.0, 0.6, 0.3), 0.3, 3));
+            }),
+        ),
+        (
+            "environment",
+            lit(&|s| {
+                let mut pixels = vec![[0.2; 3]; 16 * 8];
+                pixels[2 * 16 + 3] = [90.0; 3];
+                let map = Environment { width: 16, height: 8, pixels, ..Environment::uniform(Vec3::ZERO) };
+                s.environment = Some(map);
+            }),
+        ),
+    ]
+}
+
+/// Flux of the caustic map in all, and by which side of the floor it lies on, left and right; W, each with its variance.
+fn caustic_flux(scene: &Scene, emission: Emission) -> [(f64, f64); 3] {
+    let settings = settings(Mode::DirectPhotons, 1, 1).with(|s| {
+        s.photons.emission = emission;
+        s.photons.caustic = 100_000;
+        s.photons.max_paths = Some(150_000);
+    });
+    let map = traced(scene, &settings).caustic;
+    let photons: Vec<Photon> = map.read(gpu()).expect("photons read back");
+    let part = |wanted: &dyn Fn(f32) -> bool| {
+        let part: Vec<_> = photons.iter().filter(|p| wanted(p.position[0])).collect();
+        // Each path leaves one photon at most, and few do: the variance is about the sum of squares.
+        let squares: f64 = part.iter().map(|p| f64::from(p.flux[0]).powi(2)).sum();
+        (flux(part, map.emitted), squares / (map.emitted as f64).powi(2))
+    };
+    [part(&|_| true), part(&|x| x < 0.0), part(&|x| x >= 0.0)]
+}
+
+#[test]
+fn aimed_paths_bring_the_flux_of_unaimed_ones() {
+    for (name, scene) in lit_balls() {
+        let [aimed, unaimed] = [Emission::Aimed, Emission::Unaimed].map(|emission| caustic_flux(&scene, emission));
+        for (part, (aimed, unaimed)) in aimed.into_iter().zip(unaimed).enumerate() {
+            let deviation = (aimed.1 + unaimed.1).sqrt();
+            let (aimed, unaimed) = (aimed.0, unaimed.0);
+            assert!((aimed - unaimed).abs() < 3.5 * deviation, "{name}, part {part}: {aimed} W, unaimed {unaimed} W");
+            let control = part > 0 || (1.3 * aimed - unaimed).abs() > 3.5 * deviation;
+            assert!(control, "{name}: control: 30 % more pass");
+        }
+    }
+}
+
+/// Radiance of the first channel.
+fn reds(render: &Render) -> Vec<f64> {
+    render.frame.radiance.iter().map(|p| f64::from(p[0])).collect()
+}
+
+/// Means over blocks of 8 x 8 pixels of a picture 32 wide.
+fn blocks(picture: &[f64]) -> Vec<f64> {
+    let at = |block: usize, i: usize| (block / 4 * 8 + i / 8) * 32 + block % 4 * 8 + i % 8;
+    (0..16).map(|block| (0..64).map(|i| picture[at(block, i)]).sum::<f64>() / 64.0).collect()
+}
+
+#[test]
+fn aimed_paths_make_the_picture_of_unaimed_ones() {
+    // A closed room, so that light passes the balls after diffuse bounces too.
+    let mut scene = scene(&[diffuse(0.35), glass(), Surface::Mirror { tint: Vec3::splat(0.9) }]);
+    add_box(&mut scene, vec3(-1.0, 0.0, -1.0), vec3(1.0, 2.0, 3.0), 0);
+    scene.spheres.push(sphere(vec3(0.45, 0.4, 0.2), 0.4, 1));
+    scene.spheres.push(sphere(vec3(-0.45, 0.4, -0.2), 0.4, 2));
+    scene.materials.push(emissive("lamp", 0.5, 2.0, false));
+    add_quad(&mut scene, vec3(-0.3, 1.9, -0.3), vec3(0.6, 0.0, 0.0), vec3(0.0, 0.0, 0.6), 3);
+    scene.lights.push(point_light(vec3(0.7, 1.7, 0.6), 4.0));
+    scene.cameras.push(camera(vec3(0.0, 1.4, 2.9), vec3(0.0, 0.2, 0.0), 40.0));
+    let picture = |emission, mode| {
+        let settings = settings(mode, 100_000, 32).with(|s| {
+            s.photons.emission = emission;
+            s.estimate.neighbors = 50;
+        });
+        let render = render_scene(&scene, &settings);
+        (reds(&render), render.stats)
+    };
+    let (aimed, aimed_stats) = picture(Emission::Aimed, Mode::Photons);
+    let (unaimed, unaimed_stats) = picture(Emission::Unaimed, Mode::Photons);
+    let mean = |picture: &[f64]| picture.iter().sum::<f64>() / picture.len() as f64;
+    let worst =
+        |a: &[f64], b: &[f64]| blocks(a).iter().zip(blocks(b)).map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
+    assert!(within(mean(&aimed), mean(&unaimed), 0.01), "means {} and {}", mean(&aimed), mean(&unaimed));
+    assert!(worst(&aimed, &unaimed) < 0.03, "blocks differ by up to {}", worst(&aimed, &unaimed));
+    // Mode 3 less mode 2 is L S+ D: what general paths must not store besides.
+    let [(photons, _), (rays, _)] =
+        [Mode::DirectPhotons, Mode::DirectRays].map(|mode| picture(Emission::Unaimed, mode));
+    let both: Vec<f64> = (0..aimed.len()).map(|i| aimed[i] + photons[i] - rays[i]).collect();
+    assert!(!within(mean(&both), mean(&unaimed), 0.01), "control: keeping both passes, mean {}", mean(&both));
+    assert!(worst(&both, &unaimed) > 0.06, "control: keeping both passes");
+    // The same statistics, far fewer paths.
+    let paths = |stats: &Stats| stats.photons.caustic.emitted as f64 / stats.photons.caustic.stored as f64;
+    let (few, many) = (paths(&aimed_stats), paths(&unaimed_stats));
+    assert!(few < 0.4 * many, "{few} paths a caustic photon aimed, {many} unaimed");
+}

@@ -1,0 +1,264 @@
+//! Against what is known in closed form.
+//!
+//! | test | closed form | negative control |
+//! |---|---|---|
+//! | spot | E = I f cos³θ/h², f the specification's falloff; flux I Ω | falloff not squared; flux of the whole outer cone |
+//! | directional | E = I cos θ | without the cosine |
+//! | uniform sky | E = π L on an open floor | 2 π L |
+//! | square emitter | Lambert's formula for polygons, facing and askew | the back side, and twice the distance |
+//! | spherical emitter | E = π L (r/d)² cos θ | r/d not squared |
+//! | furnace | closed objects of albedo 1 in radiance L look L | albedo 0.9 |
+//! | bright pixel | E = the sum over the map; the camera sees it where it is | the map turned by 20° |
+
+use std::f64::consts::PI;
+
+use caustica::{
+    scene::{Environment, Light, LightKind, Scene, Surface},
+    settings::Mode,
+};
+use glam::{Vec3, vec3};
+
+use support::*;
+
+use super::{direct_flux, floor, spot};
+
+/// Irradiance of the surface of albedo 1/2 that a camera sees at `target`, by direct light. The target must lie on no edge.
+fn irradiance_at(scene: &Scene, eye: Vec3, target: Vec3, light_samples: u32) -> f64 {
+    let mut scene = scene.clone();
+    scene.cameras = vec![camera(eye, target, 0.02)];
+    let settings = settings(Mode::DirectRays, 1, 16).with(|s| s.picture.light_samples = light_samples);
+    mean(&render_scene(&scene, &settings)) * PI / 0.5
+}
+
+#[test]
+fn a_spot_has_the_falloff_of_the_specification() {
+    let (height, inner, outer) = (2.0_f32, 0.3_f32, 0.6_f32);
+    let mut scene = floor(10.0);
+    scene.lights.push(spot(vec3(0.0, height, 0.0), Vec3::NEG_Y, 3.0, inner, outer));
+    for angle in [0.0_f32, 0.2, 0.4, 0.5, 0.57, 0.7] {
+        let x = height * angle.tan();
+        let measured = irradiance_at(&scene, vec3(x, 4.0, 0.001), vec3(x, 0.0, 0.0), 1);
+        let cosine = f64::from(angle).cos();
+        let [inner, outer] = [inner, outer].map(|a| f64::from(a).cos());
+        let t = ((cosine - outer) / (inner - outer)).clamp(0.0, 1.0);
+        let (right, wrong) = (3.0 * t * t * cosine.powi(3) / 4.0, 3.0 * t * cosine.powi(3) / 4.0);
+        assert!((measured - right).abs() < 0.002 * right + 1e-9, "at {angle}: {measured} instead of {right}");
+        let in_falloff = t > 0.0 && t < 1.0;
+        assert!(!in_falloff || !within(measured, wrong, 0.03), "control: {wrong} passes at {angle}");
+    }
+}
+
+#[test]
+fn photons_of_a_spot_carry_its_exact_flux() {
+    // In a ball, the light inside and all directions open to it; and above a floor that it lights from outside the
+    // scene's sphere, wider than its cone and narrower than its cone.
+    let solid_angle = |inner: f64, outer: f64| 2.0 * PI * ((1.0 - inner.cos()) + (inner.cos() - outer.cos()) / 3.0);
+    let mut ball = scene(&[diffuse(0.5)]);
+    ball.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
+    ball.lights.push(spot(vec3(0.1, 0.3, 0.2), vec3(1.0, 2.0, 3.0), 5.0, 0.4, 1.1));
+    let (measured, right) = (direct_flux(&ball, 40_000), 5.0 * solid_angle(0.4, 1.1));
+    assert!(within(measured, right, 1e-3), "inside: {measured} instead of {right}");
+    assert!(!within(measured, 5.0 * solid_angle(1.1, 1.1), 1e-3), "control: the whole outer cone");
+    let outside = |inner: f32, outer: f32| {
+        let mut scene = floor(1.0);
+        scene.lights.push(spot(vec3(0.0, 5.0, 0.0), Vec3::NEG_Y, 5.0, inner, outer));
+        direct_flux(&scene, 40_000)
+    };
+    let (measured, right) = (outside(0.05, 0.15), 5.0 * solid_angle(0.05, 0.15));
+    assert!(within(measured, right, 1e-3), "a narrow cone: {measured} instead of {right}");
+    // A square of half side a at distance h fills 4 atan(a²/(h √(h² + 2a²))) of a point's view.
+    let (measured, right) = (outside(1.4, 1.5), 20.0 * (1.0 / (5.0 * 27.0_f64.sqrt())).atan());
+    assert!(within(measured, right, 0.01), "a wide cone: {measured} instead of {right}");
+    assert!(!within(1.03 * measured, right, 0.01), "control: 3 % more passes");
+}
+
+#[test]
+fn a_directional_light_has_the_same_irradiance_everywhere() {
+    let mut scene = floor(4.0);
+    let direction = vec3(1.0, -2.0, 0.5).normalize();
+    scene.lights.push(Light { kind: LightKind::Directional, direction, ..point_light(Vec3::splat(9.0), 3.0) });
+    let cosine = f64::from(-direction.y);
+    for target in [Vec3::ZERO, vec3(3.0, 0.0, -2.0)] {
+        let measured = irradiance_at(&scene, target + vec3(0.0, 4.0, 0.001), target, 1);
+        assert!(within(measured, 3.0 * cosine, 0.001), "{measured} instead of {}", 3.0 * cosine);
+        assert!(!within(measured, 3.0, 0.001), "control: without the cosine");
+    }
+    // All that the floor catches: irradiance times area.
+    let (measured, right) = (direct_flux(&scene, 40_000), 3.0 * cosine * 64.0);
+    assert!(within(measured, right, 0.01), "photons: {measured} W instead of {right} W");
+    assert!(!within(1.03 * measured, right, 0.01), "control: 3 % more passes");
+}
+
+#[test]
+fn a_uniform_sky_gives_pi_times_its_radiance() {
+    let mut scene = floor(4.0);
+    scene.environment = Some(Environment { strength: 2.0, ..Environment::uniform(Vec3::splat(0.75)) });
+    let measured = irradiance_at(&scene, vec3(1.0, 4.0, 0.001), vec3(1.0, 0.0, 0.0), 16);
+    assert!(within(measured, PI * 1.5, 0.005), "{measured} instead of {}", PI * 1.5);
+    assert!(!within(measured, 2.0 * PI * 1.5, 0.005), "control");
+    // Both sides of the floor: twice its area.
+    let (measured, right) = (direct_flux(&scene, 40_000), PI * 1.5 * 2.0 * 64.0);
+    assert!(within(measured, right, 0.01), "photons: {measured} W instead of {right} W");
+    assert!(!within(1.03 * measured, right, 0.01), "control: 3 % more passes");
+}
+
+/// Irradiance by a polygon of radiance 1, seen counterclockwise from the point (Lambert 1760): half the sum over its edges of the
+/// angle under which an edge is seen, times the cosine of its plane's normal.
+fn lambert(point: Vec3, normal: Vec3, corners: &[Vec3]) -> f64 {
+    let to = |i: usize| (corners[i % corners.len()] - point).as_dvec3().normalize();
+    let edge = |i: usize| to(i).angle_between(to(i + 1)) * to(i).cross(to(i + 1)).normalize().dot(normal.as_dvec3());
+    0.5 * (0..corners.len()).map(edge).sum::<f64>().abs()
+}
+
+/// A square of 1 m² at height 2 that shines down, over a floor and beside a wall at x = 1.5; not double-sided.
+fn square_over_floor() -> (Scene, [Vec3; 4]) {
+    let mut scene = floor(3.0);
+    scene.materials.push(emissive("lamp", 0.0, 2.0, false));
+    let corners = [vec3(-0.5, 2.0, -0.5), vec3(0.5, 2.0, -0.5), vec3(0.5, 2.0, 0.5), vec3(-0.5, 2.0, 0.5)];
+    add_quad(&mut scene, corners[0], Vec3::X, Vec3::Z, 1);
+    add_quad(&mut scene, vec3(1.5, 0.0, -3.0), vec3(0.0, 0.0, 6.0), vec3(0.0, 3.0, 0.0), 0);
+    (scene, corners)
+}
+
+#[test]
+fn a_square_emitter_gives_what_its_form_factor_says() {
+    let (scene, corners) = square_over_floor();
+    let facing = [(vec3(0.1, 0.0, 0.0), Vec3::Y), (vec3(-1.2, 0.0, 0.7), Vec3::Y)];
+    let askew = [(vec3(1.5, 1.0, 0.0), Vec3::NEG_X), (vec3(1.5, 0.3, -0.8), Vec3::NEG_X)];
+    for (point, normal) in facing.into_iter().chain(askew) {
+        let eye = point + 0.4 * normal + vec3(0.0, 0.1, 0.001);
+        let measured = irradiance_at(&scene, eye, point, 64);
+        let right = 2.0 * lambert(point, normal, &corners);
+        assert!(within(measured, right, 0.01), "at {point}: {measured} instead of {right}");
+        let farther = point + 2.0 * (point - corners[0]);
+        assert!(!within(measured, 2.0 * lambert(farther, normal, &corners), 0.01), "control: {farther} passes");
+    }
+    // Nothing comes from its back.
+    assert_eq!(irradiance_at(&scene, vec3(1.4, 2.6, 0.001), vec3(1.5, 2.5, 0.0), 64), 0.0);
+    let mut both = scene.clone();
+    both.materials[1].double_sided = true;
+    let (measured, point) = (irradiance_at(&both, vec3(1.4, 2.6, 0.001), vec3(1.5, 2.5, 0.0), 64), vec3(1.5, 2.5, 0.0));
+    let right = 2.0 * lambert(point, Vec3::NEG_X, &corners);
+    assert!(within(measured, right, 0.01), "double-sided: {measured} instead of {right}");
+}
+
+#[test]
+fn a_spherical_emitter_gives_what_its_solid_angle_says() {
+    let mut scene = floor(3.0);
+    scene.materials.push(emissive("bulb", 0.0, 2.0, false));
+    scene.spheres.push(sphere(vec3(0.0, 2.0, 0.0), 0.8, 1));
+    for x in [0.1_f32, 1.0, 2.5] {
+        let (point, d2) = (vec3(x, 0.0, 0.0), f64::from(x * x + 4.0));
+        let measured = irradiance_at(&scene, point + vec3(0.0, 0.5, 0.001), point, 64);
+        let right = PI * 2.0 * 0.64 / d2 * 2.0 / d2.sqrt();
+        assert!(within(measured, right, 0.005), "at {x}: {measured} instead of {right}");
+        assert!(!within(measured, right / 0.8 * d2.sqrt(), 0.005), "control at {x}");
+    }
+    // Its photons: π L times its area, half of it over the horizon of a large floor below and none lost in a ball.
+    scene.spheres.push(sphere(Vec3::ZERO, 50.0, 0));
+    let (measured, right) = (direct_flux(&scene, 40_000), PI * 2.0 * 4.0 * PI * 0.64);
+    assert!(within(measured, right, 1e-3), "photons: {measured} W instead of {right} W");
+    assert!(!within(measured, 0.9 * right, 1e-3), "control");
+}
+
+#[test]
+fn balls_vanish_in_a_furnace() {
+    let furnace = |surface: Surface, mode: Mode| {
+        let mut scene = scene(&[surface]);
+        scene.spheres.push(sphere(vec3(-0.6, 0.0, 0.0), 0.6, 0));
+        scene.spheres.push(sphere(vec3(0.6, 0.0, 0.0), 0.6, 0));
+        scene.environment = Some(Environment::uniform(Vec3::ONE));
+        scene.cameras.push(camera(vec3(0.0, 0.0, 6.0), Vec3::ZERO, 25.0));
+        let settings = settings(mode, 60_000, 32).with(|s| {
+            s.photons.max_bounces = 60;
+            s.estimate.neighbors = 50;
+            s.photons.max_paths = Some(300_000);
+        });
+        let render = render_scene(&scene, &settings);
+        assert!(render.frame.alpha.contains(&0.0), "the furnace itself has no coverage");
+        render
+    };
+    for surface in [glass(), Surface::Mirror { tint: Vec3::ONE }] {
+        let render = furnace(surface, Mode::DirectRays);
+        let worst = render.frame.radiance.iter().flatten().map(|x| (x - 1.0).abs()).fold(0.0, f32::max);
+        assert!(worst < 0.01, "{surface:?} can be told from the furnace by {worst}");
+    }
+    for mode in [Mode::Hybrid, Mode::Photons] {
+        let (white, grey) = (mean(&furnace(diffuse(1.0), mode)), mean(&furnace(diffuse(0.9), mode)));
+        assert!(within(white, 1.0, 0.01), "{mode:?}: white balls look {white}");
+        assert!(!within(grey, 1.0, 0.01), "{mode:?}: control: grey balls look {grey}");
+    }
+}
+
+/// A dim sky with a bright pixel above the horizon.
+fn sky_with_a_sun(rotation: f32) -> Environment {
+    let (width, height) = (64, 32);
+    let pixels = (0..width * height).map(|i| if i == 8 * width + 20 { [900.0; 3] } else { [0.1; 3] });
+    Environment { width, height, pixels: pixels.collect(), rotation, ..Environment::uniform(Vec3::ZERO) }
+}
+
+/// Radiance of a map in a direction, interpolated between pixels, as its documentation says.
+fn looked_up(map: &Environment, d: glam::DVec3) -> f64 {
+    let (s, c) = f64::from(map.rotation).sin_cos();
+    let (x, z) = (c * d.x - s * d.z, c * d.z + s * d.x);
+    let u = (0.5 + z.atan2(x) / (2.0 * PI)) * f64::from(map.width) - 0.5;
+    let v = d.y.clamp(-1.0, 1.0).acos() / PI * f64::from(map.height) - 0.5;
+    let at = |x: f64, y: f64| {
+        let x = (x as i64).rem_euclid(i64::from(map.width)) as usize;
+        let y = (y as i64).clamp(0, i64::from(map.height) - 1) as usize;
+        f64::from(map.pixels[y * map.width as usize + x][0])
+    };
+    let (x, y) = (u.floor(), v.floor());
+    let row = |y: f64| at(x, y) * (1.0 - (u - x)) + at(x + 1.0, y) * (u - x);
+    row(y) * (1.0 - (v - y)) + row(y + 1.0) * (v - y)
+}
+
+#[test]
+fn a_bright_pixel_lights_and_is_seen_where_it_is() {
+    let (map, turned) = (sky_with_a_sun(0.5), sky_with_a_sun(0.5 + 20_f32.to_radians()));
+    let normal = vec3(0.6, 0.5, -0.3).normalize();
+    let cosine_sum = |map: &Environment| {
+        let (rows, columns) = (2000, 4000);
+        let one = |i: usize| {
+            let (theta, phi) =
+                (PI * ((i / columns) as f64 + 0.5) / rows as f64, 2.0 * PI * (i % columns) as f64 / columns as f64);
+            let d = glam::dvec3(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
+            looked_up(map, d) * d.dot(normal.as_dvec3()).max(0.0) * theta.sin()
+        };
+        (0..rows * columns).map(one).sum::<f64>() * PI / rows as f64 * 2.0 * PI / columns as f64
+    };
+    // A leaning square of albedo 1/2.
+    let mut scene = scene(&[diffuse(0.5)]);
+    let across = normal.cross(Vec3::Y).normalize();
+    add_quad(&mut scene, -across - normal.cross(across), 2.0 * across, 2.0 * normal.cross(across), 0);
+    scene.environment = Some(map.clone());
+    let (right, wrong) = (cosine_sum(&map), cosine_sum(&turned));
+    let point = 0.3 * across;
+    let measured = irradiance_at(&scene, point + normal, point, 16);
+    assert!(within(measured, right, 0.01), "{measured} instead of {right}");
+    assert!(!within(measured, wrong, 0.05), "control: {wrong} with the map turned");
+    // Photons: all that the two sides of the square catch.
+    let back = irradiance_at(&scene, point - normal, point, 16);
+    let flux = direct_flux(&scene, 40_000);
+    assert!(within(flux, 4.0 * (right + back), 0.02), "photons: {flux} W instead of {} W", 4.0 * (right + back));
+    assert!(!within(flux, 4.0 * (wrong + back), 0.02), "control: the map turned, photons");
+    // Seen from far above the square: pixel for pixel what the map says.
+    let center = vec3(-0.1, 0.63, -0.7);
+    scene.cameras = vec![camera(vec3(0.0, 50.0, 0.0), vec3(0.0, 50.0, 0.0) + center, 90.0)];
+    scene.cameras[0].aspect = None;
+    let settings = settings(Mode::DirectRays, 1, 1).with(|s| s.picture.size = Some((48, 48)));
+    let seen = render_scene(&scene, &settings).frame;
+    let eye = &scene.cameras[0];
+    let expected = |map: &Environment, i: usize| {
+        let (x, y) = ((i % 48) as f32 + 0.5, (i / 48) as f32 + 0.5);
+        let d = eye.forward + (x / 24.0 - 1.0) * eye.right + (1.0 - y / 24.0) * eye.up;
+        looked_up(map, d.as_dvec3().normalize())
+    };
+    let worst = |map: &Environment| {
+        let difference = |i: usize| (f64::from(seen.radiance[i][0]) - expected(map, i)).abs();
+        (0..48 * 48).map(difference).fold(0.0, f64::max)
+    };
+    assert!(seen.radiance.iter().any(|p| p[0] > 300.0), "the bright pixel is in the picture");
+    assert!(worst(&map) < 2.0, "pixels differ from the map by up to {} of 900", worst(&map));
+    assert!(worst(&turned) > 100.0, "control: the map turned");
+}

@@ -1,0 +1,81 @@
+//! The references at 256 x 256 and 128 x 128, made by other renderers; see `tests/references/README.md`.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | S1, S2 | relMSE and mean of the picture | scaled by 1.05; the other scene's reference |
+//! | means | the mean over 4 seeds is within 0.5 % at k = 100 and k = 10 | scaled by 1.01 |
+
+use std::path::Path;
+
+use caustica::{
+    image::{difference::rel_mse, read_exr},
+    progress::Silent,
+    renderer::Session,
+    scene::Scene,
+    settings::Mode,
+};
+use support::*;
+
+/// relMSE and relative error of the mean of a default render against the reference of the same name.
+fn errors(name: &str, other: &str, size: u32, most: f64) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
+    let suffix = if size == 256 { "" } else { "_128" };
+    let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
+    let picture =
+        render_scene(&scene, &settings(Mode::Hybrid, 200_000, size).with(|s| s.picture.spp = 4)).frame.radiance;
+    let reference =
+        |name: &str| read_exr(&folder.join(format!("{name}{suffix}.exr"))).expect("the reference reads").radiance;
+    let right = rel_mse(&picture, &reference(name), None);
+    assert!(right < most, "{name}: relMSE {right}");
+    let wrong = rel_mse(&picture, &reference(other), None);
+    assert!(wrong > 0.1, "control: the picture of {name} passes for {other}, relMSE {wrong}");
+    let sum = |image: &[[f32; 3]]| image.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
+    let ratio = sum(&picture) / sum(&reference(name));
+    assert!((ratio - 1.0).abs() < 0.01, "{name}: mean {ratio} of the reference's");
+    assert!((ratio * 1.05 - 1.0).abs() > 0.01, "control: a picture 5 % brighter passes");
+}
+
+/// Means over four seeds of renders of that name against the reference's.
+fn means(name: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
+    let sum = |image: &[[f32; 3]]| image.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
+    let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
+    let reference = sum(&read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance);
+    let mut ratios = [0.0; 2];
+    for seed in 0..4 {
+        let settings = settings(Mode::Hybrid, 200_000, 128).with(|s| {
+            s.photons.seed = seed;
+            s.picture.spp = 2;
+        });
+        let session = Session::open(gpu(), &scene, &settings, &Silent).expect("the scene fits");
+        let maps = session.photon_maps(&settings, &Silent).expect("photons");
+        for (ratio, neighbors) in ratios.iter_mut().zip([100, 10]) {
+            let picture = session.picture(&maps, &settings.clone().with(|s| s.estimate.neighbors = neighbors), &Silent);
+            *ratio += sum(&picture.expect("a picture").frame.radiance) / reference / 4.0;
+        }
+    }
+    for (ratio, neighbors) in ratios.into_iter().zip([100, 10]) {
+        assert!((ratio - 1.0).abs() < 0.005, "{name}, k = {neighbors}: mean {ratio} of the reference's");
+        assert!((1.01 * ratio - 1.0).abs() > 0.005, "control: a picture 1 % brighter passes");
+    }
+}
+
+#[test]
+fn means_of_mirror_and_glass() {
+    means("S1");
+}
+
+#[test]
+fn means_of_diffuse_only() {
+    means("S2");
+}
+
+#[test]
+fn mirror_and_glass() {
+    errors("S1", "S2", 128, 0.007);
+}
+
+#[test]
+fn diffuse_only() {
+    errors("S2", "S1", 256, 0.0045);
+}

@@ -1,0 +1,126 @@
+//! Code that several test programs, benchmarks or fuzz targets share: scenes built in code, and the one device of a test
+//! program.
+
+pub mod any_environment;
+pub mod any_scene;
+pub mod gltf;
+pub mod make_scenes;
+pub mod photons;
+pub mod rays;
+pub mod surfaces;
+
+use std::sync::OnceLock;
+
+use caustica::{
+    gpu::Gpu,
+    progress::Silent,
+    renderer::{Render, render},
+    scene::{Camera, Light, LightKind, Material, Projection, Scene, Sphere, Surface, Triangle},
+    settings::{Mode, Settings},
+};
+use glam::Vec3;
+
+/// The device of this test process; no adapter is a failure.
+pub fn gpu() -> &'static Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    GPU.get_or_init(|| Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("tests need an adapter"))
+}
+
+pub fn diffuse(albedo: f32) -> Surface {
+    Surface::Diffuse { albedo: Vec3::splat(albedo) }
+}
+
+pub fn glass() -> Surface {
+    Surface::Glass { ior: 1.5, tint: Vec3::ONE }
+}
+
+pub fn scene(surfaces: &[Surface]) -> Scene {
+    let materials = surfaces
+        .iter()
+        .map(|&surface| Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false })
+        .collect();
+    Scene { materials, ..Scene::default() }
+}
+
+pub fn point_light(position: Vec3, intensity: f32) -> Light {
+    Light {
+        name: String::new(),
+        kind: LightKind::Point,
+        position,
+        direction: Vec3::NEG_Z,
+        intensity: Vec3::splat(intensity),
+    }
+}
+
+/// A diffuse material that shines.
+pub fn emissive(name: &str, albedo: f32, emission: f32, double_sided: bool) -> Material {
+    Material { name: name.to_owned(), surface: diffuse(albedo), emission: Vec3::splat(emission), double_sided }
+}
+
+/// A camera at `position` that looks at `target`; full vertical angle in degrees.
+pub fn camera(position: Vec3, target: Vec3, degrees: f32) -> Camera {
+    let forward = (target - position).normalize();
+    let helper = if forward.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
+    let right = forward.cross(helper).normalize();
+    let projection = Projection::Perspective { yfov: degrees.to_radians() };
+    Camera {
+        name: String::new(),
+        position,
+        right,
+        up: right.cross(forward),
+        forward,
+        projection,
+        aspect: Some(1.0),
+        keeps_width: false,
+    }
+}
+
+pub fn sphere(center: Vec3, radius: f32, material: u32) -> Sphere {
+    Sphere { center, radius, material }
+}
+
+/// The parallelogram `corner, corner + a, corner + a + b, corner + b`; its normal is along a × b.
+pub fn add_quad(scene: &mut Scene, corner: Vec3, a: Vec3, b: Vec3, material: u32) {
+    let normals = [a.cross(b).normalize(); 3];
+    for positions in [[corner, corner + a, corner + a + b], [corner, corner + a + b, corner + b]] {
+        scene.triangles.push(Triangle { positions, normals, material });
+    }
+}
+
+/// An axis-aligned box of six quads with outward normals.
+pub fn add_box(scene: &mut Scene, min: Vec3, max: Vec3, material: u32) {
+    let size = max - min;
+    let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
+    add_quad(scene, min, y, x, material);
+    add_quad(scene, min, x, z, material);
+    add_quad(scene, min, z, y, material);
+    add_quad(scene, max, -y, -z, material);
+    add_quad(scene, max, -z, -x, material);
+    add_quad(scene, max, -x, -y, material);
+}
+
+/// Small, quick settings.
+pub fn settings(mode: Mode, photons: u32, size: u32) -> Settings {
+    Settings::default().with(|s| {
+        s.photons.mode = mode;
+        s.photons.global = photons;
+        s.photons.caustic = photons;
+        s.picture.size = Some((size, size));
+        s.picture.spp = 1;
+    })
+}
+
+pub fn render_scene(scene: &Scene, settings: &Settings) -> Render {
+    render(gpu(), scene, settings, &Silent).expect("the scene renders")
+}
+
+/// Mean of all pixels and channels.
+pub fn mean(render: &Render) -> f64 {
+    let sum: f64 = render.frame.radiance.iter().flatten().map(|&x| f64::from(x)).sum();
+    sum / (3 * render.frame.radiance.len()) as f64
+}
+
+/// Whether `value` differs from `expected` by less than a fraction.
+pub fn within(value: f64, expected: f64, fraction: f64) -> bool {
+    (value - expected).abs() < fraction * expected.abs()
+}

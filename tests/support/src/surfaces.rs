@@ -1,0 +1,221 @@
+//! Places where the surface around a point is no whole flat disc, lit by one point light alone, so that the irradiance is
+//! I cos θ / d². Shared by the test of the estimate there and the benchmark that prints its errors.
+
+use caustica::{
+    bvh::Bvh,
+    gpu::Gpu,
+    layout::VisiblePoint,
+    passes::{
+        Gather, GatherOptions, GatherSettings, MapKernels, PhotonMap, PhotonTracer, estimate::gather::gathered_buffer,
+    },
+    progress::Silent,
+    scene::{Camera, Light, LightKind, Material, Projection, Scene, Sphere, Surface, Triangle},
+    settings::{Mode, Settings},
+    upload::SceneBuffers,
+};
+use glam::{Vec3, vec3};
+
+use crate::photons::Random;
+
+/// A place, and the points at which light is asked for.
+pub struct Place {
+    pub name: &'static str,
+    pub scene: Scene,
+    pub photons: u32,
+    pub neighbors: u32,
+    pub points: Vec<VisiblePoint>,
+    /// Irradiance at each, W/m².
+    pub expected: Vec<f64>,
+    /// What errors are relative to, W/m²: the mean of `expected`, or of the lit side of a wall.
+    pub scale: f64,
+}
+
+/// The four ways to estimate: name, and options of the gather.
+pub fn ways() -> [(&'static str, GatherOptions); 4] {
+    let flat = GatherOptions::flat();
+    [
+        ("raw", GatherOptions::default()),
+        ("rejection only", GatherOptions { corrects: false, ..flat }),
+        ("correction only", GatherOptions { rejects: false, ..flat }),
+        ("both", flat),
+    ]
+}
+
+/// All places; each has `count` points.
+pub fn places(count: usize) -> Vec<Place> {
+    let mut random = Random(21);
+    vec![
+        corner(&mut random, count),
+        edge(&mut random, count),
+        wall(&mut random, count, true),
+        wall(&mut random, count, false),
+        spheres(&mut random, count),
+    ]
+}
+
+/// Irradiance estimates at the points by each way, over the same photons: one map a seed, mean over the seeds.
+pub fn estimates(gpu: &Gpu, place: &Place, seeds: u32) -> [Vec<f64>; 4] {
+    let mut sums = ways().map(|_| vec![0.0; place.points.len()]);
+    for seed in 0..seeds {
+        let settings = Settings::default().with(|s| {
+            s.photons.mode = Mode::Photons;
+            s.photons.global = place.photons;
+            s.photons.max_bounces = 1;
+            s.estimate.neighbors = place.neighbors;
+            s.photons.seed = seed;
+        });
+        let buffers = SceneBuffers::new(gpu, &place.scene, &Bvh::build(&place.scene), &settings).expect("it fits");
+        let tracer = PhotonTracer::new(gpu, &buffers);
+        let traced = tracer.trace(gpu, &buffers, &settings, false, &Silent).expect("photons").global;
+        let kernels = MapKernels::new(gpu);
+        let map = PhotonMap::build(gpu, &kernels, traced.photons, traced.stored as u32, traced.emitted).expect("a map");
+        let count = place.points.len() as u32;
+        let points = gpu.storage_with("points", &place.points).expect("it fits");
+        for ((_, options), sums) in ways().into_iter().zip(&mut sums) {
+            let mut gather = Gather::over(gpu, &buffers, options);
+            let gathered = gathered_buffer(gpu, count).expect("it fits");
+            let radiance = gpu.storage::<[f32; 4]>("radiance", count.into()).expect("it fits");
+            let asked = GatherSettings::from(&settings.estimate);
+            gather.run(gpu, &map, &points, count, &asked, (&radiance, &gathered), &Silent).expect("a gather");
+            let found: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into()).expect("results");
+            sums.iter_mut().zip(found).for_each(|(sum, r)| *sum += f64::from(r[0]) / f64::from(seeds));
+        }
+    }
+    sums
+}
+
+/// Mean over the points of estimate minus truth, relative to the scale.
+pub fn bias(place: &Place, estimates: &[f64]) -> f64 {
+    let sum: f64 = estimates.iter().zip(&place.expected).map(|(a, b)| a - b).sum();
+    sum / estimates.len() as f64 / place.scale
+}
+
+fn room(light: Vec3) -> Scene {
+    let material = Material {
+        name: String::new(),
+        surface: Surface::Diffuse { albedo: Vec3::splat(0.5) },
+        emission: Vec3::ZERO,
+        double_sided: false,
+    };
+    Scene {
+        materials: vec![material],
+        lights: vec![Light {
+            name: String::new(),
+            kind: LightKind::Point,
+            position: light,
+            direction: Vec3::NEG_Z,
+            intensity: Vec3::splat(10.0),
+        }],
+        cameras: vec![Camera {
+            name: String::new(),
+            position: Vec3::Y,
+            right: Vec3::X,
+            up: Vec3::Y,
+            forward: Vec3::NEG_Z,
+            projection: Projection::Perspective { yfov: 1.0 },
+            aspect: None,
+            keeps_width: false,
+        }],
+        ..Scene::default()
+    }
+}
+
+fn quad(scene: &mut Scene, corner: Vec3, a: Vec3, b: Vec3) {
+    let normals = [a.cross(b).normalize(); 3];
+    for positions in [[corner, corner + a, corner + a + b], [corner, corner + a + b, corner + b]] {
+        scene.triangles.push(Triangle { positions, normals, material: 0 });
+    }
+}
+
+fn floor(scene: &mut Scene, height: f32, half: f32) {
+    quad(scene, vec3(-half, height, half), vec3(2.0 * half, 0.0, 0.0), vec3(0.0, 0.0, -2.0 * half));
+}
+
+fn at(position: Vec3, normal: Vec3) -> VisiblePoint {
+    VisiblePoint {
+        position: position.into(),
+        valid: 1,
+        weight: [1.0; 3],
+        offset: 4e-6,
+        ng: normal.into(),
+        ns: normal.into(),
+        ..VisiblePoint::default()
+    }
+}
+
+/// I cos θ / d² of the scene's light.
+fn irradiance(scene: &Scene, point: &VisiblePoint) -> f64 {
+    let way = (scene.lights[0].position - Vec3::from(point.position)).as_dvec3();
+    let cosine = way.normalize().dot(Vec3::from(point.ng).as_dvec3());
+    f64::from(scene.lights[0].intensity.x) * cosine / way.length_squared()
+}
+
+fn place(name: &'static str, scene: Scene, (photons, neighbors): (u32, u32), points: Vec<VisiblePoint>) -> Place {
+    let expected: Vec<f64> = points.iter().map(|p| irradiance(&scene, p)).collect();
+    let scale = expected.iter().sum::<f64>() / expected.len() as f64;
+    Place { name, scene, photons, neighbors, points, expected, scale }
+}
+
+/// The floor of a closed box along a wall, from a corner on.
+fn corner(random: &mut Random, count: usize) -> Place {
+    let mut scene = room(vec3(-0.7, 1.5, -0.6));
+    let (x, y, z) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 2.0);
+    let (low, high) = (vec3(-1.0, 0.0, -1.0), vec3(1.0, 2.0, 1.0));
+    for (corner, a, b) in [(low, x, z), (low, y, x), (low, z, y), (high, -x, -z), (high, -y, -x), (high, -z, -y)] {
+        quad(&mut scene, corner, a, b);
+    }
+    let point = |random: &mut Random| {
+        let (near, along) = (0.04 * random.unit(), random.unit());
+        at(vec3(-1.0 + near, 0.0, -1.0 + along), Vec3::Y)
+    };
+    let points = (0..count).map(|_| point(random)).collect();
+    place("box corner", scene, (150_000, 150), points)
+}
+
+/// The top of a table along its edges, the floor far below.
+fn edge(random: &mut Random, count: usize) -> Place {
+    let mut scene = room(vec3(0.4, 1.8, 0.0));
+    floor(&mut scene, 0.0, 2.0);
+    floor(&mut scene, 0.8, 0.4);
+    let point = |random: &mut Random| {
+        let (in_, along) = (0.03 * random.unit(), 0.8 * random.unit() - 0.4);
+        at(vec3(0.4 - in_, 0.8, along), Vec3::Y)
+    };
+    let points = (0..count).map(|_| point(random)).collect();
+    place("table edge", scene, (40_000, 60), points)
+}
+
+/// The floor at the foot of a thin wall that keeps the light from one side.
+fn wall(random: &mut Random, count: usize, lit: bool) -> Place {
+    let mut scene = room(vec3(-0.1, 0.8, 0.0));
+    floor(&mut scene, 0.0, 1.0);
+    quad(&mut scene, vec3(0.0, 0.0, -1.5), vec3(0.0, 2.0, 0.0), vec3(0.0, 0.0, 3.0));
+    let point =
+        |random: &mut Random, side: f32| at(vec3(side * 0.05 * random.unit(), 0.0, random.unit() - 0.5), Vec3::Y);
+    let bright = (0..count).map(|_| point(random, -1.0)).collect();
+    let bright = place("lit side of a thin wall", scene, (40_000, 60), bright);
+    if lit {
+        return bright;
+    }
+    let points = (0..count).map(|_| point(random, 1.0)).collect();
+    Place { name: "dark side of a thin wall", points, expected: vec![0.0; count], ..bright }
+}
+
+/// Spheres smaller than the radius of the estimate, a floor below them.
+fn spheres(random: &mut Random, count: usize) -> Place {
+    const RADIUS: f32 = 0.04;
+    let mut scene = room(vec3(0.0, 2.0, 0.0));
+    floor(&mut scene, 0.0, 1.0);
+    let spots = (0..25).map(|i| vec3(0.35 * ((i % 5) as f32 - 2.0), 0.3, 0.35 * ((i / 5) as f32 - 2.0)));
+    scene.spheres = spots.map(|center| Sphere { center, radius: RADIUS, material: 0 }).collect();
+    let mut points = Vec::new();
+    while points.len() < count {
+        let sphere = scene.spheres[points.len() % 25];
+        let normal = random.direction();
+        let position = sphere.center + RADIUS * normal;
+        if (scene.lights[0].position - position).normalize().dot(normal) > 0.7 {
+            points.push(at(position, normal));
+        }
+    }
+    place("small spheres", scene, (60_000, 400), points)
+}
