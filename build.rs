@@ -104,7 +104,8 @@ fn source_line(wgsl: &str, offset: usize) -> Option<String> {
             && wgsl[..composed[i].0].lines().last().is_none_or(|l| l.trim_start().len() == l.len())
     })?;
     let name = &composed.get(declaration + 1)?.1;
-    for folder in ["shaders", "shaders/lib", "shaders/bindings"] {
+    let lib = ["core", "transport", "gather", "camera"].map(|part| format!("shaders/lib/{part}"));
+    for folder in ["shaders", "shaders/bindings"].into_iter().chain(lib.iter().map(String::as_str)) {
         for path in fs::read_dir(folder).ok()?.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_file()) {
             let text = fs::read_to_string(&path).ok()?;
             let source = words(&text);

@@ -9,8 +9,8 @@ use caustica::{
     gpu::Gpu,
     layout::{Gathered, VisiblePoint},
     passes::{
-        gather::{Gather, GatherOptions, GatherSettings, gathered_buffer},
-        photon_map::{MapKernels, PhotonMap, PhotonStore},
+        estimate::gather::{Gather, GatherOptions, GatherSettings, gathered_buffer},
+        maps::photon_map::{MapKernels, PhotonMap, PhotonStore},
     },
     progress::Silent,
     settings::Settings,
@@ -87,8 +87,12 @@ fn grid_rate(
     k: u32,
 ) -> (f64, Vec<f32>) {
     let count = QUERIES as u32;
-    let settings =
-        GatherSettings { neighbors: k, radius: None, max_radius: None, density: Settings::default().density() };
+    let settings = GatherSettings {
+        neighbors: k,
+        radius: None,
+        max_radius: None,
+        density: Settings::default().estimate.density(),
+    };
     let radiance = gpu.storage::<[f32; 4]>("radiance", count.into()).expect("it fits");
     let gathered = gathered_buffer(gpu, count).expect("it fits");
     let start = Instant::now();

@@ -9,9 +9,9 @@ use caustica::{
     bvh::Bvh,
     gpu::Gpu,
     layout::{Ray, RayHit},
-    passes::SceneBuffers,
     scene::{Material, Scene, Surface, Triangle},
     settings::Settings,
+    upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
 use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris, ray};

@@ -231,7 +231,7 @@ pub struct VisiblePoint {
     pub media_inner: u32,
 }
 
-/// What happens to a batch of paths; see `shaders/lib/queue.wesl`. A batch has at most 2^19 paths of at most 4095 bounces, so that
+/// What happens to a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^19 paths of at most 4095 bounces, so that
 /// what is counted once a bounce stays below 2^31; the host adds batches up in 64 bits.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -271,7 +271,7 @@ impl Counters {
     }
 }
 
-/// Settings of one batch of photon paths; see `shaders/lib/photon_batch.wesl`.
+/// Settings of one batch of photon paths; see `shaders/lib/transport/photon_batch.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PhotonBatch {
@@ -345,11 +345,11 @@ pub struct Store {
     pub map_bit: u32,
 }
 
-/// Where the numbers for sampling come from; see `shaders/lib/sampler.wesl`.
+/// Where the numbers for sampling come from; see `shaders/lib/core/sampler.wesl`.
 pub const SAMPLER_RANDOM: u32 = 0;
 pub const SAMPLER_SOBOL: u32 = 1;
 
-/// A camera and the part of its samples that one tile holds; see `shaders/lib/camera_tile.wesl`.
+/// A camera and the part of its samples that one tile holds; see `shaders/lib/camera/camera_tile.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct CameraTile {
@@ -541,12 +541,12 @@ pub struct Gathered {
     pub fingerprint: u32,
 }
 
-/// Pixels along the side of a cell of a tile's margin; see `shaders/lib/margin.wesl`.
+/// Pixels along the side of a cell of a tile's margin; see `shaders/lib/camera/margin.wesl`.
 pub const MARGIN_CELL: u32 = 8;
 /// Camera samples of such a cell.
 pub const MARGIN_SAMPLES: u32 = 16;
 
-/// One round in which points of a tile share estimates; see `shaders/lib/share.wesl`.
+/// One round in which points of a tile share estimates; see `shaders/lib/camera/share.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ShareRound {
@@ -577,7 +577,7 @@ pub const RADIX_DIGITS: u32 = 256;
 /// Values that one invocation of a prefix sum adds up.
 pub const SCAN_SPAN: u32 = 256;
 
-/// One digit of the radix sort; see `shaders/lib/radix.wesl`.
+/// One digit of the radix sort; see `shaders/lib/core/radix.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct SortStep {
@@ -656,7 +656,7 @@ pub const GATHER_STATE_BYTES: usize = 1072;
 
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of
 /// Efficient Representations for Independent Unit Vectors"); x in the low half. Twin of `encode_octahedral` in
-/// `shaders/lib/octahedral.wesl`.
+/// `shaders/lib/core/octahedral.wesl`.
 #[must_use]
 pub fn octahedral(v: glam::Vec3) -> u32 {
     let p = v / (v.x.abs() + v.y.abs() + v.z.abs());

@@ -24,7 +24,7 @@
 //!
 //! fn main() -> caustica::Result<()> {
 //!     let scene = Scene::load(Path::new("scene.glb"))?;
-//!     let settings = Settings { global_photons: 1_000_000, ..Settings::default() };
+//!     let settings = Settings::default().with(|s| s.photons.global = 1_000_000);
 //!     let render = renderer::render(&Gpu::open(None)?, &scene, &settings, &Silent)?;
 //!     write_exr(Path::new("out.exr"), &render.frame, &scene.origin(&settings, &render.stats))
 //! }
@@ -38,6 +38,7 @@
 pub mod bvh;
 pub mod compare;
 pub mod density;
+pub mod emitters;
 pub mod error;
 pub mod gpu;
 mod html;
@@ -53,5 +54,6 @@ pub mod scene;
 pub mod settings;
 pub mod stats;
 pub mod study;
+pub mod upload;
 
 pub use error::{Error, Result};

@@ -123,8 +123,12 @@ pub struct CompareArgs {
 impl RenderArgs {
     /// The library's settings that these arguments ask for.
     pub fn settings(&self) -> Settings {
-        let (search, radius, final_gather) = (self.search.into(), self.radius, self.final_gather);
-        Settings { search, radius, final_gather, share_reach: self.share, ..self.options.settings() }
+        self.options.settings().with(|s| {
+            s.photons.final_gather = self.final_gather;
+            s.estimate.search = self.search.into();
+            s.estimate.radius = self.radius;
+            s.estimate.share_reach = self.share;
+        })
     }
 }
 
@@ -158,17 +162,17 @@ mod tests {
     #[test]
     fn modes_go_by_name_or_number() {
         for (number, mode) in Mode::ALL.into_iter().enumerate() {
-            assert_eq!(settings(&format!("--mode {number}")).mode, mode);
-            assert_eq!(settings(&format!("--mode {}", mode.name())).mode, mode);
+            assert_eq!(settings(&format!("--mode {number}")).photons.mode, mode);
+            assert_eq!(settings(&format!("--mode {}", mode.name())).photons.mode, mode);
         }
     }
 
     #[test]
     fn a_map_of_its_own_capacity_overrides_photons() {
         let s = settings("--photons 200k --caustic-photons 1.5M");
-        assert_eq!((s.global_photons, s.caustic_photons), (200_000, 1_500_000));
+        assert_eq!((s.photons.global, s.photons.caustic), (200_000, 1_500_000));
         let s = settings("--global-photons 7");
-        assert_eq!((s.global_photons, s.caustic_photons), (7, 100_000));
+        assert_eq!((s.photons.global, s.photons.caustic), (7, 100_000));
     }
 
     #[test]
@@ -178,30 +182,29 @@ mod tests {
              --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
              --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
-        let expected = Settings {
-            max_paths: Some(3_000_000),
-            neighbors: 50,
-            kernel: DensityKernel::Gaussian,
-            raw_estimate: true,
-            final_gather: 16,
-            share_reach: 0.5,
-            cone_constant: 1.5,
-            max_radius: Some(0.25),
-            max_bounces: 0,
-            spp: 9,
-            size: Some((640, 480)),
-            camera: Some("side".into()),
-            seed: 11,
-            light_sampling: LightSampling::Uniform,
-            light_unit: LightUnit::Photometric,
-            search: Search::KdTree,
-            light_photons: vec![("lamp".into(), 2.0), ("sky".into(), 0.5)],
-            light_samples: 9,
-            emission: Emission::Unaimed,
-            ..Settings::default()
-        };
+        let expected = Settings::default().with(|s| {
+            s.photons.max_paths = Some(3_000_000);
+            s.estimate.neighbors = 50;
+            s.estimate.kernel = DensityKernel::Gaussian;
+            s.estimate.raw = true;
+            s.photons.final_gather = 16;
+            s.estimate.share_reach = 0.5;
+            s.estimate.cone_constant = 1.5;
+            s.estimate.max_radius = Some(0.25);
+            s.photons.max_bounces = 0;
+            s.picture.spp = 9;
+            s.picture.size = Some((640, 480));
+            s.picture.camera = Some("side".into());
+            s.photons.seed = 11;
+            s.lights.sampling = LightSampling::Uniform;
+            s.lights.unit = LightUnit::Photometric;
+            s.estimate.search = Search::KdTree;
+            s.lights.photon_weights = vec![("lamp".into(), 2.0), ("sky".into(), 0.5)];
+            s.picture.light_samples = 9;
+            s.photons.emission = Emission::Unaimed;
+        });
         assert_eq!(s, expected);
         let s = settings("--search radius --radius 0.1");
-        assert_eq!((s.search, s.radius), (Search::Radius, Some(0.1)));
+        assert_eq!((s.estimate.search, s.estimate.radius), (Search::Radius, Some(0.1)));
     }
 }

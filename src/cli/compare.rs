@@ -34,7 +34,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let settings = options.settings();
     let gpu = Gpu::open(options.shared.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
-    if !settings.raw_estimate {
+    if !settings.estimate.raw {
         display.note(RAW_NOTE);
     }
     let asked = Options { tolerance: args.tolerance, sabotage: args.sabotage };

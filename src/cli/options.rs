@@ -4,7 +4,10 @@ use caustica::{
     density::DensityKernel,
     image::Tonemap,
     pixel_filter::PixelFilter,
-    settings::{Crop, Emission, LightSampling, LightUnit, Mode, Sampler, Search, Settings},
+    settings::{
+        Crop, Emission, EstimateSettings, LightSampling, LightSettings, LightUnit, MAX_BOUNCES, Mode, PhotonSettings,
+        PictureSettings, Sampler, Search, Settings,
+    },
 };
 use clap::{
     ValueEnum,
@@ -80,10 +83,10 @@ pub struct SharedOptions {
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true, help_heading = "Photons")]
     pub max_paths: Option<u64>,
 
-    /// Longest photon path, and longest chain of mirrors and glass on a camera path, in surfaces, up to 65535;
+    /// Longest photon path, and longest chain of mirrors and glass on a camera path, in surfaces, up to 4095;
     /// 0 leaves the end of paths to Russian roulette
     #[arg(long, value_name = "B", default_value_t = 20, help_heading = "Photons")]
-    #[arg(value_parser = |text: &str| whole(text, 0, 65535))]
+    #[arg(value_parser = |text: &str| whole(text, 0, MAX_BOUNCES))]
     pub max_bounces: u32,
 
     /// Kernel that weighs the photons by their distance; each integrates to 1 over its disc
@@ -164,44 +167,51 @@ pub struct SharedOptions {
 impl RenderOptions {
     /// The library's settings that these arguments ask for.
     pub fn settings(&self) -> Settings {
-        let settings = self.shared.settings();
-        let capacity = |specific: Option<u32>, default| specific.or(self.photons).unwrap_or(default);
-        Settings {
-            mode: self.mode.into(),
-            global_photons: capacity(self.global_photons, settings.global_photons),
-            caustic_photons: capacity(self.caustic_photons, settings.caustic_photons),
-            neighbors: self.neighbors,
-            ..settings
-        }
+        let capacity = |own: Option<u32>, default| own.or(self.photons).unwrap_or(default);
+        self.shared.settings().with(|s| {
+            s.photons.mode = self.mode.into();
+            s.photons.global = capacity(self.global_photons, s.photons.global);
+            s.photons.caustic = capacity(self.caustic_photons, s.photons.caustic);
+            s.estimate.neighbors = self.neighbors;
+        })
     }
 }
 
 impl SharedOptions {
     /// The library's settings that these arguments ask for; mode, photons and neighbours are the defaults.
     pub fn settings(&self) -> Settings {
-        let defaults = Settings::default();
+        let Settings { photons, estimate, picture, .. } = Settings::default();
         Settings {
-            max_paths: self.max_paths,
-            kernel: self.kernel.into(),
-            raw_estimate: self.raw_estimate,
-            cone_constant: self.cone_constant,
-            max_radius: self.max_radius,
-            max_bounces: self.max_bounces,
-            spp: self.spp.unwrap_or(defaults.spp),
-            size: self.size,
-            camera: self.camera.clone(),
-            seed: self.seed,
-            crop: self.crop,
-            pixel_filter: self.pixel_filter.into(),
-            aperture: self.aperture.unwrap_or(defaults.aperture),
-            focus: self.focus,
-            sampler: self.sampler.into(),
-            light_sampling: self.light_sampling.into(),
-            light_unit: self.light_unit.into(),
-            light_photons: self.light_photons.clone(),
-            light_samples: self.light_samples,
-            emission: self.emission.into(),
-            ..defaults
+            lights: LightSettings {
+                sampling: self.light_sampling.into(),
+                photon_weights: self.light_photons.clone(),
+                unit: self.light_unit.into(),
+            },
+            photons: PhotonSettings {
+                max_paths: self.max_paths,
+                emission: self.emission.into(),
+                max_bounces: self.max_bounces,
+                sampler: self.sampler.into(),
+                seed: self.seed,
+                ..photons
+            },
+            estimate: EstimateSettings {
+                kernel: self.kernel.into(),
+                cone_constant: self.cone_constant,
+                max_radius: self.max_radius,
+                raw: self.raw_estimate,
+                ..estimate
+            },
+            picture: PictureSettings {
+                size: self.size,
+                crop: self.crop,
+                camera: self.camera.clone(),
+                spp: self.spp.unwrap_or(picture.spp),
+                pixel_filter: self.pixel_filter.into(),
+                aperture: self.aperture.unwrap_or(picture.aperture),
+                focus: self.focus,
+                light_samples: self.light_samples,
+            },
         }
     }
 }

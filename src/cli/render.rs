@@ -57,7 +57,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     files.read_scene(&scene)?;
     display.check()?;
     display.note(&light_unit_line(&settings));
-    if settings.search == Search::KdTree && !settings.raw_estimate {
+    if settings.estimate.search == Search::KdTree && !settings.estimate.raw {
         display.note(RAW_NOTE);
     }
     for warning in &scene.warnings {
@@ -108,7 +108,7 @@ fn write_stats(path: &Path, stats: &Stats) -> Result<()> {
 }
 
 fn light_unit_line(settings: &Settings) -> String {
-    match settings.light_unit {
+    match settings.lights.unit {
         LightUnit::Radiometric => "light unit: radiometric (candela read as W/sr in each channel)".to_string(),
         LightUnit::Photometric => "light unit: photometric (candela divided by 683 lm/W)".to_string(),
     }

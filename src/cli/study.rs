@@ -12,7 +12,7 @@ use caustica::{
     gpu::Gpu,
     image::read_exr,
     scene::{LoadOptions, Scene},
-    settings::{Mode, Settings},
+    settings::Mode,
     study::{self, Finer, Look, Plan, Reference, Results, Subject},
 };
 
@@ -103,7 +103,11 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
         let size = Some(options.size.unwrap_or(PRESET_SIZE));
         // The report's estimate, whatever became of it since.
         let spp = options.spp.unwrap_or(PRESET_SPP);
-        let settings = Settings { size, spp, raw_estimate: true, ..settings };
+        let settings = settings.with(|s| {
+            s.picture.size = size;
+            s.picture.spp = spp;
+            s.estimate.raw = true;
+        });
         return study::report(&folder, &settings, args.repeat.unwrap_or(PRESET_REPEATS), args.preset_scale, look);
     }
     // clap has seen to it that all three are there.
@@ -112,14 +116,14 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
     let most = args.photons.iter().copied().max().unwrap_or(1);
     let (reference, size) = match &args.reference {
         None => (Reference::None, options.size),
-        Some(ReferenceArg::Auto) => (Reference::Finer(Finer::than(most, settings.spp)), options.size),
+        Some(ReferenceArg::Auto) => (Reference::Finer(Finer::than(most, settings.picture.spp)), options.size),
         Some(ReferenceArg::File(path)) => {
             let frame = read_exr(path)?;
             let size = options.size.unwrap_or((frame.width, frame.height));
             (Reference::Picture { name: path.display().to_string(), frame: Box::new(frame) }, Some(size))
         }
     };
-    let settings = Settings { size, ..settings };
+    let settings = settings.with(|s| s.picture.size = size);
     let subject = Subject { scene, reference };
     let repeats = args.repeat.unwrap_or(1);
     Ok(study::grid(subject, &settings, &modes, &args.photons, &args.neighbors, repeats, look))

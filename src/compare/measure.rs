@@ -122,11 +122,11 @@ pub(super) fn explained_by_ties(
 ) -> bool {
     let edge = estimate.radius_squared;
     // Their number is k or all but one, unless the bound of the radius cuts through the tie.
-    let cut = settings.max_radius.is_some_and(|r| are_tied(edge, r * r));
+    let cut = settings.estimate.max_radius.is_some_and(|r| are_tied(edge, r * r));
     if !cut && grid.count != estimate.count {
         return false;
     }
-    let near = map.search(point, settings.neighbors + MOST_TIED as u32, edge * (1.0 + 2.0 * TIE));
+    let near = map.search(point, settings.estimate.neighbors + MOST_TIED as u32, edge * (1.0 + 2.0 * TIE));
     let tied: Vec<u32> = near.iter().filter(|n| are_tied(n.0, edge)).map(|n| mix(n.1)).collect();
     let nearer = near.iter().take_while(|n| !are_tied(n.0, edge));
     let (base, certain) = nearer.fold((0_u32, 0), |(sum, n), photon| (sum.wrapping_add(mix(photon.1)), n + 1));
@@ -152,7 +152,7 @@ mod tests {
         reference::fingerprint,
     };
 
-    const SETTINGS: fn() -> Settings = || Settings { neighbors: 2, ..Settings::default() };
+    const SETTINGS: fn() -> Settings = || Settings::default().with(|s| s.estimate.neighbors = 2);
 
     /// Photons at these distances along x, all of them from above, and the origin to see them from.
     fn line(distances: &[f32]) -> (KdMap, VisiblePoint) {
@@ -166,7 +166,7 @@ mod tests {
     /// What is counted when the grid has summed these photons of a line, with the estimate's radiance times `factor`.
     fn counted(distances: &[f32], summed: &[u32], factor: f32) -> Measure {
         let (map, point) = line(distances);
-        let estimate = map.estimate(&point, &SETTINGS());
+        let estimate = map.estimate(&point, &SETTINGS().estimate);
         let gathered = Gathered {
             radius_squared: estimate.radius_squared,
             count: summed.len() as u32,

@@ -64,13 +64,13 @@ fn subtitle(comparison: &Comparison, origin: &Origin) -> String {
     format!(
         "{}{environment}, {} mode, k = {}, {} + {} photons, {} x {} pixels, {} spp; Caustica {}",
         origin.scene,
-        settings.mode.name(),
-        settings.neighbors,
+        settings.photons.mode.name(),
+        settings.estimate.neighbors,
         grouped(photons.global.stored),
         grouped(photons.caustic.stored),
         comparison.grid.width,
         comparison.grid.height,
-        settings.spp,
+        settings.picture.spp,
         env!("CARGO_PKG_VERSION"),
     )
 }

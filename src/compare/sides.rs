@@ -136,7 +136,7 @@ impl<'a> KdTreeGather<'a> {
     /// Lets the first map lose up to `count` photons, each the nearest to one of the points; returns how many.
     pub fn leave_out(&mut self, count: u32, points: &[VisiblePoint]) -> u32 {
         let Some(map) = self.maps.first_mut() else { return 0 };
-        let limit = self.settings.max_radius.map_or(f32::INFINITY, |r| r * r);
+        let limit = self.settings.estimate.max_radius.map_or(f32::INFINITY, |r| r * r);
         let valid: Vec<&VisiblePoint> = points.iter().filter(|p| p.valid != 0).collect();
         let places = (count as usize).min(valid.len());
         let mut lost = 0;
@@ -154,7 +154,7 @@ impl<'a> KdTreeGather<'a> {
 
     /// Gathers the points.
     pub fn gather(&mut self, map: usize, points: &[VisiblePoint], progress: &dyn Progress) -> Result<Vec<Estimate>> {
-        timed(&mut self.seconds, || self.maps[map].gather(points, self.settings, progress))
+        timed(&mut self.seconds, || self.maps[map].gather(points, &self.settings.estimate, progress))
     }
 
     /// Whether the photons that the grid summed differ from those of the estimate in tied ones only.

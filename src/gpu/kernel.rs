@@ -7,7 +7,7 @@ use super::{
     shaders::{BindingKind, Shader, shader},
 };
 
-/// The bind group that says which part of a dispatch runs: owned here, filled for each dispatch (`shaders/lib/dispatch.wesl`).
+/// The bind group that says which part of a dispatch runs: owned here, filled for each dispatch (`shaders/bindings/dispatch.wesl`).
 const PART_GROUP: u32 = 3;
 
 /// A compute kernel. Several that are equal share what was compiled.

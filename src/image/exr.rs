@@ -102,7 +102,7 @@ fn attributes(origin: &Origin) -> LayerAttributes {
     let texts = [
         ("version", version.to_string()),
         ("settings", serde_json::to_string(settings).expect("settings hold nothing that JSON cannot")),
-        ("seed", settings.seed.to_string()),
+        ("seed", settings.photons.seed.to_string()),
         ("scene", origin.scene.to_string()),
         ("sceneHash", origin.scene_hash.to_string()),
         ("device", stats.device.name.clone()),
@@ -270,7 +270,7 @@ mod tests {
     fn reads_back_every_channel_and_attribute() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
-        let settings = Settings { seed: u32::MAX, ..Settings::default() };
+        let settings = Settings::default().with(|s| s.photons.seed = u32::MAX);
         write(&path, &frame(), &settings);
         assert_eq!(read_exr(&path).unwrap(), frame());
         let found = read_exr_attributes(&path).unwrap();

@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     layout::{PhotonFlux, PhotonPlace, VisiblePoint},
     progress::Progress,
-    settings::Settings,
+    settings::EstimateSettings,
 };
 
 /// Two squared distances that differ by at most this fraction are tied: rounding alone decides which is the smaller.
@@ -87,7 +87,7 @@ impl KdMap {
 
     /// The estimate at a point with `neighbors`, `kernel`, `cone_constant` and `max_radius` of the settings.
     #[must_use]
-    pub fn estimate(&self, point: &VisiblePoint, settings: &Settings) -> Estimate {
+    pub fn estimate(&self, point: &VisiblePoint, settings: &EstimateSettings) -> Estimate {
         let k = settings.neighbors;
         let bound = settings.max_radius.map_or(f32::INFINITY, |r| r * r);
         // What lies just beyond the bound could on the device lie just inside.
@@ -112,7 +112,7 @@ impl KdMap {
     pub fn gather(
         &self,
         points: &[VisiblePoint],
-        settings: &Settings,
+        settings: &EstimateSettings,
         progress: &dyn Progress,
     ) -> Result<Vec<Estimate>> {
         let at = |point: &VisiblePoint| {

@@ -8,9 +8,10 @@ use crate::{
     gpu::{Buffer, Gpu},
     image::{Frame, PlaceInWhole},
     layout::{TilePixel, VisiblePoint},
-    passes::{CameraTracer, FinalGather, GatherSettings, SceneBuffers, StepCount, Tile},
+    passes::{CameraTracer, FinalGather, GatherSettings, StepCount, Tile},
     settings::{Crop, Settings},
     stats::{Stats, timed},
+    upload::SceneBuffers,
 };
 
 /// A picture under way. For each tile: [`Self::trace`], then light is added to the radiance of its visible points,
@@ -32,21 +33,21 @@ pub(crate) struct CameraPass<'a> {
 impl<'a> CameraPass<'a> {
     pub fn new(session: &'a Session<'a>, settings: &Settings) -> Result<Self> {
         settings.check()?;
-        let number = session.scene.camera_number(settings.camera.as_deref())?;
+        let number = session.scene.camera_number(settings.picture.camera.as_deref())?;
         let (camera, media) = (&session.scene.cameras[number], session.camera_media[number]);
         let size = picture_size(camera, settings)?;
         let (gpu, buffers) = (session.gpu, &session.buffers);
         let tracer = CameraTracer::new(gpu, buffers, camera, media, size, settings)?;
-        let rays = Some(settings.final_gather).filter(|rays| *rays > 0);
+        let rays = Some(settings.photons.final_gather).filter(|rays| *rays > 0);
         Ok(Self {
             gpu,
             buffers,
             final_gather: rays.map(|rays| FinalGather::new(gpu, buffers, &tracer, rays)).transpose()?,
             tracer,
-            estimate: GatherSettings::from(settings),
+            estimate: GatherSettings::from(&settings.estimate),
             size,
-            window: settings.window(size),
-            direct: settings.mode.direct_by_rays(),
+            window: settings.picture.window(size),
+            direct: settings.photons.mode.direct_by_rays(),
         })
     }
 

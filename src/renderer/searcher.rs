@@ -26,14 +26,14 @@ enum Searches<'a> {
 
 impl<'a> Searcher<'a> {
     pub fn new(session: &'a Session, maps: &PhotonMaps, settings: &'a Settings) -> Result<Self> {
-        let search = match settings.search {
+        let search = match settings.estimate.search {
             Search::Grid | Search::Radius => Searches::Grid(Box::new(session.gather(settings))),
             Search::KdTree => {
                 let trees = maps.maps.iter().map(|map| kd_map(session.gpu, map)).collect::<Result<_>>()?;
                 Searches::KdTree(trees)
             }
         };
-        Ok(Self { search, sharing: EstimateSharing::new(session.gpu, settings.share_reach), settings })
+        Ok(Self { search, sharing: EstimateSharing::new(session.gpu, settings.estimate.share_reach), settings })
     }
 
     /// Adds the light of the maps' photons to the radiance of the tile's visible points: that of all maps; with final gathering
@@ -79,7 +79,7 @@ fn kd_estimates(gpu: &Gpu, tree: &KdMap, settings: &Settings, asked: &Asked, pro
     points.iter_mut().filter(|p| p.valid > asked.turn).for_each(|p| p.valid = 0);
     let mut radiance: Vec<[f32; 4]> = gpu.read(asked.radiance, 0, asked.count.into())?;
     let mut gathered: Vec<Gathered> = gpu.read(asked.gathered, 0, asked.count.into())?;
-    for (i, estimate) in tree.gather(&points, settings, progress)?.into_iter().enumerate() {
+    for (i, estimate) in tree.gather(&points, &settings.estimate, progress)?.into_iter().enumerate() {
         if points[i].valid != 0 {
             (0..3).for_each(|c| radiance[i][c] += estimate.radiance[c] as f32);
             let Estimate { radius_squared, count, fingerprint, .. } = estimate;

@@ -44,10 +44,11 @@ impl Watch for crate::progress::Silent {
 
 /// Work of a cell, in arbitrary units: samples times neighbours, and photons. Only its proportions count.
 pub(super) fn work(settings: &Settings) -> f64 {
-    let (width, height) = settings.size.unwrap_or((512, 512));
-    let samples = f64::from(width) * f64::from(height) * f64::from(settings.spp);
-    let gather = if settings.mode.traces_photons() { 30.0 + f64::from(settings.neighbors) } else { 0.0 };
-    1e5 + samples * (10.0 + gather) + f64::from(settings.global_photons)
+    let (width, height) = settings.picture.size.unwrap_or((512, 512));
+    let samples = f64::from(width) * f64::from(height) * f64::from(settings.picture.spp);
+    let gather =
+        if settings.photons.mode.traces_photons() { 30.0 + f64::from(settings.estimate.neighbors) } else { 0.0 };
+    1e5 + samples * (10.0 + gather) + f64::from(settings.photons.global)
 }
 
 /// Turns the stages of one render after the other into the progress of the whole.
@@ -138,7 +139,12 @@ mod tests {
     #[test]
     fn progress_runs_over_all_cells_in_proportion_to_their_work() {
         let last = Last(Mutex::default());
-        let settings = |neighbors| Settings { neighbors, size: Some((100, 100)), ..Settings::default() };
+        let settings = |neighbors| {
+            Settings::default().with(|s| {
+                s.estimate.neighbors = neighbors;
+                s.picture.size = Some((100, 100));
+            })
+        };
         let (small, large) = (settings(1), settings(1000));
         let meter = Meter::new(&last, 2, 3, work(&small) + work(&large));
         let seen = || last.0.lock().unwrap().clone().expect("it was told");

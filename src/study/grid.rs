@@ -17,7 +17,7 @@ pub fn grid(
     let title = format!("Study of {}", subject.scene.file_name);
     let mut plan = Plan { title, subjects: vec![subject], combinations: Vec::new(), figures: Vec::new(), look };
     for &mode in modes {
-        let base = Settings { mode, ..settings.clone() };
+        let base = settings.clone().with(|s| s.photons.mode = mode);
         let title = format!("Mode {}", mode.name());
         add_plane(&mut plan, 0, &base, photons, neighbors, repeats, title);
     }
@@ -36,15 +36,19 @@ pub(super) fn add_plane(
 ) {
     let rows = photons.iter().map(|&n| {
         let cells = neighbors.iter().map(|&k| {
-            let settings = Settings { global_photons: n, caustic_photons: n, neighbors: k, ..base.clone() };
+            let settings = base.clone().with(|s| {
+                s.photons.global = n;
+                s.photons.caustic = n;
+                s.estimate.neighbors = k;
+            });
             Some(plan.add(Combination { subject, settings, repeats, measured: true }))
         });
         (format!("n = {}", short(n)), cells.collect())
     });
     let rows = rows.collect();
     let columns = neighbors.iter().map(|k| format!("k = {k}")).collect();
-    let questions = if base.mode.traces_photons() { Question::OF_A_PLANE.to_vec() } else { Vec::new() };
-    plan.figures.push(Figure { title, columns, rows, questions, plane: base.mode.traces_photons() });
+    let questions = if base.photons.mode.traces_photons() { Question::OF_A_PLANE.to_vec() } else { Vec::new() };
+    plan.figures.push(Figure { title, columns, rows, questions, plane: base.photons.mode.traces_photons() });
 }
 
 /// 1000 as `1k`, 1500000 as `1.5M`; exact.

@@ -97,7 +97,13 @@ impl Row {
 
 /// A render in words.
 pub(super) fn name(scene: &str, s: &Settings) -> String {
-    format!("{scene}, {}, n = {}, k = {}, seed {}", s.mode.name(), short(s.global_photons), s.neighbors, s.seed)
+    format!(
+        "{scene}, {}, n = {}, k = {}, seed {}",
+        s.photons.mode.name(),
+        short(s.photons.global),
+        s.estimate.neighbors,
+        s.photons.seed
+    )
 }
 
 /// Measures the renders, one a repeat; none if the combination failed.
@@ -112,14 +118,14 @@ pub(super) fn measure(
     let scene = &plan.subjects[combination.subject].scene;
     let mut row = Row {
         scene: scene.file_name.clone(),
-        mode: settings.mode,
-        photons: settings.global_photons,
-        neighbors: settings.neighbors,
-        seed: settings.seed,
+        mode: settings.photons.mode,
+        photons: settings.photons.global,
+        neighbors: settings.estimate.neighbors,
+        seed: settings.photons.seed,
         repeats: combination.repeats,
         width: 0,
         height: 0,
-        spp: settings.spp,
+        spp: settings.picture.spp,
         seconds: Seconds::default(),
         global: MapRow::default(),
         caustic: MapRow::default(),
@@ -144,7 +150,7 @@ pub(super) fn measure(
     row.thumbnail = Thumbnail::new(first, plan.look);
     if let Some(reference) = reference.filter(|r| (r.width, r.height) == (first.width, first.height)) {
         compare(&mut row, renders, reference, plan.look);
-        row.corner_ratio = scene.camera(settings.camera.as_deref()).ok().and_then(|camera| {
+        row.corner_ratio = scene.camera(settings.picture.camera.as_deref()).ok().and_then(|camera| {
             let region = corner_region(first, camera);
             let right = mean_in(reference, &region)?;
             let found = average(renders, |frame| mean_in(frame, &region).unwrap_or(0.0));

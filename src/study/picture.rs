@@ -20,8 +20,8 @@ pub(super) fn picture(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<(Frame, Measured)> {
-    if settings.final_gather > 0 {
-        let (name, value) = ("final-gather", settings.final_gather.to_string());
+    if settings.photons.final_gather > 0 {
+        let (name, value) = ("final-gather", settings.photons.final_gather.to_string());
         return Err(Error::Setting { name, value, problem: "is not studied".to_string() });
     }
     let mut stats = maps.stats().clone();
@@ -51,7 +51,7 @@ pub(super) fn picture(
         pass.resolve(tile, &mut film)?;
     }
     session.close(&mut stats);
-    Ok((film.finish(settings.spp), Measured { stats, radii: radii.map(|counts| counts.finish()) }))
+    Ok((film.finish(settings.picture.spp), Measured { stats, radii: radii.map(|counts| counts.finish()) }))
 }
 
 /// Mean of pictures of one size; the other layers are the first one's.

@@ -70,7 +70,7 @@ impl Finer {
 pub struct Combination {
     /// Index into [`Plan::subjects`].
     pub subject: usize,
-    /// Repeat r, from 0, has the seed `settings.seed` + r.
+    /// Repeat r, from 0, has the seed `settings.photons.seed` + r.
     pub settings: Settings,
     /// Renders of different seeds, ≥ 1.
     pub repeats: u32,
@@ -109,10 +109,12 @@ impl Plan {
     /// Adds a combination, or finds it; the larger number of repeats stays. Where no photons are traced, n and k make no
     /// difference and are the defaults. A study is of estimates: each point has its own.
     pub fn add(&mut self, mut new: Combination) -> usize {
-        new.settings.share_reach = 0.0;
-        if !new.settings.mode.traces_photons() {
-            let Settings { global_photons, caustic_photons, neighbors, .. } = Settings::default();
-            new.settings = Settings { global_photons, caustic_photons, neighbors, ..new.settings };
+        new.settings.estimate.share_reach = 0.0;
+        if !new.settings.photons.mode.traces_photons() {
+            let Settings { photons, estimate, .. } = Settings::default();
+            new.settings.photons.global = photons.global;
+            new.settings.photons.caustic = photons.caustic;
+            new.settings.estimate.neighbors = estimate.neighbors;
         }
         let same = |old: &Combination| old.subject == new.subject && old.settings == new.settings;
         if let Some(at) = self.combinations.iter().position(same) {
@@ -136,10 +138,10 @@ impl Plan {
         for combination in &self.combinations {
             let subject = &self.subjects[combination.subject];
             combination.settings.check()?;
-            subject.scene.camera(combination.settings.camera.as_deref())?;
+            subject.scene.camera(combination.settings.picture.camera.as_deref())?;
             let Reference::Picture { name, frame } = &subject.reference else { continue };
             let size = crate::renderer::picture_size(
-                subject.scene.camera(combination.settings.camera.as_deref())?,
+                subject.scene.camera(combination.settings.picture.camera.as_deref())?,
                 &combination.settings,
             )?;
             if combination.measured && size != (frame.width, frame.height) {

@@ -33,7 +33,7 @@ pub fn report(folder: &Path, settings: &Settings, repeats: u32, scale: f64, look
     let scenes = FILES.iter().map(|file| Scene::load(&folder.join(file))).collect::<Result<Vec<_>>>()?;
     let scaled = |n: u32| ((f64::from(n) * scale).round() as u32).max(1);
     let subjects = scenes.into_iter().enumerate().map(|(i, scene)| {
-        let finer = Finer::than(scaled(PHOTONS[3]), settings.spp);
+        let finer = Finer::than(scaled(PHOTONS[3]), settings.picture.spp);
         let reference = if i <= DIFFUSE { Reference::Finer(finer) } else { Reference::None };
         Subject { scene, reference }
     });
@@ -61,7 +61,12 @@ struct Figures<'a> {
 impl Figures<'_> {
     fn add(&mut self, subject: usize, mode: Mode, n: u32, k: u32, measured: bool) -> Option<usize> {
         let n = (self.scaled)(n);
-        let settings = Settings { mode, global_photons: n, caustic_photons: n, neighbors: k, ..self.settings.clone() };
+        let settings = self.settings.clone().with(|s| {
+            s.photons.mode = mode;
+            s.photons.global = n;
+            s.photons.caustic = n;
+            s.estimate.neighbors = k;
+        });
         Some(self.plan.add(Combination { subject, settings, repeats: 1, measured }))
     }
 
@@ -113,7 +118,7 @@ impl Figures<'_> {
 
     /// Of scene 1.
     fn add_plane(&mut self, photons: &[u32], neighbors: &[u32], title: String) -> &mut Figure {
-        let base = Settings { mode: Mode::Hybrid, ..self.settings.clone() };
+        let base = self.settings.clone().with(|s| s.photons.mode = Mode::Hybrid);
         add_plane(&mut self.plan, MIRROR_AND_GLASS, &base, photons, neighbors, self.repeats, title);
         self.plan.figures.last_mut().expect("it was added")
     }

@@ -102,7 +102,7 @@ impl Study<'_> {
     fn reference_cells(&self, combination: &Combination) -> Vec<Settings> {
         let subject = &self.plan.subjects[combination.subject];
         let (Reference::Finer(finer), true) = (&subject.reference, combination.measured) else { return Vec::new() };
-        let mode = reference_mode(combination.settings.mode, subject.scene.has_delta());
+        let mode = reference_mode(combination.settings.photons.mode, subject.scene.has_delta());
         finer_settings(&combination.settings, *finer, mode)
     }
 
@@ -116,7 +116,7 @@ impl Study<'_> {
                 let opened = Session::open(self.gpu, scene, settings, meter);
                 let traced = opened.and_then(|session| {
                     begun?;
-                    if warm.insert((sharing[0].subject, settings.mode as u32)) {
+                    if warm.insert((sharing[0].subject, settings.photons.mode as u32)) {
                         self.warm_up(&session, settings)?;
                     }
                     let maps = session.photon_maps(settings, meter)?;
@@ -177,14 +177,13 @@ impl Study<'_> {
     /// A tiny render before the first that is timed: drivers compile kernels when they are used first.
     fn warm_up(&self, session: &Session, settings: &Settings) -> Result<()> {
         session.compile_ahead(settings);
-        let tiny = Settings {
-            global_photons: 64,
-            caustic_photons: 64,
-            max_paths: Some(1024),
-            spp: 1,
-            size: Some((8, 8)),
-            ..settings.clone()
-        };
+        let tiny = settings.clone().with(|s| {
+            s.photons.global = 64;
+            s.photons.caustic = 64;
+            s.photons.max_paths = Some(1024);
+            s.picture.spp = 1;
+            s.picture.size = Some((8, 8));
+        });
         let maps = session.photon_maps(&tiny, &Silent)?;
         session.picture(&maps, &tiny, &Silent)?;
         Ok(())

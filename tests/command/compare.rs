@@ -203,15 +203,14 @@ fn ctrl_c_ends_a_comparison_and_leaves_no_file() {
 }
 
 fn small(mode: Mode) -> Settings {
-    Settings {
-        mode,
-        global_photons: 3000,
-        caustic_photons: 3000,
-        neighbors: 30,
-        size: Some((24, 24)),
-        spp: 1,
-        ..Settings::default()
-    }
+    Settings::default().with(|s| {
+        s.photons.mode = mode;
+        s.photons.global = 3000;
+        s.photons.caustic = 3000;
+        s.estimate.neighbors = 30;
+        s.picture.size = Some((24, 24));
+        s.picture.spp = 1;
+    })
 }
 
 #[test]
@@ -219,13 +218,17 @@ fn both_searches_agree_in_every_mode() {
     let scene = Scene::load(Path::new(SCENE)).expect("the scene loads");
     let options = Options::default();
     for kernel in DensityKernel::ALL {
-        let settings = Settings { kernel, ..small(Mode::Photons) };
+        let settings = small(Mode::Photons).with(|s| s.estimate.kernel = kernel);
         let verdict = compare(gpu(), &scene, &settings, &options, &Silent).expect("the work succeeds").verdict();
         assert!(verdict.is_ok(), "{kernel:?}: {verdict:?}");
     }
     for mode in Mode::ALL.into_iter().filter(|mode| mode.traces_photons()) {
         for (neighbors, max_radius, cone_constant) in [(1, None, 2.0), (30, Some(0.2), 1.0), (1000, None, 1.5)] {
-            let settings = Settings { neighbors, max_radius, cone_constant, ..small(mode) };
+            let settings = small(mode).with(|s| {
+                s.estimate.neighbors = neighbors;
+                s.estimate.max_radius = max_radius;
+                s.estimate.cone_constant = cone_constant;
+            });
             let comparison = compare(gpu(), &scene, &settings, &options, &Silent).expect("the work succeeds");
             let verdict = comparison.verdict();
             assert!(verdict.is_ok(), "{mode:?}, k = {neighbors}, radius {max_radius:?}: {verdict:?}");
@@ -236,7 +239,7 @@ fn both_searches_agree_in_every_mode() {
 #[test]
 fn both_searches_make_the_same_picture() {
     let scene = Scene::load(Path::new(SCENE)).expect("the scene loads");
-    let settings = Settings { raw_estimate: true, ..small(Mode::Hybrid) };
+    let settings = small(Mode::Hybrid).with(|s| s.estimate.raw = true);
     let session = Session::open(gpu(), &scene, &settings, &Silent).expect("the scene fits");
     let maps = session.photon_maps(&settings, &Silent).expect("photons");
     let picture = |settings: Settings| session.picture(&maps, &settings, &Silent).expect("a picture").frame;
@@ -245,10 +248,13 @@ fn both_searches_make_the_same_picture() {
         let pairs = grid.radiance.iter().flatten().zip(other.radiance.iter().flatten());
         pairs.map(|(a, b)| (a - b).abs() / a.max(*b).max(1e-12)).fold(0.0, f32::max)
     };
-    let kdtree = picture(Settings { search: Search::KdTree, ..settings.clone() });
+    let kdtree = picture(settings.clone().with(|s| s.estimate.search = Search::KdTree));
     assert!(worst(&kdtree) < 1e-5, "{}", worst(&kdtree));
     assert!(kdtree.depth == grid.depth && kdtree.albedo == grid.albedo);
-    let control = picture(Settings { search: Search::KdTree, neighbors: settings.neighbors + 1, ..settings });
+    let control = picture(settings.clone().with(|s| {
+        s.estimate.search = Search::KdTree;
+        s.estimate.neighbors += 1;
+    }));
     assert!(worst(&control) > 1e-3, "the control: {}", worst(&control));
 }
 

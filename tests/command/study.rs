@@ -25,7 +25,11 @@ fn room() -> Scene {
 }
 
 fn settings() -> Settings {
-    Settings { size: Some((24, 16)), spp: 1, share_reach: 0.0, ..Settings::default() }
+    Settings::default().with(|s| {
+        s.picture.size = Some((24, 16));
+        s.picture.spp = 1;
+        s.estimate.share_reach = 0.0;
+    })
 }
 
 fn plan(reference: Reference, modes: &[Mode], repeats: u32) -> Plan {
@@ -117,7 +121,7 @@ fn what_is_finished_is_kept_and_what_is_not_is_rendered() {
     assert_eq!(means(&third), means(&first), "what is rendered again is the same");
 
     let mut other = small();
-    other.combinations.iter_mut().for_each(|c| c.settings.seed = 1);
+    other.combinations.iter_mut().for_each(|c| c.settings.photons.seed = 1);
     let other_seed = run(&other, path);
     assert_eq!(counts(&other_seed), (4, 0), "another seed");
     assert_ne!(means(&other_seed), means(&first));
@@ -132,7 +136,7 @@ fn what_is_finished_is_kept_and_what_is_not_is_rendered() {
         assert_eq!(counts(&run(&other, path)), (4, 0), "{what}");
     }
     let mut other = small();
-    other.combinations[0].settings.max_radius = Some(0.3);
+    other.combinations[0].settings.estimate.max_radius = Some(0.3);
     assert_eq!(counts(&run(&other, path)), (1, 3), "another radius of one");
 }
 
@@ -140,7 +144,7 @@ fn what_is_finished_is_kept_and_what_is_not_is_rendered() {
 fn a_cell_is_the_picture_that_render_makes() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut plan = small();
-    plan.combinations.retain(|c| c.settings.global_photons == 2000);
+    plan.combinations.retain(|c| c.settings.photons.global == 2000);
     plan.figures.clear();
     run(&plan, folder.path());
     let found: Vec<Frame> = cells(folder.path(), "exr").iter().map(|p| read_exr(p).expect("a picture")).collect();
@@ -154,7 +158,11 @@ fn a_cell_is_the_picture_that_render_makes() {
 fn errors_are_those_of_the_measures() {
     let folder = tempfile::tempdir().expect("a folder");
     let frame = |k| {
-        let settings = Settings { global_photons: 500, caustic_photons: 500, neighbors: k, ..settings() };
+        let settings = settings().with(|s| {
+            s.photons.global = 500;
+            s.photons.caustic = 500;
+            s.estimate.neighbors = k;
+        });
         render_scene(&room(), &settings).frame
     };
     let (reference, other) = (frame(5), frame(20));
@@ -209,7 +217,7 @@ fn combinations_are_planned_once() {
     let known = plan.combinations[0].clone();
     let at = plan.add(Combination { repeats: 3, ..known.clone() });
     assert_eq!((at, plan.combinations.len(), plan.combinations[0].repeats), (0, 4, 3));
-    let at = plan.add(Combination { settings: Settings { seed: 9, ..known.settings.clone() }, ..known });
+    let at = plan.add(Combination { settings: known.settings.clone().with(|s| s.photons.seed = 9), ..known });
     assert_eq!((at, plan.combinations.len()), (4, 5));
     // Without photons n and k make no difference.
     assert_eq!(self::plan(Reference::None, &[Mode::DirectRays], 1).combinations.len(), 1);

@@ -12,9 +12,9 @@ use std::{fs, path::Path, process::Command};
 use caustica::{
     bvh::Bvh,
     layout::{self, Counters, PhotonBatch},
-    passes::SceneBuffers,
     scene::{Light, LightKind},
     settings::{Mode, Sampler, Settings},
+    upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -28,7 +28,10 @@ fn two_renders_are_equal() {
     scene.lights.push(point_light(vec3(-0.5, 0.5, 0.1), 0.3));
     scene.cameras.push(camera(vec3(0.0, 0.0, 0.99), Vec3::ZERO, 80.0));
     let picture = |seed| {
-        let settings = Settings { seed, spp: 2, ..settings(Mode::Hybrid, 20_000, 40) };
+        let settings = settings(Mode::Hybrid, 20_000, 40).with(|s| {
+            s.photons.seed = seed;
+            s.picture.spp = 2;
+        });
         render_scene(&scene, &settings).frame
     };
     assert_eq!(picture(7), picture(7));
@@ -71,7 +74,7 @@ fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampl
     scene.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
     scene.lights.push(Light { kind, ..point_light(Vec3::ZERO, 1.0) });
     let bvh = Bvh::build(&scene);
-    let settings = Settings { sampler, ..Settings::default() };
+    let settings = Settings::default().with(|s| s.photons.sampler = sampler);
     let buffers = SceneBuffers::new(gpu, &scene, &bvh, &settings).expect("the scene fits");
     let emit = buffers.kernel(gpu, "emit_photons");
     let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns, target_count: 1, ..Default::default() };

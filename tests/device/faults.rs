@@ -33,7 +33,7 @@ fn room() -> Scene {
 }
 
 fn small() -> Settings {
-    Settings { neighbors: 20, ..settings(Mode::Hybrid, 1000, 8) }
+    settings(Mode::Hybrid, 1000, 8).with(|s| s.estimate.neighbors = 20)
 }
 
 fn open(pacing: Pacing) -> Gpu {
@@ -43,7 +43,7 @@ fn open(pacing: Pacing) -> Gpu {
 #[test]
 fn cut_dispatches_change_no_bit() {
     let scene = room();
-    let settings = Settings { final_gather: 1, ..small() };
+    let settings = small().with(|s| s.photons.final_gather = 1);
     let picture = |pacing, settings: &Settings| {
         let gpu = open(pacing);
         let frame = render(&gpu, &scene, settings, &Silent).expect("the scene renders").frame;
@@ -56,7 +56,7 @@ fn cut_dispatches_change_no_bit() {
     let (timed, parts) = picture(Pacing::Measured, &settings);
     assert!(timed == whole, "dispatches cut by time give another picture");
     assert!(parts >= uncut, "{uncut} dispatches, {parts} when timed");
-    let (other, _) = picture(Pacing::Whole, &Settings { seed: 1, ..settings });
+    let (other, _) = picture(Pacing::Whole, &settings.with(|s| s.photons.seed = 1));
     assert!(other != whole, "control: the seed changes nothing");
 }
 

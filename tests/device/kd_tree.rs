@@ -14,7 +14,7 @@ use caustica::{
     layout::{PhotonFlux, PhotonPlace, octahedral},
     progress::Silent,
     reference::{Found, KdMap, KdTree, brute_force, fingerprint},
-    settings::Settings,
+    settings::EstimateSettings,
 };
 use glam::Vec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -126,7 +126,7 @@ fn line(distances: &[f32]) -> (KdMap, caustica::layout::VisiblePoint) {
 fn photons_nearly_as_far_as_each_other_are_tied() {
     let tied = |distances: &[f32], max_radius| {
         let (map, origin) = line(distances);
-        map.estimate(&origin, &Settings { neighbors: 2, max_radius, ..Settings::default() }).tied
+        map.estimate(&origin, &EstimateSettings { neighbors: 2, max_radius, ..Default::default() }).tied
     };
     let near = 2.0 * (1.0 + 2.4e-7);
     assert!(tied(&[1.0, 2.0, near], None) && tied(&[1.0, 2.0, 2.0, 2.0, 3.0], None));
@@ -152,7 +152,7 @@ fn fingerprints_tell_sets_apart_and_do_not_know_order() {
 #[test]
 fn photons_left_out_are_not_found() {
     let (mut map, origin) = line(&[1.0, 2.0, 3.0, 4.0]);
-    let settings = Settings { neighbors: 2, ..Settings::default() };
+    let settings = EstimateSettings { neighbors: 2, ..Default::default() };
     let photons = |map: &KdMap| map.search(&origin, 3, f32::INFINITY).iter().map(|n| n.1).collect::<Vec<_>>();
     assert_eq!(photons(&map), [0, 1, 2]);
     for photon in [3, 1, 1] {

@@ -16,7 +16,7 @@ use caustica::{
     progress::Silent,
     renderer::{Session, render},
     scene::Scene,
-    settings::{Mode, Settings},
+    settings::Mode,
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -69,7 +69,10 @@ fn maps_that_no_buffers_hold_are_refused_at_once() {
     // 1024 places of photons in a window, two windows.
     let gpu = device_with_bindings(16 << 10);
     let refused = |global_photons, caustic_photons| {
-        let settings = Settings { global_photons, caustic_photons, ..settings(Mode::Hybrid, 1, 8) };
+        let settings = settings(Mode::Hybrid, 1, 8).with(|s| {
+            s.photons.global = global_photons;
+            s.photons.caustic = caustic_photons;
+        });
         let before = gpu.dispatches();
         let error = render(&gpu, &scene, &settings, &Silent).map(|_| ()).expect_err("bindings are tiny");
         assert_eq!(gpu.dispatches(), before, "work was done for nothing");
@@ -105,12 +108,11 @@ fn memory_is_bounded_by_photons_alone() {
     // A device of its own: the peak counts all that lives on it.
     let gpu = Gpu::open(None).expect("tests need an adapter");
     let peak = |photons: u32, size: u32, spp: u32| {
-        let settings = Settings {
-            max_paths: Some(1_000_000),
-            spp,
-            neighbors: 10,
-            ..settings(Mode::IndirectPhotons, photons, size)
-        };
+        let settings = settings(Mode::IndirectPhotons, photons, size).with(|s| {
+            s.photons.max_paths = Some(1_000_000);
+            s.picture.spp = spp;
+            s.estimate.neighbors = 10;
+        });
         render(&gpu, &scene, &settings, &Silent).expect("the scene renders").stats.peak_device_bytes
     };
     let (few, many) = (peak(1000, 16, 1), peak(500_000, 16, 1));

@@ -5,9 +5,9 @@ use caustica::{
     gpu::{Buffer, Gpu},
     layout::{Gathered, Photon, PhotonFlux, PhotonPlace, VisiblePoint},
     passes::{
-        gather::{Gather, GatherOptions, GatherSettings, GatherStats, gathered_buffer},
-        photon_map::{MapKernels, PhotonMap, PhotonStore},
-        radix_sort::RadixSort,
+        estimate::gather::{Gather, GatherOptions, GatherSettings, GatherStats, gathered_buffer},
+        maps::photon_map::{MapKernels, PhotonMap, PhotonStore},
+        maps::radix_sort::RadixSort,
     },
     progress::Silent,
     reference::{Found, brute_force, estimate, usable},

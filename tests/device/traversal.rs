@@ -3,9 +3,9 @@
 use caustica::{
     bvh::Bvh,
     layout::{Ray, RayHit},
-    passes::SceneBuffers,
     scene::{Scene, Sphere, Triangle},
     settings::Settings,
+    upload::SceneBuffers,
 };
 use glam::{DVec3, Vec3};
 use support::*;

@@ -10,11 +10,12 @@ fn layer_of(module: &str) -> Option<u32> {
         // What lib.rs hands out of `error` under its own name.
         "Error" | "Result" => 0,
         "scene" | "bvh" => 1,
-        "reference" => 2,
+        "emitters" | "reference" => 2,
         "gpu" => 3,
-        "passes" => 4,
-        "renderer" | "compare" | "study" => 5,
-        "lib" | "main" | "cli" => 6,
+        "upload" => 4,
+        "passes" => 5,
+        "renderer" | "compare" | "study" => 6,
+        "lib" | "main" | "cli" => 7,
         _ => return None,
     })
 }

@@ -14,10 +14,11 @@ use std::f64::consts::PI;
 use caustica::{
     bvh::Bvh,
     layout::Photon,
-    passes::{PhotonTracer, SceneBuffers, TracedPhotons},
+    passes::{PhotonTracer, TracedPhotons},
     progress::Silent,
     scene::Scene,
     settings::{Mode, Sampler, Settings},
+    upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -47,8 +48,14 @@ fn closed_sphere_has_the_radiance_of_the_series() {
     let right = direct * series(ALBEDO, BOUNCES);
     for mode in [Mode::Photons, Mode::Hybrid] {
         let estimate = |neighbors, sampler, max_bounces| {
-            let settings = Settings { neighbors, max_bounces, sampler, ..settings(mode, 40_000, 32) };
-            Estimate::over_seeds(8, |seed| mean(&render_scene(&scene, &Settings { seed, ..settings.clone() })))
+            let settings = settings(mode, 40_000, 32).with(|s| {
+                s.estimate.neighbors = neighbors;
+                s.photons.max_bounces = max_bounces;
+                s.photons.sampler = sampler;
+            });
+            Estimate::over_seeds(8, |seed| {
+                mean(&render_scene(&scene, &settings.clone().with(|s| s.photons.seed = seed)))
+            })
         };
         for neighbors in [10, 100] {
             // Independent photons: those of a Sobol sequence keep a distance, which makes the (k+1)-th lie farther by up to 1/(2k).
@@ -70,11 +77,14 @@ fn closed_sphere_has_the_radiance_of_the_series() {
 fn final_gathering_adds_the_bounce_that_its_rays_make() {
     let (scene, direct) = closed_sphere();
     for (mode, first) in [(Mode::Hybrid, 0.0), (Mode::IndirectPhotons, 1.0)] {
-        let settings = Settings { max_bounces: BOUNCES, final_gather: 8, ..settings(mode, 50_000, 32) };
+        let settings = settings(mode, 50_000, 32).with(|s| {
+            s.photons.max_bounces = BOUNCES;
+            s.photons.final_gather = 8;
+        });
         let measured = mean(&render_scene(&scene, &settings));
         let right = direct * (series(ALBEDO, BOUNCES + 1) - first);
         assert!(within(measured, right, 0.015), "{mode:?}: {measured} instead of {right}");
-        let short = mean(&render_scene(&scene, &Settings { max_bounces: BOUNCES - 1, ..settings }));
+        let short = mean(&render_scene(&scene, &settings.clone().with(|s| s.photons.max_bounces = BOUNCES - 1)));
         assert!(!within(short, right, 0.015), "control: {mode:?}: {short} with a bounce less");
     }
 }
@@ -98,9 +108,9 @@ fn closed_box_stores_the_flux_of_the_series() {
     let mut scene = scene(&[caustica::scene::Surface::Diffuse { albedo }]);
     add_box(&mut scene, vec3(-1.0, -1.0, -1.0), vec3(1.0, 2.0, 1.5), 0);
     scene.lights.push(point_light(vec3(0.2, 0.3, -0.1), 5.0));
-    let settings = Settings { max_bounces: BOUNCES, ..settings(Mode::Photons, 300_000, 1) };
+    let settings = settings(Mode::Photons, 300_000, 1).with(|s| s.photons.max_bounces = BOUNCES);
     let (traced, flux) = trace_photons(&scene, &settings);
-    let (_, short) = trace_photons(&scene, &Settings { max_bounces: BOUNCES - 1, ..settings });
+    let (_, short) = trace_photons(&scene, &settings.clone().with(|s| s.photons.max_bounces = BOUNCES - 1));
     let power = 4.0 * PI * 5.0;
     for channel in 0..3 {
         let rho = f64::from(albedo[channel]);
@@ -120,12 +130,12 @@ fn roulette_alone_ends_paths() {
     let mut scene = scene(&[diffuse(0.9)]);
     add_box(&mut scene, Vec3::splat(-1.0), Vec3::splat(1.0), 0);
     scene.lights.push(point_light(vec3(0.2, 0.3, -0.1), 1.0));
-    let settings = Settings { max_bounces: 0, ..settings(Mode::Photons, 200_000, 1) };
+    let settings = settings(Mode::Photons, 200_000, 1).with(|s| s.photons.max_bounces = 0);
     let (traced, flux) = trace_photons(&scene, &settings);
     let right = 4.0 * PI / (1.0 - 0.9);
     assert!(within(flux[0], right, 0.02), "{} instead of {right}", flux[0]);
     assert_eq!(traced.lost, 0.0);
-    let (_, limited) = trace_photons(&scene, &Settings { max_bounces: 20, ..settings });
+    let (_, limited) = trace_photons(&scene, &settings.clone().with(|s| s.photons.max_bounces = 20));
     assert!(!within(limited[0], right, 0.02), "control: {} with at most 20 bounces", limited[0]);
 }
 
@@ -144,7 +154,10 @@ fn light_falls_with_the_square_of_the_distance() {
     for (mode, tolerance) in [(Mode::DirectRays, 0.005), (Mode::DirectPhotons, 0.03)] {
         let measured = |height| {
             let one = |seed| {
-                let settings = Settings { neighbors: 250, seed, ..settings(mode, 200_000, 16) };
+                let settings = settings(mode, 200_000, 16).with(|s| {
+                    s.estimate.neighbors = 250;
+                    s.photons.seed = seed;
+                });
                 mean(&render_scene(&floor_under_light(height), &settings))
             };
             (0..SEEDS).map(one).sum::<f64>() / f64::from(SEEDS)

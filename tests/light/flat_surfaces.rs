@@ -7,11 +7,7 @@
 
 use std::path::Path;
 
-use caustica::{
-    renderer::Render,
-    scene::Scene,
-    settings::{Mode, Settings},
-};
+use caustica::{renderer::Render, scene::Scene, settings::Mode};
 use support::surfaces::{bias, estimates, places};
 use support::{gpu, mean, render_scene, settings};
 
@@ -40,8 +36,12 @@ fn amiss(found: &Render, right: &Render) -> Option<String> {
 fn where_solids_touch_few_photons_are_as_bright_as_many() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/diffuse.gltf");
     let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
-    let asked =
-        |photons, neighbors, seed| Settings { neighbors, seed, ..settings(Mode::IndirectPhotons, photons, 128) };
+    let asked = |photons, neighbors, seed| {
+        settings(Mode::IndirectPhotons, photons, 128).with(|s| {
+            s.estimate.neighbors = neighbors;
+            s.photons.seed = seed;
+        })
+    };
     let picture = |photons, neighbors, seed| render_scene(&scene, &asked(photons, neighbors, seed));
     let right = picture(400_000, 100, 0);
     for (photons, neighbors) in [(2000, 50), (2000, 100), (5000, 100), (20_000, 500)] {

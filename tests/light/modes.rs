@@ -12,7 +12,7 @@ use caustica::{
     progress::Silent,
     renderer::{Render, render},
     scene::{Scene, Triangle},
-    settings::{Emission, LightSampling, Mode, Sampler, Settings},
+    settings::{Emission, LightSampling, Mode, Sampler},
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -64,17 +64,26 @@ fn hybrid_is_direct_rays_plus_indirect_photons() {
 #[test]
 fn final_gathering_has_the_mean_of_the_estimate() {
     let scene = room();
-    let settings = Settings { max_bounces: 0, spp: 1, ..settings(Mode::Hybrid, 50_000, 24) };
+    let settings = settings(Mode::Hybrid, 50_000, 24).with(|s| {
+        s.photons.max_bounces = 0;
+        s.picture.spp = 1;
+    });
     let plain = mean(&render_scene(&scene, &settings));
     for emission in [Emission::Aimed, Emission::Unaimed] {
-        let gathers = Settings { final_gather: 6, emission, ..settings.clone() };
+        let gathers = settings.clone().with(|s| {
+            s.photons.final_gather = 6;
+            s.photons.emission = emission;
+        });
         let gathered = mean(&render_scene(&scene, &gathers));
         assert!(within(gathered, plain, 0.015), "{emission:?}: {gathered} instead of {plain}");
         let darker = mean(&render_scene(&without_lamp(1), &gathers));
         assert!(!within(darker, plain, 0.015), "control: {emission:?}: {darker} without the second lamp");
     }
     for mode in [Mode::Photons, Mode::DirectPhotons, Mode::DirectRays] {
-        let wrong = Settings { mode, final_gather: 1, ..settings.clone() };
+        let wrong = settings.clone().with(|s| {
+            s.photons.mode = mode;
+            s.photons.final_gather = 1;
+        });
         let refused = render(gpu(), &scene, &wrong, &Silent).map(drop).expect_err("the mode has no final gathering");
         assert!(refused.to_string().contains("final-gather"), "{refused}");
     }
@@ -85,7 +94,10 @@ fn hybrid_and_photons_agree_in_the_limit() {
     const SEEDS: u32 = 6;
     // Independent photons: those of a Sobol sequence are estimated up to 1/(2k) darker.
     let picture = |scene: &Scene, mode, seed| {
-        let settings = Settings { seed, sampler: Sampler::Random, ..settings(mode, 50_000, 32) };
+        let settings = settings(mode, 50_000, 32).with(|s| {
+            s.photons.seed = seed;
+            s.photons.sampler = Sampler::Random;
+        });
         mean(&render_scene(scene, &settings))
     };
     let hybrid: Vec<f64> = (0..SEEDS).map(|seed| picture(&room(), Mode::Hybrid, seed)).collect();
@@ -126,7 +138,7 @@ fn coarse_ball(smooth: bool) -> Scene {
 #[test]
 fn modes_agree_on_a_smooth_shaded_ball() {
     let picture = |mode, smooth| {
-        let settings = Settings { neighbors: 150, ..settings(mode, 100_000, 40) };
+        let settings = settings(mode, 100_000, 40).with(|s| s.estimate.neighbors = 150);
         render_scene(&coarse_ball(smooth), &settings)
     };
     // Means over blocks of 4 x 4 pixels, against noise; away from the shadow's edge, where the disc of the estimate
@@ -155,18 +167,17 @@ fn modes_agree_on_a_smooth_shaded_ball() {
 fn a_full_map_is_normalised_by_its_own_paths() {
     let scene = room();
     for light_sampling in [LightSampling::Power, LightSampling::Uniform] {
-        let small = Settings {
-            global_photons: 5_000,
-            caustic_photons: 100_000,
-            max_paths: Some(500_000),
-            neighbors: 50,
-            light_sampling,
+        let small = settings(Mode::Photons, 1, 32).with(|s| {
+            s.photons.global = 5_000;
+            s.photons.caustic = 100_000;
+            s.photons.max_paths = Some(500_000);
+            s.estimate.neighbors = 50;
+            s.lights.sampling = light_sampling;
             // Over few photons sharing costs two per cent of the light of so small a picture.
-            share_reach: 0.0,
-            ..settings(Mode::Photons, 1, 32)
-        };
+            s.estimate.share_reach = 0.0;
+        });
         let full = render_scene(&scene, &small);
-        let open = render_scene(&scene, &Settings { global_photons: 250_000, ..small.clone() });
+        let open = render_scene(&scene, &small.clone().with(|s| s.photons.global = 250_000));
         let (global, caustic) = (full.stats.photons.global, full.stats.photons.caustic);
         assert!(global.stored > 4_900, "the global map holds only {} photons", global.stored);
         assert!(caustic.emitted > 20 * global.emitted, "the global map was full after {} paths", global.emitted);

@@ -20,12 +20,13 @@ use caustica::{
     bvh::Bvh,
     image::{PlaceInWhole, difference::rel_mse, read_exr},
     layout::VisiblePoint,
-    passes::{CameraTracer, SceneBuffers},
+    passes::CameraTracer,
     pixel_filter::PixelFilter,
     progress::Silent,
     renderer::{Session, render},
     scene::{Camera, Projection, Scene},
     settings::{Crop, Mode, Sampler, Settings},
+    upload::SceneBuffers,
 };
 use glam::{DVec2, Vec3, vec3};
 use support::*;
@@ -69,7 +70,11 @@ fn offsets(settings: &Settings) -> Vec<DVec2> {
 }
 
 fn set(sampler: Sampler, spp: u32, seed: u32) -> Vec<DVec2> {
-    offsets(&Settings { sampler, spp, seed, ..Settings::default() })
+    offsets(&Settings::default().with(|s| {
+        s.photons.sampler = sampler;
+        s.picture.spp = spp;
+        s.photons.seed = seed;
+    }))
 }
 
 /// Numbers of points in `parts` equal parts of each axis.
@@ -141,7 +146,7 @@ fn sobol_columns() -> Vec<[u32; 2]> {
 
 #[test]
 fn matrices_follow_from_their_polynomials() {
-    let text = include_str!("../../shaders/lib/sampler.wesl");
+    let text = include_str!("../../shaders/lib/core/sampler.wesl");
     let is_there = |i: usize, [z, w]: [u32; 2]| {
         let (z, w) = (z.reverse_bits(), w.reverse_bits());
         text.contains(&format!("column(place, {:#x}u, vec2u({z:#x}u, {w:#x}u))", 1_u32 << i))
@@ -174,7 +179,11 @@ fn sobol_sets_integrate_better() {
 fn samples_follow_the_pixel_filter() {
     let all = [PixelFilter::Box, PixelFilter::Gaussian, PixelFilter::BlackmanHarris];
     let drawn = all.map(|pixel_filter| {
-        offsets(&Settings { pixel_filter, sampler: Sampler::Random, spp: 4096, ..Settings::default() })
+        offsets(&Settings::default().with(|s| {
+            s.picture.pixel_filter = pixel_filter;
+            s.photons.sampler = Sampler::Random;
+            s.picture.spp = 4096;
+        }))
     });
     // Chi-square over 12 parts of one axis, of what lies inside the filter.
     let chi_square = |points: &[DVec2], filter: PixelFilter, axis: usize| {
@@ -199,8 +208,11 @@ fn samples_follow_the_pixel_filter() {
         }
     }
     // One sample by the box is the pixel's centre, by others it is not.
-    assert_eq!(offsets(&Settings { spp: 1, ..Settings::default() }), [DVec2::ZERO]);
-    let one = Settings { spp: 1, pixel_filter: PixelFilter::Gaussian, ..Settings::default() };
+    assert_eq!(offsets(&Settings::default().with(|s| s.picture.spp = 1)), [DVec2::ZERO]);
+    let one = Settings::default().with(|s| {
+        s.picture.spp = 1;
+        s.picture.pixel_filter = PixelFilter::Gaussian;
+    });
     assert_ne!(offsets(&one), [DVec2::ZERO]);
 }
 
@@ -212,7 +224,10 @@ fn wider_filters_soften_edges_and_keep_the_mean() {
     half.lights.push(point_light(Vec3::ZERO, 1.0));
     half.cameras.push(parallel_camera(1.0));
     let alpha = |pixel_filter| {
-        let settings = Settings { pixel_filter, spp: 256, ..settings(Mode::DirectRays, 1, 16) };
+        let settings = settings(Mode::DirectRays, 1, 16).with(|s| {
+            s.picture.pixel_filter = pixel_filter;
+            s.picture.spp = 256;
+        });
         let frame = render_scene(&half, &settings).frame;
         let mean = frame.alpha.iter().sum::<f32>() / 256.0;
         (frame.alpha[16 * 8 + 7], mean)
@@ -226,7 +241,11 @@ fn wider_filters_soften_edges_and_keep_the_mean() {
 fn circles_of_confusion_have_the_closed_form_s_size() {
     let eye = camera(Vec3::ZERO, Vec3::NEG_Z, 1.0);
     let (aperture, focus) = (0.2, 2.0);
-    let lens = Settings { aperture, focus: Some(focus), spp: 1024, ..Settings::default() };
+    let lens = Settings::default().with(|s| {
+        s.picture.aperture = aperture;
+        s.picture.focus = Some(focus);
+        s.picture.spp = 1024;
+    });
     // Points of the plane seen by the one pixel of a narrow picture, about its centre: a disc, blurred by the pixel.
     let spread = |distance: f32| {
         let points = visible(&plane(-distance), &eye, 1, &lens);
@@ -244,7 +263,7 @@ fn circles_of_confusion_have_the_closed_form_s_size() {
     let (sharp, _) = spread(focus);
     assert!(sharp < 1e-5, "control: the sharp plane is blurred by {sharp}");
     let orthographic = Scene { cameras: vec![parallel_camera(1.0)], ..plane(-1.0) };
-    let refused = render(gpu(), &orthographic, &Settings { size: Some((8, 8)), ..lens }, &Silent);
+    let refused = render(gpu(), &orthographic, &lens.with(|s| s.picture.size = Some((8, 8))), &Silent);
     assert!(matches!(refused, Err(Error::Setting { name: "aperture", .. })), "{refused:?}");
 }
 
@@ -254,7 +273,7 @@ fn parallel_rays_show_true_sizes() {
     let pixels = |camera: &Camera, distance: f32| {
         let mut square = scene(&[diffuse(0.5)]);
         add_quad(&mut square, vec3(-0.25, -0.5, -distance), Vec3::X, Vec3::Y, 0);
-        let seen = visible(&square, camera, 64, &Settings { spp: 1, ..Settings::default() });
+        let seen = visible(&square, camera, 64, &Settings::default().with(|s| s.picture.spp = 1));
         for ((x, y), p) in &seen {
             let center = |i: u32| (i as f32 + 0.5) / 16.0 - 2.0;
             let off = (p.x - center(*x)).abs().max((p.y + center(*y)).abs());
@@ -282,10 +301,11 @@ fn room() -> Scene {
 fn a_crop_has_the_bits_of_the_whole() {
     let scene = room();
     // Two tiles and more: 20 samples with 4 branches leave 512 pixels to a tile.
-    let base = Settings { spp: 20, ..settings(Mode::Hybrid, 3000, 40) };
+    let base = settings(Mode::Hybrid, 3000, 40).with(|s| s.picture.spp = 20);
     let session = Session::open(gpu(), &scene, &base, &Silent).expect("the scene fits");
     let maps = session.photon_maps(&base, &Silent).expect("photons");
-    let picture = |crop| session.picture(&maps, &Settings { crop, ..base.clone() }, &Silent).map(|r| r.frame);
+    let picture =
+        |crop| session.picture(&maps, &base.clone().with(|s| s.picture.crop = crop), &Silent).map(|r| r.frame);
     let whole = picture(None).expect("a picture");
     let part = Crop { column: 5, row: 19, width: 11, height: 9 };
     let cropped = picture(Some(part)).expect("a part");
@@ -311,24 +331,27 @@ fn shared_estimates_err_like_those_of_every_sample() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let scene = Scene::load(&folder.join("S2.glb")).expect("the scene loads");
     let reference = read_exr(&folder.join("S2_128.exr")).expect("the reference reads").radiance;
-    let base = Settings { raw_estimate: true, spp: 2, ..settings(Mode::Hybrid, 60_000, 128) };
+    let base = settings(Mode::Hybrid, 60_000, 128).with(|s| {
+        s.estimate.raw = true;
+        s.picture.spp = 2;
+    });
     let session = Session::open(gpu(), &scene, &base, &Silent).expect("the scene fits");
     let picture = |settings: &Settings, share_reach: f32| {
         let maps = session.photon_maps(settings, &Silent).expect("photons");
-        let settings = Settings { share_reach, ..settings.clone() };
+        let settings = settings.clone().with(|s| s.estimate.share_reach = share_reach);
         session.picture(&maps, &settings, &Silent).expect("a picture").frame.radiance
     };
-    let (shared, own) = (picture(&base, base.share_reach), picture(&base, 0.0));
+    let (shared, own) = (picture(&base, base.estimate.share_reach), picture(&base, 0.0));
     let error = |picture: &[[f32; 3]]| rel_mse(picture, &reference, None);
     assert!(error(&shared) < 1.03 * error(&own), "{} against {}", error(&shared), error(&own));
     let sum = |picture: &[[f32; 3]]| picture.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
     assert!((sum(&shared) / sum(&own) - 1.0).abs() < 0.004, "mean {}", sum(&shared) / sum(&own));
     // What sharing changes is less than what other photons change, and it changes something.
     let change = rel_mse(&shared, &own, None);
-    let other = rel_mse(&picture(&Settings { seed: 1, ..base.clone() }, 0.0), &own, None);
+    let other = rel_mse(&picture(&base.clone().with(|s| s.photons.seed = 1), 0.0), &own, None);
     assert!(change > 0.0 && change < 0.5 * other, "{change} against {other}");
-    let few = Settings { global_photons: 30_000, ..base };
-    let few = picture(&few, few.share_reach);
+    let few = base.clone().with(|s| s.photons.global = 30_000);
+    let few = picture(&few, few.estimate.share_reach);
     assert!(error(&few) > 1.03 * error(&own), "control: half the photons err as little");
 }
 
@@ -348,12 +371,12 @@ fn step_at_borders(radiance: &[[f32; 3]], width: usize, side: usize) -> f64 {
 fn shared_estimates_go_on_across_the_borders_of_tiles() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/diffuse.gltf");
     let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
-    let asked = Settings { spp: 4, ..settings(Mode::IndirectPhotons, 20_000, 256) };
+    let asked = settings(Mode::IndirectPhotons, 20_000, 256).with(|s| s.picture.spp = 4);
     let mut radiance = render_scene(&scene, &asked).frame.radiance;
     let step = step_at_borders(&radiance, 256, 128);
     assert!(step < 2.0, "light changes {step} times as much where tiles meet as elsewhere");
     // Control: tiles that do not share with each other, for their photons are not the same.
-    let other = render_scene(&scene, &Settings { seed: 1, ..asked }).frame.radiance;
+    let other = render_scene(&scene, &asked.clone().with(|s| s.photons.seed = 1)).frame.radiance;
     for (row, other) in radiance.chunks_mut(256).zip(other.chunks(256)) {
         row[128..].copy_from_slice(&other[128..]);
     }

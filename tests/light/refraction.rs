@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 
 use caustica::{
     scene::{Scene, Surface},
-    settings::{Mode, Settings},
+    settings::Mode,
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -38,7 +38,7 @@ fn edge_scene(slab: Option<Surface>) -> Scene {
 
 /// Height, as a fraction of the picture, of the black part below the edge in the middle column.
 fn edge_height(scene: &Scene) -> f64 {
-    let settings = Settings { spp: 16, ..settings(Mode::DirectRays, 1000, 128) };
+    let settings = settings(Mode::DirectRays, 1000, 128).with(|s| s.picture.spp = 16);
     let frame = render_scene(scene, &settings).frame;
     let column: Vec<f32> = frame.radiance.iter().skip(64).step_by(128).map(|p| p[0]).collect();
     // The white part has about 1; stray reflections in the glass brighten the black one a little.
@@ -83,7 +83,7 @@ fn irradiance_below(cover: Option<Surface>) -> f64 {
     scene.lights.push(point_light(vec3(0.0, 5.0, 0.0), 1.0));
     // Below the cover, so that the camera's own path stays clear.
     scene.cameras.push(camera(vec3(0.0, 0.4, 0.001), Vec3::ZERO, 100.0));
-    let settings = Settings { neighbors: 500, ..settings(Mode::DirectPhotons, 1_000_000, 8) };
+    let settings = settings(Mode::DirectPhotons, 1_000_000, 8).with(|s| s.estimate.neighbors = 500);
     mean(&render_scene(&scene, &settings)) * PI
 }
 
@@ -110,12 +110,11 @@ fn a_ball_in_glass_has_the_radiance_of_its_photons() {
         scene.spheres.push(sphere(Vec3::ZERO, b, 0));
         scene.lights.push(point_light(vec3(0.0, 0.0, distance), 1000.0));
         scene.cameras.push(camera(vec3(0.0, 0.0, distance), Vec3::ZERO, 2.0));
-        let settings = Settings {
-            neighbors: 100,
-            max_bounces: 2,
-            max_paths: Some(20_000_000),
-            ..settings(Mode::DirectPhotons, 20_000, 16)
-        };
+        let settings = settings(Mode::DirectPhotons, 20_000, 16).with(|s| {
+            s.estimate.neighbors = 100;
+            s.photons.max_bounces = 2;
+            s.photons.max_paths = Some(20_000_000);
+        });
         mean(&render_scene(&scene, &settings))
     };
     // Paraxial optics on the axis: a ray that meets the glass at height h is inclined by h/R · (1 − 1/n) − h/(g n)
@@ -141,7 +140,7 @@ fn an_air_bubble_is_a_closed_surface_of_ior_one() {
         scene.spheres.push(sphere(vec3(0.0, 3.0, 0.0), 1.5, 3));
         scene.lights.push(point_light(vec3(0.0, 0.5, 0.0), 1.0));
         scene.cameras.push(camera(vec3(0.4, 8.0, 0.001), vec3(0.4, 0.0, 0.0), 1.0));
-        let settings = Settings { spp: 16, ..settings(Mode::DirectRays, 1000, 8) };
+        let settings = settings(Mode::DirectRays, 1000, 8).with(|s| s.picture.spp = 16);
         mean(&render_scene(&scene, &settings))
     };
     // A bubble spreads the view away from the axis, a ball of the slab's own index leaves it: both see white, farther

@@ -11,7 +11,7 @@ use std::{
 use caustica::{
     Error,
     scene::{Environment, Scene},
-    settings::{Mode, Settings},
+    settings::Mode,
 };
 use serde_json::Value;
 
@@ -76,7 +76,7 @@ fn load(path: &Path) -> Result<Scene, String> {
 /// Renders in this process; says what is wrong with the picture.
 fn render(path: &Path) -> Result<(), String> {
     let scene = load(path)?;
-    let settings = Settings { neighbors: 10, ..support::settings(Mode::Hybrid, 500, 16) };
+    let settings = support::settings(Mode::Hybrid, 500, 16).with(|s| s.estimate.neighbors = 10);
     let silent = caustica::progress::Silent;
     let render = caustica::renderer::render(support::gpu(), &scene, &settings, &silent).map_err(|e| e.to_string())?;
     let pixels = render.frame.radiance.as_flattened();

@@ -95,7 +95,7 @@ fn room() -> Scene {
 }
 
 fn quick(mode: Mode) -> Settings {
-    Settings { neighbors: 30, ..settings(mode, 3000, 10) }
+    settings(mode, 3000, 10).with(|s| s.estimate.neighbors = 30)
 }
 
 #[test]
@@ -176,7 +176,7 @@ fn glass_on_a_floor_does_not_leak() {
             up: turn * view.up,
             ..view
         });
-        let render = render_scene(&scene, &Settings { max_paths: Some(60_000), ..quick(Mode::Photons) });
+        let render = render_scene(&scene, &quick(Mode::Photons).with(|s| s.photons.max_paths = Some(60_000)));
         assert!(is_finite(&render) && render.stats.non_finite == NonFinite::default());
         let least = render.frame.radiance.iter().map(|p| p[0]).fold(f32::INFINITY, f32::min);
         f64::from(least) / mean(&render).max(1e-9)
@@ -211,7 +211,7 @@ fn lights_on_surfaces_and_along_walls_are_harmless() {
         let kind = light.kind;
         scene.lights = vec![Light { position: turn * light.position, direction: turn * light.direction, ..light }];
         for mode in [Mode::DirectRays, Mode::Photons] {
-            let render = render_scene(&scene, &Settings { raw_estimate: true, ..quick(mode) });
+            let render = render_scene(&scene, &quick(mode).with(|s| s.estimate.raw = true));
             assert!(is_finite(&render) && render.stats.non_finite == NonFinite::default(), "{kind:?} in {mode:?}");
             let most = render.frame.radiance.iter().map(|p| f64::from(p[0])).fold(0.0, f64::max);
             // Photons that a light leaves where it stands would be a spot without end.
@@ -235,7 +235,7 @@ fn scaled(factor: f32, light: f32) -> Scene {
 
 #[test]
 fn size_does_not_matter() {
-    let raw = Settings { raw_estimate: true, ..quick(Mode::Hybrid) };
+    let raw = quick(Mode::Hybrid).with(|s| s.estimate.raw = true);
     let one = render_scene(&room(), &raw).frame.radiance;
     for exponent in [-7, 13] {
         let factor = 2.0_f32.powi(exponent);

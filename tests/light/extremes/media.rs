@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use caustica::{
     bvh::Bvh,
-    passes::SceneBuffers,
     scene::{Environment, Material, Scene, Surface},
     settings::{Mode, Settings},
+    upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
 
@@ -76,8 +76,10 @@ fn a_light_in_nested_glass_sends_out_what_is_not_trapped() {
         let mut scene = ball_in_shell(WATER);
         add_box(&mut scene, Vec3::splat(-3.0), Vec3::splat(3.0), 2);
         scene.lights.push(point_light(vec3(aside, 0.0, 0.0), 1.0));
-        let settings =
-            Settings { max_bounces: 40, max_paths: Some(20_000), ..settings(Mode::IndirectPhotons, 20_000, 8) };
+        let settings = settings(Mode::IndirectPhotons, 20_000, 8).with(|s| {
+            s.photons.max_bounces = 40;
+            s.photons.max_paths = Some(20_000);
+        });
         let traced = traced(&scene, &settings);
         assert_eq!((traced.non_finite, traced.unfinished), (0, 0));
         flux(&traced.caustic)
@@ -121,8 +123,9 @@ fn what_lies_in_the_same_glass_is_lit_by_rays_and_photons_alike() {
     add_quad(&mut scene, vec3(-0.8, -0.5, 0.8), vec3(1.6, 0.0, 0.0), vec3(0.0, 0.0, -1.6), 0);
     scene.lights.push(point_light(vec3(0.0, 0.3, 0.0), 1.0));
     scene.cameras.push(camera(vec3(0.0, 0.6, 0.001), vec3(0.0, -0.5, 0.0), 30.0));
-    let of =
-        |scene: &Scene, mode| mean(&render_scene(scene, &Settings { max_bounces: 12, ..settings(mode, 10_000, 6) }));
+    let of = |scene: &Scene, mode| {
+        mean(&render_scene(scene, &settings(mode, 10_000, 6).with(|s| s.photons.max_bounces = 12)))
+    };
     let (hybrid, photons) = (of(&scene, Mode::Hybrid), of(&scene, Mode::Photons));
     assert!(within(photons, hybrid, 0.05), "{photons} by photons, {hybrid} with rays");
     scene.lights[0].intensity *= 0.5;
@@ -141,7 +144,7 @@ fn rays_of_final_gathering_start_in_what_is_around_them() {
     scene.lights.push(point_light(vec3(1.5, 0.0, 0.0), 10.0));
     scene.cameras.push(camera(vec3(0.0, 0.4, 0.001), vec3(0.0, -0.4, 0.0), 40.0));
     let of = |scene: &Scene, final_gather: u32| {
-        let settings = Settings { final_gather, ..settings(Mode::IndirectPhotons, 20_000, 6) };
+        let settings = settings(Mode::IndirectPhotons, 20_000, 6).with(|s| s.photons.final_gather = final_gather);
         mean(&render_scene(scene, &settings))
     };
     let (estimated, gathered) = (of(&scene, 0), of(&scene, 32));

@@ -24,11 +24,12 @@ mod numbers;
 
 use caustica::{
     bvh::Bvh,
-    passes::{PhotonTracer, RawMap, SceneBuffers, TracedPhotons},
+    passes::{PhotonTracer, RawMap, TracedPhotons},
     progress::Silent,
     renderer::Render,
     scene::Scene,
     settings::Settings,
+    upload::SceneBuffers,
 };
 use support::gpu;
 

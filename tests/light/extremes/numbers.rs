@@ -3,7 +3,7 @@
 use caustica::{
     renderer::Render,
     scene::{Scene, Surface},
-    settings::{Mode, Settings},
+    settings::Mode,
     stats::NonFinite,
 };
 use glam::{Vec3, vec3};
@@ -25,7 +25,11 @@ fn room(intensity: f32, radiance: f32) -> Scene {
 }
 
 fn picture(scene: &Scene, seed: u32) -> Render {
-    let settings = Settings { seed, light_samples: 1, neighbors: 30, ..settings(Mode::Hybrid, 3000, 8) };
+    let settings = settings(Mode::Hybrid, 3000, 8).with(|s| {
+        s.photons.seed = seed;
+        s.picture.light_samples = 1;
+        s.estimate.neighbors = 30;
+    });
     render_scene(scene, &settings)
 }
 
@@ -77,7 +81,10 @@ fn black_and_white_rooms_end() {
     // Nothing is absorbed: each bounce stores all of the power, and the bounce limit takes it in the end.
     let power = 4.0 * std::f64::consts::PI;
     let limited = |albedo: f32, max_bounces: u32, max_paths: u64| {
-        let settings = Settings { max_bounces, max_paths: Some(max_paths), ..settings(Mode::Photons, 100_000, 8) };
+        let settings = settings(Mode::Photons, 100_000, 8).with(|s| {
+            s.photons.max_bounces = max_bounces;
+            s.photons.max_paths = Some(max_paths);
+        });
         traced(&closed_box(albedo), &settings)
     };
     let white = limited(1.0, 30, 1000);

@@ -10,7 +10,7 @@ use caustica::{
     layout::Photon,
     renderer::Render,
     scene::{Environment, Light, LightKind, Material, Scene, Surface},
-    settings::{Emission, Mode, Settings},
+    settings::{Emission, Mode},
     stats::Stats,
 };
 use glam::{Vec3, vec3};
@@ -77,12 +77,11 @@ fn lit_balls() -> Vec<(&'static str, Scene)> {
 
 /// Flux of the caustic map in all, and by which side of the floor it lies on, left and right; W, each with its variance.
 fn caustic_flux(scene: &Scene, emission: Emission) -> [(f64, f64); 3] {
-    let settings = Settings {
-        emission,
-        caustic_photons: 100_000,
-        max_paths: Some(150_000),
-        ..settings(Mode::DirectPhotons, 1, 1)
-    };
+    let settings = settings(Mode::DirectPhotons, 1, 1).with(|s| {
+        s.photons.emission = emission;
+        s.photons.caustic = 100_000;
+        s.photons.max_paths = Some(150_000);
+    });
     let map = traced(scene, &settings).caustic;
     let photons: Vec<Photon> = map.read(gpu()).expect("photons read back");
     let part = |wanted: &dyn Fn(f32) -> bool| {
@@ -137,7 +136,10 @@ fn aimed_paths_make_the_picture_of_unaimed_ones() {
     scene.lights.push(point_light(vec3(0.7, 1.7, 0.6), 4.0));
     scene.cameras.push(camera(vec3(0.0, 1.4, 2.9), vec3(0.0, 0.2, 0.0), 40.0));
     let picture = |emission, mode| {
-        let settings = Settings { emission, neighbors: 50, ..settings(mode, 100_000, 32) };
+        let settings = settings(mode, 100_000, 32).with(|s| {
+            s.photons.emission = emission;
+            s.estimate.neighbors = 50;
+        });
         let render = render_scene(&scene, &settings);
         (reds(&render), render.stats)
     };

@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 
 use caustica::{
     scene::{Environment, Light, LightKind, Scene, Surface},
-    settings::{Mode, Settings},
+    settings::Mode,
 };
 use glam::{Vec3, vec3};
 
@@ -26,7 +26,7 @@ use super::{direct_flux, floor, spot};
 fn irradiance_at(scene: &Scene, eye: Vec3, target: Vec3, light_samples: u32) -> f64 {
     let mut scene = scene.clone();
     scene.cameras = vec![camera(eye, target, 0.02)];
-    let settings = Settings { light_samples, ..settings(Mode::DirectRays, 1, 16) };
+    let settings = settings(Mode::DirectRays, 1, 16).with(|s| s.picture.light_samples = light_samples);
     mean(&render_scene(&scene, &settings)) * PI / 0.5
 }
 
@@ -188,8 +188,11 @@ fn balls_vanish_in_a_furnace() {
         scene.spheres.push(sphere(vec3(0.6, 0.0, 0.0), 0.6, 0));
         scene.environment = Some(Environment::uniform(Vec3::ONE));
         scene.cameras.push(camera(vec3(0.0, 0.0, 6.0), Vec3::ZERO, 25.0));
-        let settings =
-            Settings { max_bounces: 60, neighbors: 50, max_paths: Some(300_000), ..settings(mode, 60_000, 32) };
+        let settings = settings(mode, 60_000, 32).with(|s| {
+            s.photons.max_bounces = 60;
+            s.estimate.neighbors = 50;
+            s.photons.max_paths = Some(300_000);
+        });
         let render = render_scene(&scene, &settings);
         assert!(render.frame.alpha.contains(&0.0), "the furnace itself has no coverage");
         render
@@ -264,7 +267,7 @@ fn a_bright_pixel_lights_and_is_seen_where_it_is() {
     let center = vec3(-0.1, 0.63, -0.7);
     scene.cameras = vec![camera(vec3(0.0, 50.0, 0.0), vec3(0.0, 50.0, 0.0) + center, 90.0)];
     scene.cameras[0].aspect = None;
-    let settings = Settings { size: Some((48, 48)), ..settings(Mode::DirectRays, 1, 1) };
+    let settings = settings(Mode::DirectRays, 1, 1).with(|s| s.picture.size = Some((48, 48)));
     let seen = render_scene(&scene, &settings).frame;
     let eye = &scene.cameras[0];
     let expected = |map: &Environment, i: usize| {

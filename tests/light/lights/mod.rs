@@ -7,10 +7,11 @@ mod photons;
 use caustica::{
     bvh::Bvh,
     layout::Photon,
-    passes::{PhotonTracer, SceneBuffers, TracedPhotons},
+    passes::{PhotonTracer, TracedPhotons},
     progress::Silent,
     scene::{Light, LightKind, Scene},
     settings::{Mode, Settings},
+    upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
 use support::*;

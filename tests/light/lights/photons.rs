@@ -15,7 +15,7 @@ use caustica::{
     progress::Silent,
     renderer::{Render, render},
     scene::{Environment, Light, LightKind, Material, Scene, Surface, Triangle},
-    settings::{LightSampling, Mode, Settings},
+    settings::{LightSampling, Mode},
 };
 use glam::{Vec3, vec3};
 
@@ -77,8 +77,12 @@ fn lit_yards() -> Vec<(&'static str, Scene)> {
 fn photons_agree_with_rays_under_every_kind_of_light() {
     for (name, scene) in lit_yards() {
         let picture = |mode, max_bounces| {
-            let settings = Settings { neighbors: 25, light_samples: 8, max_bounces, ..settings(mode, 80_000, 32) };
-            mean(&render_scene(&scene, &Settings { max_paths: Some(300_000), ..settings }))
+            let settings = settings(mode, 80_000, 32).with(|s| {
+                s.estimate.neighbors = 25;
+                s.picture.light_samples = 8;
+                s.photons.max_bounces = max_bounces;
+            });
+            mean(&render_scene(&scene, &settings.clone().with(|s| s.photons.max_paths = Some(300_000))))
         };
         let (rays, photons) = (picture(Mode::Hybrid, 0), picture(Mode::Photons, 0));
         eprintln!("{name:24} {rays} {photons} {:+.4}", photons / rays - 1.0);
@@ -139,7 +143,7 @@ fn ten_thousand_emissive_triangles_light_as_the_ball_they_make() {
         many.cameras.push(camera(vec3(1.0, 0.5, 0.3), vec3(1.0, 0.0, 0.2), 0.1));
         many
     };
-    let settings = Settings { light_samples: 64, ..settings(Mode::DirectRays, 1, 16) };
+    let settings = settings(Mode::DirectRays, 1, 16).with(|s| s.picture.light_samples = 64);
     let measured = |radius| mean(&render_scene(&under(radius), &settings)) * PI / 0.5;
     let d2 = 1.0_f64 + 4.0 + 0.04;
     let right = PI * 2.0 * 0.64 / d2 * 2.0 / d2.sqrt();
@@ -167,8 +171,11 @@ fn photons_go_to_lights_as_asked() {
     scene.cameras.push(camera(Vec3::ZERO, Vec3::Y, 50.0));
     let run = |light_sampling, weights: &[(&str, f64)]| {
         let light_photons = weights.iter().map(|(name, weight)| ((*name).to_owned(), *weight)).collect();
-        let settings =
-            Settings { light_sampling, light_photons, neighbors: 10, ..settings(Mode::DirectPhotons, 40_000, 8) };
+        let settings = settings(Mode::DirectPhotons, 40_000, 8).with(|s| {
+            s.lights.sampling = light_sampling;
+            s.lights.photon_weights = light_photons;
+            s.estimate.neighbors = 10;
+        });
         render(gpu(), &scene, &settings, &Silent)
     };
     let stats = run(LightSampling::Power, &[]).expect("the scene renders").stats.photons;
@@ -200,7 +207,7 @@ fn photons_go_to_lights_as_asked() {
         let mut pair = scene.clone();
         pair.lights = [(apart, 1.0), (-apart, 0.1)].map(|(at, intensity)| point_light(at, intensity)).into();
         pair.triangles.clear();
-        let in_turn = Settings { light_sampling: LightSampling::Uniform, ..settings(Mode::DirectPhotons, 40_000, 8) };
+        let in_turn = settings(Mode::DirectPhotons, 40_000, 8).with(|s| s.lights.sampling = LightSampling::Uniform);
         let map = traced(&pair, &in_turn).global;
         let photons = map.read(gpu()).expect("photons read back");
         [0, 1, 2].map(|axis| flux(photons.iter().filter(|p| p.position[axis] > 0.0), map.emitted))

@@ -101,14 +101,13 @@ pub fn add_box(scene: &mut Scene, min: Vec3, max: Vec3, material: u32) {
 
 /// Small, quick settings.
 pub fn settings(mode: Mode, photons: u32, size: u32) -> Settings {
-    Settings {
-        mode,
-        global_photons: photons,
-        caustic_photons: photons,
-        size: Some((size, size)),
-        spp: 1,
-        ..Settings::default()
-    }
+    Settings::default().with(|s| {
+        s.photons.mode = mode;
+        s.photons.global = photons;
+        s.photons.caustic = photons;
+        s.picture.size = Some((size, size));
+        s.picture.spp = 1;
+    })
 }
 
 pub fn render_scene(scene: &Scene, settings: &Settings) -> Render {

@@ -3,9 +3,9 @@
 use caustica::{
     bvh::Bvh,
     layout::{CameraTile, Counters, FirstHit, Path, VisiblePoint},
-    passes::SceneBuffers,
     scene::Scene,
     settings::Settings,
+    upload::SceneBuffers,
 };
 use glam::Vec3;
 

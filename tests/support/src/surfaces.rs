@@ -6,12 +6,12 @@ use caustica::{
     gpu::Gpu,
     layout::VisiblePoint,
     passes::{
-        Gather, GatherOptions, GatherSettings, MapKernels, PhotonMap, PhotonTracer, SceneBuffers,
-        gather::gathered_buffer,
+        Gather, GatherOptions, GatherSettings, MapKernels, PhotonMap, PhotonTracer, estimate::gather::gathered_buffer,
     },
     progress::Silent,
     scene::{Camera, Light, LightKind, Material, Projection, Scene, Sphere, Surface, Triangle},
     settings::{Mode, Settings},
+    upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
 
@@ -57,14 +57,13 @@ pub fn places(count: usize) -> Vec<Place> {
 pub fn estimates(gpu: &Gpu, place: &Place, seeds: u32) -> [Vec<f64>; 4] {
     let mut sums = ways().map(|_| vec![0.0; place.points.len()]);
     for seed in 0..seeds {
-        let settings = Settings {
-            mode: Mode::Photons,
-            global_photons: place.photons,
-            max_bounces: 1,
-            neighbors: place.neighbors,
-            seed,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|s| {
+            s.photons.mode = Mode::Photons;
+            s.photons.global = place.photons;
+            s.photons.max_bounces = 1;
+            s.estimate.neighbors = place.neighbors;
+            s.photons.seed = seed;
+        });
         let buffers = SceneBuffers::new(gpu, &place.scene, &Bvh::build(&place.scene), &settings).expect("it fits");
         let tracer = PhotonTracer::new(gpu, &buffers);
         let traced = tracer.trace(gpu, &buffers, &settings, false, &Silent).expect("photons").global;
@@ -76,7 +75,7 @@ pub fn estimates(gpu: &Gpu, place: &Place, seeds: u32) -> [Vec<f64>; 4] {
             let mut gather = Gather::over(gpu, &buffers, options);
             let gathered = gathered_buffer(gpu, count).expect("it fits");
             let radiance = gpu.storage::<[f32; 4]>("radiance", count.into()).expect("it fits");
-            let asked = GatherSettings::from(&settings);
+            let asked = GatherSettings::from(&settings.estimate);
             gather.run(gpu, &map, &points, count, &asked, (&radiance, &gathered), &Silent).expect("a gather");
             let found: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into()).expect("results");
             sums.iter_mut().zip(found).for_each(|(sum, r)| *sum += f64::from(r[0]) / f64::from(seeds));

@@ -1,0 +1,228 @@
+//! The grid on the device against the kd-tree on the CPU: one set of photons, every visible point gathered by both.
+//!
+//! Both sides get the same photons, visible points and settings in the same single precision. They may differ in what
+//! rounding decides: where the last photon of an estimate and the next one are tied (their squared distances differ by
+//! at most [`TIE`]), either may be summed. Such queries are counted, may differ in tied photons only, and do not enter
+//! the differences of radius and radiance. Both make the report's raw estimate, whatever [`Settings::raw_estimate`] says.
+
+mod measure;
+mod page;
+mod pictures;
+mod report;
+mod sides;
+
+use std::path::Path;
+
+pub use report::{GridSide, KdTreeSide, Neighbors, RelativeDifference, Report, Row};
+
+pub use crate::reference::TIE;
+use crate::{
+    error::{Error, Result},
+    gpu::Gpu,
+    image::{Frame, Origin, Tonemap, write_exr, write_file, write_png},
+    layout::VisiblePoint,
+    passes::Tile,
+    progress::{Progress, Stage},
+    renderer::{CameraPass, Session},
+    scene::Scene,
+    settings::{Search, Settings},
+    stats::Stats,
+};
+use measure::{Histogram, Measure};
+use sides::{GridGather, KdTreeGather};
+
+/// Default of [`Options::tolerance`].
+pub const TOLERANCE: f64 = 1e-4;
+
+/// What a comparison allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Largest relative difference of a channel's radiance, and of the radius, at any query without a tie; ≥ 0.
+    pub tolerance: f64,
+    /// Photons that the kd-tree leaves out, for tests of the comparison itself: it must then fail.
+    pub sabotage: u32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { tolerance: TOLERANCE, sabotage: 0 }
+    }
+}
+
+/// A finished comparison.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    pub report: Report,
+    /// The picture by the grid.
+    pub grid: Frame,
+    /// The picture by the kd-tree; all but the radiance is that of the grid's.
+    pub kdtree: Frame,
+    pub stats: Stats,
+    tolerance: f64,
+    /// Queries that differ in more than tied photons.
+    different: u64,
+    histogram: Histogram,
+}
+
+/// Names of the files that [`Comparison::write`] leaves in its folder.
+pub const FILES: [&str; 8] = [
+    "grid.exr",
+    "kdtree.exr",
+    "difference.exr",
+    "grid.png",
+    "kdtree.png",
+    "difference.png",
+    "report.json",
+    "report.html",
+];
+
+/// Traces the photons once and gathers every visible point of the picture by both searches.
+///
+/// # Errors
+/// As [`crate::renderer::render`]; also if the settings' mode has no photons, or `tolerance` is no number ≥ 0.
+pub fn compare(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &Settings,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<Comparison> {
+    check(settings, options)?;
+    let session = Session::open(gpu, scene, settings, progress)?;
+    let maps = session.photon_maps(settings, progress)?;
+    let mut stats = maps.stats().clone();
+    let pass = CameraPass::new(&session, settings)?;
+    let mut sides = Sides {
+        grid: GridGather::new(gpu, maps.maps())?,
+        kdtree: KdTreeGather::new(gpu, maps.maps(), settings)?,
+        measure: Measure::default(),
+    };
+    let (mut grid, mut kdtree) = (pass.film(), pass.film());
+    let mut sabotage = options.sabotage;
+    let tiles = pass.tracer.tiles();
+    for (done, tile) in tiles.iter().enumerate() {
+        progress.check()?;
+        progress.report(Stage::Compare, done as u64, tiles.len() as u64);
+        pass.trace(tile, &mut stats)?;
+        let points = pass.points(tile)?;
+        sabotage -= sides.kdtree.leave_out(sabotage, &points);
+        let [grid_radiance, kdtree_radiance] = sides.gather(&pass, tile, &points, progress)?;
+        pass.set_radiance(&grid_radiance);
+        pass.resolve(tile, &mut grid)?;
+        pass.set_radiance(&kdtree_radiance);
+        pass.resolve(tile, &mut kdtree)?;
+    }
+    progress.report(Stage::Compare, tiles.len() as u64, tiles.len() as u64);
+    let Sides { grid: grid_side, kdtree: kdtree_side, measure } = sides;
+    stats.seconds.gather = grid_side.seconds + kdtree_side.seconds;
+    session.close(&mut stats);
+    Ok(Comparison {
+        report: Report::new(&measure, &grid_side, &kdtree_side, &stats),
+        grid: grid.finish(settings.picture.spp),
+        kdtree: kdtree.finish(settings.picture.spp),
+        stats,
+        tolerance: options.tolerance,
+        different: measure.different,
+        histogram: measure.histogram,
+    })
+}
+
+/// Both sides and what is counted of them.
+struct Sides<'a> {
+    grid: GridGather<'a>,
+    kdtree: KdTreeGather<'a>,
+    measure: Measure,
+}
+
+impl Sides<'_> {
+    /// Gathers the tile's points over all maps by both; the radiance of the points by the grid and by the kd-tree, on top of
+    /// what they have.
+    fn gather(
+        &mut self,
+        pass: &CameraPass,
+        tile: &Tile,
+        points: &[VisiblePoint],
+        progress: &dyn Progress,
+    ) -> Result<[Vec<[f32; 4]>; 2]> {
+        let mut by_grid = pass.radiance(tile)?;
+        let mut by_kdtree = by_grid.clone();
+        for map in 0..self.grid.maps.len() {
+            let ours = self.grid.gather(map, pass, tile, progress)?;
+            let theirs = self.kdtree.gather(map, points, progress)?;
+            self.measure
+                .add(points, &ours, &theirs, |i, gathered| self.kdtree.explains(map, &points[i], &theirs[i], gathered));
+            for i in 0..points.len() {
+                for c in 0..3 {
+                    by_grid[i][c] += ours.radiance[i][c];
+                    by_kdtree[i][c] += theirs[i].radiance[c] as f32;
+                }
+            }
+        }
+        Ok([by_grid, by_kdtree])
+    }
+}
+
+fn check(settings: &Settings, options: &Options) -> Result<()> {
+    let fail = |name, value: String, problem: &str| Err(Error::Setting { name, value, problem: problem.to_string() });
+    if !settings.photons.mode.traces_photons() {
+        return fail("mode", settings.photons.mode.name().to_string(), "has no photons to compare");
+    }
+    if settings.photons.final_gather > 0 {
+        return fail("final-gather", settings.photons.final_gather.to_string(), "is not compared");
+    }
+    if settings.estimate.search == Search::Radius {
+        return fail("search", "radius".to_string(), "has no nearest photons to compare");
+    }
+    if !(options.tolerance >= 0.0 && options.tolerance.is_finite()) {
+        return fail("tolerance", options.tolerance.to_string(), "must be at least 0");
+    }
+    Ok(())
+}
+
+impl Comparison {
+    /// Whether both sides agree, or in one line how they do not.
+    ///
+    /// # Errors
+    /// [`Error::Differs`] if a query differs in photons that are not tied, a difference exceeds the tolerance, or there
+    /// was no query.
+    pub fn verdict(&self) -> Result<()> {
+        let report = &self.report;
+        let beyond = |what: &str, found: f64| {
+            Some(format!("the {what} differs by up to {found:.3e}, more than the tolerance {:.3e}", self.tolerance))
+                .filter(|_| found > self.tolerance || found.is_nan())
+        };
+        let queries = report.queries;
+        let problem = if queries == 0 {
+            Some("no query: there is no photon or no visible diffuse surface".to_string())
+        } else if self.different > 0 {
+            let different = self.different;
+            Some(format!("{different} of {queries} queries differ in their photons, by more than what is tied"))
+        } else {
+            beyond("radiance", report.radiance.max_relative_difference)
+                .or_else(|| beyond("radius", report.radius.max_relative_difference))
+        };
+        problem.map_or(Ok(()), |problem| Err(Error::Differs(format!("grid and kd-tree differ: {problem}"))))
+    }
+
+    /// Writes [`FILES`] to the folder, each whole or not at all: both pictures and their difference (grid minus kd-tree)
+    /// as EXR; as PNG both with `exposure` and `tonemap`, and the relative difference in false colours; the report as
+    /// JSON and as a page that needs no other file.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(&self, folder: &Path, origin: &Origin, exposure: f32, tonemap: Tonemap) -> Result<()> {
+        let place = |name: &str| folder.join(name);
+        write_exr(&place("grid.exr"), &self.grid, origin)?;
+        write_exr(&place("kdtree.exr"), &self.kdtree, origin)?;
+        write_exr(&place("difference.exr"), &pictures::difference(&self.grid, &self.kdtree), origin)?;
+        write_png(&place("grid.png"), &self.grid, exposure, tonemap)?;
+        write_png(&place("kdtree.png"), &self.kdtree, exposure, tonemap)?;
+        let difference = pictures::false_colors(&self.grid, &self.kdtree)?;
+        write_file(&place("difference.png"), &difference)?;
+        let mut json = serde_json::to_string_pretty(&self.report).expect("a report holds nothing that JSON cannot");
+        json.push('\n');
+        write_file(&place("report.json"), json.as_bytes())?;
+        let page = page::page(self, origin, exposure, tonemap, &difference)?;
+        write_file(&place("report.html"), page.as_bytes())
+    }
+}

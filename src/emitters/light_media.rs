@@ -1,0 +1,34 @@
+//! The media that a light's paths start in.
+
+use glam::{DVec3, Vec3};
+
+use crate::{
+    bvh::{MediaProbe, packed},
+    layout::{self, Light},
+};
+
+/// Off a surface, as a fraction of its largest coordinate: `OFFSET_SCALE` of `shaders/lib/transport/surface.wesl`.
+const OFFSET_SCALE: f64 = 1.907_348_6e-6;
+
+/// Notes the media around a light; false if there are more than a path keeps, of which the outermost count. One place of a surface speaks for all of it, just off each side: the middle of a triangle,
+/// a point of a sphere.
+pub fn set_media(light: &mut Light, probe: &MediaProbe) -> bool {
+    let [position, e1, e2] = [light.position, light.e1, light.e2].map(|v| Vec3::from_array(v).as_dvec3());
+    let (place, normal, reach) = match light.kind {
+        layout::POINT_LIGHT | layout::SPOT_LIGHT => (position, DVec3::ZERO, 0.0),
+        layout::TRIANGLE_LIGHT => {
+            let reach = position.abs().max(e1.abs()).max(e2.abs()).max_element();
+            (position + (e1 + e2) / 3.0, e1.cross(e2).normalize_or_zero(), reach)
+        }
+        layout::SPHERE_LIGHT => {
+            let outward = DVec3::ONE.normalize();
+            (position + e1.x * outward, outward, position.abs().max_element() + e1.x)
+        }
+        // What comes from infinitely far away starts outside of all.
+        _ => return true,
+    };
+    let at = |side: f64| packed(&probe.at(place + side * reach * OFFSET_SCALE * normal));
+    let ((front, front_fits), (back, back_fits)) = (at(1.0), at(-1.0));
+    (light.media, light.back_media) = (front, back);
+    front_fits && back_fits
+}

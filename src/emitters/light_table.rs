@@ -1,0 +1,280 @@
+//! All that shines in a scene, as one list for the device, and the tables by which passes choose from it.
+//!
+//! Lights without extent come first, then emissive triangles and spheres, material by material, then the environment. What
+//! a user calls one light is a group: a light without extent, all that shines by one material, the environment.
+
+use std::{
+    collections::BTreeMap,
+    f64::consts::{PI, TAU},
+};
+
+use glam::{DVec3, Vec3};
+
+use super::{
+    cumulative::{MAX_CHOICES, cumulative, probabilities},
+    environment_map::EnvironmentMap,
+    targets::Target,
+};
+use crate::{
+    error::{Error, Result},
+    layout::{self, LightChoice},
+    scene::{LEAST_FALLOFF, LUMENS_PER_WATT, LightKind, Scene},
+    settings::{LightSampling, LightSettings, LightUnit},
+};
+
+/// What a user calls one light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightGroup {
+    pub name: String,
+    /// `point`, `spot`, `directional`, `surface` or `environment`.
+    pub kind: &'static str,
+    /// W in each channel; of directional lights and environments what the sphere around the scene catches.
+    pub power: DVec3,
+}
+
+/// The lights of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct LightTable {
+    /// Sorted by group.
+    pub lights: Vec<layout::Light>,
+    pub groups: Vec<LightGroup>,
+    /// How many of the lights have no extent: the first ones.
+    pub punctual: usize,
+    /// Power of each light, W, mean of the channels.
+    powers: Vec<f64>,
+    /// The light that a primitive of the scene is, by its index there.
+    emitters: BTreeMap<u32, u32>,
+}
+
+/// A table by which lights are chosen.
+#[derive(Clone, Debug, Default)]
+pub struct Choices {
+    pub entries: Vec<LightChoice>,
+    /// Parts into which the numbers that choose are cut, dealt to the paths in turn; 0 if no light can be chosen.
+    pub turns: u32,
+}
+
+impl LightTable {
+    /// # Errors
+    /// [`Error::Scene`] if more triangles shine than a table can hold; [`Error::Setting`] if `light_photons` names no light.
+    pub fn new(
+        scene: &Scene,
+        environment: Option<&EnvironmentMap>,
+        around: &Target,
+        settings: &LightSettings,
+    ) -> Result<Self> {
+        let mut table = Self::default();
+        for light in &scene.lights {
+            table.add_punctual(light, around.radius, settings.unit);
+        }
+        table.punctual = table.lights.len();
+        table.add_surfaces(scene, settings.unit);
+        if let (Some(environment), Some(map)) = (&scene.environment, environment) {
+            let power = DVec3::from(map.integral) * PI * f64::from(around.radius).powi(2);
+            table.start_group(&environment.name, "environment");
+            let light = layout::Light { kind: layout::ENVIRONMENT_LIGHT, area: 1.0, ..Default::default() };
+            table.add(layout::Light { emission: [1.0; 3], ..light }, power);
+        }
+        if table.lights.len() > MAX_CHOICES {
+            let problem = format!("{} lights and emissive triangles; at most {MAX_CHOICES}", table.lights.len());
+            return Err(Error::Scene { path: scene.path.clone(), place: "materials".to_owned(), problem });
+        }
+        table.check_names(settings)?;
+        Ok(table)
+    }
+
+    /// Index, plus one, of the light that a primitive of the scene is; 0 if it does not shine.
+    #[must_use]
+    pub fn emitter(&self, primitive: u32) -> u32 {
+        self.emitters.get(&primitive).map_or(0, |light| light + 1)
+    }
+
+    /// Some primitive shines.
+    #[must_use]
+    pub fn has_surfaces(&self) -> bool {
+        !self.emitters.is_empty()
+    }
+
+    /// Some emitter has an extent, so that its direct light must be sampled.
+    #[must_use]
+    pub fn has_extent(&self) -> bool {
+        self.powers[self.punctual..].iter().any(|power| *power > 0.0)
+    }
+
+    /// Power of all lights, W, mean of the channels.
+    #[must_use]
+    pub fn power(&self) -> f64 {
+        self.powers.iter().sum()
+    }
+
+    /// For photon paths: by power, or every group alike, times the factors that the settings ask for.
+    #[must_use]
+    pub fn for_photons(&self, settings: &LightSettings) -> Choices {
+        self.choices(self.powers.clone(), settings)
+    }
+
+    /// For paths aimed at `targets`: as [`Self::for_photons`], of the power that goes towards them.
+    #[must_use]
+    pub fn for_aimed_photons(&self, targets: &[Target], around: &Target, settings: &LightSettings) -> Choices {
+        let aimed = |(light, power): (&layout::Light, &f64)| power * aimed_fraction(light, targets, around);
+        self.choices(self.lights.iter().zip(&self.powers).map(aimed).collect(), settings)
+    }
+
+    /// For direct light of what has an extent: by power.
+    #[must_use]
+    pub fn for_direct_light(&self) -> Choices {
+        let mut powers = self.powers.clone();
+        powers[..self.punctual].fill(0.0);
+        Choices { entries: entries(&powers), turns: 1 }
+    }
+
+    fn choices(&self, powers: Vec<f64>, settings: &LightSettings) -> Choices {
+        let mut of_groups = vec![0.0; self.groups.len()];
+        for (light, power) in self.lights.iter().zip(&powers) {
+            of_groups[light.group as usize] += power;
+        }
+        let shining = of_groups.iter().filter(|power| **power > 0.0).count() as u32;
+        let factor = |group: usize| -> f64 {
+            let asked = settings.photon_weights.iter().filter(|(name, _)| *name == self.groups[group].name);
+            let alike = if settings.sampling == LightSampling::Uniform { 1.0 / of_groups[group] } else { 1.0 };
+            asked.map(|(_, weight)| weight).product::<f64>() * alike
+        };
+        let factors: Vec<f64> = (0..self.groups.len()).map(factor).collect();
+        let weigh = |(light, power): (&layout::Light, f64)| {
+            if power > 0.0 { power * factors[light.group as usize] } else { 0.0 }
+        };
+        let weights: Vec<f64> = self.lights.iter().zip(powers).map(weigh).collect();
+        let turns = if settings.sampling == LightSampling::Uniform { shining } else { shining.min(1) };
+        Choices { entries: entries(&weights), turns }
+    }
+
+    fn start_group(&mut self, name: &str, kind: &'static str) {
+        self.groups.push(LightGroup { name: name.to_owned(), kind, power: DVec3::ZERO });
+    }
+
+    /// Adds a light to the last group.
+    fn add(&mut self, light: layout::Light, power: DVec3) {
+        let group = self.groups.len() - 1;
+        self.lights.push(layout::Light { group: group as u32, ..light });
+        self.powers.push(power.element_sum() / 3.0);
+        self.groups[group].power += power;
+    }
+
+    fn add_punctual(&mut self, light: &crate::scene::Light, radius: f32, unit: LightUnit) {
+        let emission = light.intensity_in(unit).to_array();
+        let (kind, name, e2) = match light.kind {
+            LightKind::Point => (layout::POINT_LIGHT, "point", Vec3::ZERO),
+            LightKind::Spot { inner, outer } => {
+                let height = 1.0 - f64::from(outer).cos();
+                let width = (f64::from(inner).cos() - f64::from(outer).cos()).max(f64::from(LEAST_FALLOFF));
+                (layout::SPOT_LIGHT, "spot", Vec3::new(height as f32, width as f32, 0.0))
+            }
+            LightKind::Directional => (layout::DIRECTIONAL_LIGHT, "directional", Vec3::ZERO),
+        };
+        self.start_group(&light.name, name);
+        let power = crate::scene::Light { intensity: light.intensity_in(unit), ..light.clone() }.power(radius);
+        let (position, e1) = (light.position.to_array(), light.direction.to_array());
+        let solid_angle = light.solid_angle();
+        let light = layout::Light { position, kind, e1, e2: e2.to_array(), ..Default::default() };
+        self.add(layout::Light { emission, area: 1.0, solid_angle, ..light }, power);
+    }
+
+    /// Emissive triangles and spheres, material by material.
+    fn add_surfaces(&mut self, scene: &Scene, unit: LightUnit) {
+        let mut of_materials = BTreeMap::<u32, Vec<usize>>::new();
+        let triangles = scene.triangles.iter().map(|t| t.material);
+        for (primitive, material) in triangles.chain(scene.spheres.iter().map(|s| s.material)).enumerate() {
+            if scene.materials[material as usize].emission.max_element() > 0.0 {
+                of_materials.entry(material).or_default().push(primitive);
+            }
+        }
+        for (material, primitives) in of_materials {
+            let material = &scene.materials[material as usize];
+            self.start_group(&material.name, "surface");
+            let emission = emission_in(material.emission, unit);
+            let solid_angle = if material.double_sided { TAU } else { PI };
+            for primitive in primitives {
+                let light = surface_light(scene, primitive);
+                // Without area nothing shines.
+                if light.area > 0.0 {
+                    self.emitters.insert(primitive as u32, self.lights.len() as u32);
+                    let power = emission.as_dvec3() * f64::from(light.area) * solid_angle;
+                    let emission = emission.to_array();
+                    self.add(layout::Light { emission, solid_angle: solid_angle as f32, ..light }, power);
+                }
+            }
+        }
+    }
+
+    fn check_names(&self, settings: &LightSettings) -> Result<()> {
+        let is_known = |name: &String| self.groups.iter().any(|group| group.name == *name);
+        let Some((name, weight)) = settings.photon_weights.iter().find(|(name, _)| !is_known(name)) else {
+            return Ok(());
+        };
+        let names: Vec<String> = self.groups.iter().map(|group| format!("{:?}", group.name)).collect();
+        let problem = format!("no light is called {name:?}; the scene has {}", names.join(", "));
+        Err(Error::Setting { name: "light-photons", value: format!("{name}={weight}"), problem })
+    }
+}
+
+/// A material's emission in the unit that the file's numbers are taken for.
+pub(crate) fn emission_in(emission: Vec3, unit: LightUnit) -> Vec3 {
+    match unit {
+        LightUnit::Radiometric => emission,
+        LightUnit::Photometric => emission / LUMENS_PER_WATT,
+    }
+}
+
+/// Shape of the triangle or sphere with that index in the scene, triangles first.
+fn surface_light(scene: &Scene, primitive: usize) -> layout::Light {
+    if let Some(triangle) = scene.triangles.get(primitive) {
+        let [a, b, c] = triangle.positions;
+        let area = 0.5 * (b - a).as_dvec3().cross((c - a).as_dvec3()).length();
+        let (e1, e2) = ((b - a).to_array(), (c - a).to_array());
+        let kind = layout::TRIANGLE_LIGHT;
+        return layout::Light { position: a.to_array(), kind, e1, e2, area: area as f32, ..Default::default() };
+    }
+    let sphere = &scene.spheres[primitive - scene.triangles.len()];
+    let (position, e1) = (sphere.center.to_array(), [sphere.radius, 0.0, 0.0]);
+    let area = 4.0 * PI * f64::from(sphere.radius).powi(2);
+    layout::Light { position, kind: layout::SPHERE_LIGHT, e1, area: area as f32, ..Default::default() }
+}
+
+/// About what part of a light's power goes towards the targets; above 0 if any can.
+fn aimed_fraction(light: &layout::Light, targets: &[Target], around: &Target) -> f64 {
+    let cross_sections = targets.iter().map(|t| (t.radius / around.radius).powi(2));
+    if matches!(light.kind, layout::DIRECTIONAL_LIGHT | layout::ENVIRONMENT_LIGHT) {
+        return f64::from(cross_sections.sum::<f32>()).min(1.0);
+    }
+    let [position, e1, e2] = [light.position, light.e1, light.e2].map(Vec3::from_array);
+    let (from, own) = match light.kind {
+        layout::TRIANGLE_LIGHT => (position + (e1 + e2) / 3.0, f64::from(light.solid_angle)),
+        layout::SPHERE_LIGHT => (position, 4.0 * PI),
+        _ => (position, f64::from(light.solid_angle)),
+    };
+    let seen = targets.iter().filter(|target| can_reach(light, target, from));
+    seen.map(|target| target.solid_angle(from).map_or(1.0, |angle| (angle / own).min(1.0))).sum::<f64>().min(1.0)
+}
+
+/// Whether light can go from there to the target at all.
+fn can_reach(light: &layout::Light, target: &Target, from: Vec3) -> bool {
+    let [axis, e2] = [light.e1, light.e2].map(Vec3::from_array);
+    let to = target.center - from;
+    let sine = f64::from(target.radius) / f64::from(to.length());
+    match light.kind {
+        layout::SPOT_LIGHT if sine < 1.0 => {
+            let outer = (1.0 - f64::from(e2.x)).clamp(-1.0, 1.0).acos();
+            f64::from(axis.dot(to.normalize())).clamp(-1.0, 1.0).acos() <= outer + sine.asin() + 1e-3
+        }
+        layout::TRIANGLE_LIGHT if f64::from(light.solid_angle) < 1.5 * PI => {
+            axis.cross(e2).normalize().dot(to) > -target.radius * 1.001
+        }
+        _ => true,
+    }
+}
+
+fn entries(weights: &[f64]) -> Vec<LightChoice> {
+    let table = cumulative(weights);
+    let chosen = probabilities(&table);
+    table.into_iter().zip(chosen).map(|(cdf, probability)| LightChoice { cdf, probability }).collect()
+}

@@ -1,0 +1,11 @@
+//! All that emits light, as one list and the tables that choose from it: punctual lights, emissive
+//! triangles and spheres, the environment. Host only; `upload` puts it on the device.
+
+mod cumulative;
+pub mod environment_map;
+mod light_media;
+pub mod light_table;
+pub mod targets;
+
+pub(crate) use light_media::set_media;
+pub use light_table::LightGroup;

@@ -1,0 +1,53 @@
+//! Light that reaches visible points straight from what shines: shadow rays to each light without extent, and samples of
+//! emissive surfaces and the environment.
+
+use crate::{
+    gpu::{Buffer, Commands, Gpu, Kernel},
+    layout::{DirectLight, EmitterSample},
+    upload::SceneBuffers,
+};
+
+/// Kernels of direct light.
+#[derive(Debug)]
+pub struct DirectLighting {
+    punctual: Kernel,
+    /// With the number of samples; `None` if nothing with an extent shines.
+    emitters: Option<(Kernel, u32)>,
+}
+
+impl DirectLighting {
+    /// Compiles what the scene's lights need; `samples` of each point for those with an extent.
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, samples: u32) -> Self {
+        let emitters = scene.lights.table.has_extent().then(|| (scene.kernel(gpu, "sample_emitters"), samples));
+        Self { punctual: scene.kernel(gpu, "light_directly"), emitters }
+    }
+
+    /// Dispatches that make up all of it.
+    pub fn steps(&self, scene: &SceneBuffers) -> u32 {
+        scene.lights.table.punctual as u32 + self.emitters.as_ref().map_or(0, |(_, samples)| *samples)
+    }
+
+    /// Adds the light of one step to the radiance of the points. `buffers` are `tile`, `points`, `radiance` and `counters`.
+    pub fn add(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        commands: &mut Commands,
+        (step, points): (u32, u32),
+        buffers: &[(&str, &Buffer)],
+    ) {
+        let table = &scene.lights.table;
+        let punctual = table.punctual as u32;
+        let Some(sample) = step.checked_sub(punctual) else {
+            let uniform = gpu.uniform("direct light", &DirectLight { light: step, points, ..Default::default() });
+            let bindings = self.punctual.bind(gpu, &[&scene.with(buffers)[..], &[("direct", &uniform)]].concat());
+            return self.punctual.dispatch(commands, &bindings, u64::from(points));
+        };
+        let Some((kernel, samples)) = &self.emitters else { return };
+        let (samples, light_count) = (*samples, table.lights.len() as u32);
+        let uniform = gpu.uniform("emitter sample", &EmitterSample { points, sample, samples, light_count });
+        let own = [("sampling", &uniform), ("choices", &scene.lights.direct.buffer)];
+        let bindings = kernel.bind(gpu, &[&scene.with(buffers)[..], &own].concat());
+        kernel.dispatch(commands, &bindings, u64::from(points));
+    }
+}

@@ -1,0 +1,75 @@
+//! Final gathering: light that visible points get from what rays of theirs see (Jensen 2001, "Realistic Image Synthesis Using
+//! Photon Mapping", section 8.2). Kernels: `start_final_gather`, `trace_camera`.
+
+use super::camera_tracer::{CameraTracer, StepCount, Tile};
+use crate::{
+    error::Result,
+    gpu::{Buffer, Gpu, Kernel},
+    layout::{CameraTile, FinalStep, VisiblePoint},
+    reference::mix,
+    upload::SceneBuffers,
+};
+
+/// Kernels, and room for what one ray of each visible point sees: memory does not grow with the rays.
+#[derive(Debug)]
+pub struct FinalGather {
+    start: Kernel,
+    trace: Kernel,
+    rays: u32,
+    /// A [`VisiblePoint`] per visible point of the camera, whose weight brings its light to the camera; some are not valid.
+    pub seen: Buffer,
+}
+
+impl FinalGather {
+    /// `rays` per visible point, at least 1.
+    ///
+    /// # Errors
+    /// Limits of the adapter.
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, tracer: &CameraTracer, rays: u32) -> Result<Self> {
+        Ok(Self {
+            start: scene.kernel(gpu, "start_final_gather"),
+            // What shines straight into a visible point is direct light, which it has already.
+            trace: scene.kernel_with(gpu, "trace_camera", &[("SEES_LIGHTS", 0.0)]),
+            rays,
+            seen: gpu.storage::<VisiblePoint>("points seen in final gathering", tracer.room())?,
+        })
+    }
+
+    /// Rays of each visible point.
+    #[must_use]
+    pub fn rays(&self) -> u32 {
+        self.rays
+    }
+
+    /// Sends the `ray`-th ray of each visible point of the tile on to the first diffuse surface.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn trace(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        tracer: &CameraTracer,
+        tile: &Tile,
+        ray: u32,
+    ) -> Result<StepCount> {
+        let view = tracer.tile_view(tile);
+        let points = tracer.point_count(tile);
+        let step = gpu.uniform("final step", &FinalStep { ray, rays: self.rays, points, pad: 0 });
+        let camera = gpu.uniform("camera tile", &view);
+        // Each visible point is a sample of its own, which follows glass one way by chance: another way with each ray.
+        let own = gpu.uniform(
+            "final gather tile",
+            &CameraTile {
+                seed: mix(view.seed ^ mix(ray.wrapping_add(1))),
+                branches: 1,
+                samples: view.samples * view.branches,
+                first_sample: view.first_sample * view.branches,
+                ..view
+            },
+        );
+        let started = [("tile", &camera), ("final_step", &step), ("points", &tracer.points), ("seen", &self.seen)];
+        let followed = [("tile", &own), ("points", &self.seen)];
+        tracer.follow(gpu, scene, (&self.start, &started, points), (&self.trace, &followed))
+    }
+}

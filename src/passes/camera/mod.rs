@@ -1,0 +1,8 @@
+//! Second pass: camera paths to visible points, direct light there, rays of final gathering.
+
+pub mod camera_tracer;
+mod direct_light;
+pub mod final_gather;
+
+pub use camera_tracer::{CameraKernels, CameraTracer, StepCount, Tile};
+pub use final_gather::FinalGather;

@@ -1,0 +1,8 @@
+//! The radiance estimate: the search for the nearest photons, their sum, and estimates that visible
+//! points share.
+
+pub mod gather;
+pub mod share_estimates;
+
+pub use gather::{Gather, GatherOptions, GatherSettings};
+pub use share_estimates::{Asked, EstimateSharing, SharedPoints};

@@ -1,0 +1,70 @@
+//! Builds the cells over sorted photons, finest level first. Kernel: `build_grid`.
+
+use crate::{
+    error::Result,
+    gpu::{Buffer, Gpu, Kernel},
+    layout::{CELL_FAN, CELL_PHOTONS, Cell, GridStep},
+};
+
+/// The compiled kernel.
+#[derive(Debug)]
+pub struct BuildGrid(Kernel);
+
+impl BuildGrid {
+    /// Compiles it.
+    #[must_use]
+    pub fn new(gpu: &Gpu) -> Self {
+        Self(Kernel::new(gpu, "build_grid", &[]))
+    }
+
+    /// The cells of `count` photons, which lie in windows of `window` each, and the number of levels.
+    pub(crate) fn build(&self, gpu: &Gpu, places: &[Buffer], window: u32, count: u32) -> Result<(Buffer, u32)> {
+        let sizes = level_sizes(count.div_ceil(CELL_PHOTONS));
+        let base = |level: usize| sizes.iter().skip(level + 1).sum::<u32>();
+        let cells = gpu.storage::<Cell>("cells", sizes.iter().map(|&n| u64::from(n)).sum())?;
+        let mut encoder = gpu.encoder();
+        for (level, &size) in sizes.iter().enumerate() {
+            // The finest level reads photons, window by window; the others read cells.
+            let windows = if level == 0 { places.len() } else { 1 };
+            let per_window = if level == 0 { window / CELL_PHOTONS } else { size };
+            for (place, w) in places[..windows].iter().zip(0..) {
+                let first_cell = w * per_window;
+                let finer = level.checked_sub(1);
+                let step = GridStep {
+                    photons: count,
+                    level: level as u32,
+                    base: base(level),
+                    finer_base: finer.map_or(0, base),
+                    finer_count: finer.map_or(0, |l| sizes[l]),
+                    first_cell,
+                    cell_count: per_window.min(size - first_cell),
+                    pad: 0,
+                };
+                let uniform = gpu.uniform("grid step", &step);
+                let buffers = [("places", place), ("grid_cells", &cells), ("grid_step", &uniform)];
+                self.0.dispatch(&mut encoder, &self.0.bind(gpu, &buffers), step.cell_count.into());
+            }
+        }
+        gpu.submit(encoder);
+        Ok((cells, sizes.len() as u32))
+    }
+}
+
+/// Cells of each level, finest first, up to a single one; none for no photons.
+fn level_sizes(finest: u32) -> Vec<u32> {
+    let coarser = |&n: &u32| (n > 1).then(|| n.div_ceil(CELL_FAN));
+    std::iter::successors((finest > 0).then_some(finest), coarser).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::level_sizes;
+
+    #[test]
+    fn levels_end_in_one_cell() {
+        assert!(level_sizes(0).is_empty());
+        assert_eq!(level_sizes(1), [1]);
+        assert_eq!(level_sizes(8), [8, 1]);
+        assert_eq!(level_sizes(9), [9, 2, 1]);
+    }
+}

@@ -1,0 +1,8 @@
+//! Photon maps: photons sorted along a Hilbert curve, and the grid of cells over them.
+
+pub mod build_grid;
+pub mod photon_map;
+pub mod radix_sort;
+pub mod sort_photons;
+
+pub use photon_map::{MapKernels, PhotonMap, PhotonStore};

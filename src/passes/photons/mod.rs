@@ -1,0 +1,8 @@
+//! First pass: photon paths from the lights, and the photons that they leave.
+
+mod photon_batch;
+pub mod photon_tracer;
+pub mod raw_map;
+
+pub use photon_tracer::{PhotonTracer, TracedPhotons};
+pub use raw_map::RawMap;

@@ -1,0 +1,222 @@
+//! The photon pass: emission by emission, batch by batch, until the maps are full.
+//!
+//! Aimed, there are two emissions: general paths fill the global map, and paths aimed at mirrors and glass the caustic
+//! map, which then holds L S+ D only. Unaimed, the same paths fill both. Which photons a map holds, and in which order, depends on
+//! the indices of the paths alone: never on the size of the batches or on the order in which the device runs them.
+
+use super::{
+    photon_batch::{BatchBuffers, PhotonKernels},
+    raw_map::RawMap,
+};
+use crate::{
+    error::Result,
+    gpu::Gpu,
+    layout::{self, PhotonBatch},
+    progress::{Progress, Stage},
+    settings::{Emission, Settings},
+    upload::{SceneBuffers, light_buffers::ChoiceBuffer},
+};
+
+/// Paths of one batch at least and at most: the device must be busy, and a staged photon knows its path by 19 bits.
+const MIN_BATCH: u64 = 1 << 16;
+const MAX_BATCH: u64 = 1 << 19;
+/// Paths over which the growth of a map is watched, at least; a map's capacity if that is more.
+const GROWTH_WINDOW: u64 = 1 << 17;
+/// Fixed-point unit of lost flux, as a fraction of a path's mean flux.
+const LOST_UNIT: f64 = 1.0 / 4096.0;
+
+/// What the photon pass leaves.
+#[derive(Debug)]
+pub struct TracedPhotons {
+    pub global: RawMap,
+    pub caustic: RawMap,
+    /// Photons stored of each group of lights.
+    pub of_lights: Vec<u32>,
+    /// Flux that the bounce limit took, W, mean of the channels; of the general paths.
+    pub lost: f64,
+    pub rays: u64,
+    pub media_overflows: u64,
+    /// Rays given up after the loop budget.
+    pub unfinished: u64,
+    /// Paths that ended as a number of theirs was not finite.
+    pub non_finite: u64,
+    pub warnings: Vec<String>,
+}
+
+/// Kernels of the photon pass.
+#[derive(Debug)]
+pub struct PhotonTracer {
+    kernels: PhotonKernels,
+}
+
+/// Paths of one kind, numbered from 0.
+struct EmissionPlan<'a> {
+    choices: &'a ChoiceBuffer,
+    stream: u32,
+    first_target: u32,
+    target_count: u32,
+    /// [`layout::AIM`], [`layout::CAUSTICS_APART`], and what of the modes' rules holds for these paths.
+    rules: u32,
+    fills_global: bool,
+    fills_caustic: bool,
+}
+
+impl PhotonTracer {
+    #[must_use]
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers) -> Self {
+        Self { kernels: PhotonKernels::new(gpu, scene) }
+    }
+
+    /// Traces photons until both maps are full, hardly grow, or all paths have been emitted. `caustics`: the scene has
+    /// a delta surface.
+    ///
+    /// # Errors
+    /// Limits of the adapter, faults of the driver, and [`crate::Error::Stopped`].
+    pub fn trace(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        settings: &Settings,
+        caustics: bool,
+        progress: &dyn Progress,
+    ) -> Result<TracedPhotons> {
+        let wants_global = settings.photons.stores_direct() || settings.photons.mode.follows_diffuse();
+        let mut traced = TracedPhotons {
+            global: RawMap::new(gpu, settings.photons.global, wants_global)?,
+            caustic: RawMap::new(gpu, settings.photons.caustic, caustics)?,
+            of_lights: Vec::new(),
+            lost: 0.0,
+            rays: 0,
+            media_overflows: 0,
+            unfinished: 0,
+            non_finite: 0,
+            warnings: Vec::new(),
+        };
+        let largest = u64::from(settings.photons.global.max(settings.photons.caustic));
+        let max_paths = settings.photons.max_paths.unwrap_or(100 * largest);
+        let batch_limit = (largest / 4).clamp(MIN_BATCH, MAX_BATCH).min(max_paths.max(1));
+        let groups = scene.lights.table.groups.len();
+        let buffers = BatchBuffers::new(gpu, batch_limit, groups)?;
+        for plan in plans(scene, settings, caustics) {
+            self.run(gpu, scene, &plan, settings, (&buffers, batch_limit, max_paths), &mut traced, progress)?;
+        }
+        traced.of_lights = gpu.read(&buffers.light_photons, 0, groups as u64)?;
+        Ok(traced)
+    }
+
+    /// Traces the paths of one emission.
+    #[allow(clippy::too_many_arguments, reason = "what stays the same for all emissions, and what does not")]
+    fn run(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        plan: &EmissionPlan,
+        settings: &Settings,
+        (buffers, mut batch_limit, max_paths): (&BatchBuffers, u64, u64),
+        traced: &mut TracedPhotons,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let growth_window = GROWTH_WINDOW.max(plan.maps(traced).map(|(_, map)| map.capacity).max().unwrap_or(0));
+        let (mut first_path, mut lost_units) = (0, 0);
+        while first_path < max_paths && plan.maps(traced).any(|(_, map)| map.open) {
+            progress.check()?;
+            let until_check = growth_window - first_path % growth_window;
+            let wanted = plan.maps(traced).map(|(_, map)| map.paths_wanted(first_path)).max().unwrap_or(0);
+            let paths = wanted.min(batch_limit).min(max_paths - first_path).min(until_check);
+            let batch = PhotonBatch {
+                paths: paths as u32,
+                staging_capacity: buffers.staging_capacity as u32,
+                ..plan.batch(scene, settings, traced)
+            }
+            .starting_at(first_path);
+            let result = self.kernels.run(gpu, scene, &plan.choices.buffer, buffers, &batch)?;
+            let staged = u64::from(result.counters.staged);
+            if staged > buffers.staging_capacity {
+                batch_limit = (paths * buffers.staging_capacity * 9 / (staged * 10)).max(1);
+                continue;
+            }
+            let TracedPhotons { global, caustic, .. } = traced;
+            let maps = [plan.fills_global.then_some(global), plan.fills_caustic.then_some(caustic)];
+            self.kernels.store(gpu, buffers, maps, &result, first_path)?;
+            first_path += paths;
+            traced.rays += result.counters.all_rays();
+            traced.media_overflows += u64::from(result.counters.media_overflows);
+            traced.unfinished += u64::from(result.counters.unfinished);
+            traced.non_finite += u64::from(result.counters.non_finite);
+            lost_units += result.counters.all_lost();
+            if first_path.is_multiple_of(growth_window) {
+                let idle = plan.maps(traced).filter_map(|(name, map)| map.close_if_idle(name, growth_window));
+                let idle: Vec<String> = idle.collect();
+                traced.warnings.extend(idle);
+            }
+            let (global, caustic) = (&traced.global, &traced.caustic);
+            progress.report(Stage::Photons, global.stored + caustic.stored, global.expected() + caustic.expected());
+        }
+        if plan.fills_global {
+            let flux = LOST_UNIT * scene.lights.table.power();
+            traced.lost = lost_units as f64 * flux / first_path.max(1) as f64;
+        }
+        Ok(())
+    }
+}
+
+/// The emissions that fill the maps; none of lights that are all dark.
+fn plans<'a>(scene: &'a SceneBuffers, settings: &Settings, caustics: bool) -> Vec<EmissionPlan<'a>> {
+    let lights = &scene.lights;
+    let rule = |holds: bool, bit: u32| if holds { bit } else { 0 };
+    let aimed = settings.photons.emission == Emission::Aimed;
+    let general = EmissionPlan {
+        choices: &lights.photons,
+        stream: layout::STREAM_PHOTON,
+        first_target: 0,
+        target_count: 1,
+        // Rays of final gathering see what was scattered before it came through glass.
+        rules: rule(aimed, layout::AIM)
+            | rule(aimed || settings.photons.final_gather > 0, layout::CAUSTICS_APART)
+            | rule(settings.photons.stores_direct(), layout::STORE_DIRECT)
+            | rule(settings.photons.mode.follows_diffuse(), layout::FOLLOW_DIFFUSE),
+        fills_global: true,
+        fills_caustic: !aimed,
+    };
+    let caustic = EmissionPlan {
+        choices: &lights.aimed,
+        stream: layout::STREAM_CAUSTIC,
+        first_target: 1,
+        target_count: lights.delta_targets,
+        rules: layout::AIM | layout::CAUSTICS_APART,
+        fills_global: false,
+        fills_caustic: true,
+    };
+    let wanted = [Some(general), (aimed && caustics).then_some(caustic)];
+    wanted.into_iter().flatten().filter(|plan| plan.choices.turns > 0).collect()
+}
+
+impl EmissionPlan<'_> {
+    /// The maps that it fills, by name.
+    fn maps<'t>(
+        &self,
+        traced: &'t mut TracedPhotons,
+    ) -> impl Iterator<Item = (&'static str, &'t mut RawMap)> + use<'t> {
+        let global = self.fills_global.then_some(("global", &mut traced.global));
+        global.into_iter().chain(self.fills_caustic.then_some(("caustic", &mut traced.caustic)))
+    }
+
+    /// What the batches of it share, and what follows from the maps that are still open.
+    fn batch(&self, scene: &SceneBuffers, settings: &Settings, traced: &TracedPhotons) -> PhotonBatch {
+        let rule = |holds: bool, bit: u32| if holds { bit } else { 0 };
+        PhotonBatch {
+            seed: settings.photons.seed,
+            light_count: scene.lights.table.lights.len() as u32,
+            turns: self.choices.turns,
+            max_bounces: settings.photons.bounce_limit(),
+            rules: self.rules
+                | rule(self.fills_global && traced.global.open, layout::STORE_GLOBAL)
+                | rule(self.fills_caustic && traced.caustic.open, layout::STORE_CAUSTIC),
+            lost_scale: (1.0 / (LOST_UNIT * scene.lights.table.power())) as f32,
+            stream: self.stream,
+            first_target: self.first_target,
+            target_count: self.target_count,
+            ..Default::default()
+        }
+    }
+}

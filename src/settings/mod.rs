@@ -1,0 +1,65 @@
+//! What a caller may choose, by stage. Every value has a unit, a range and a default.
+
+mod estimate;
+mod lights;
+mod photons;
+mod picture;
+
+use serde::{Deserialize, Serialize};
+
+pub use estimate::{EstimateSettings, Search};
+pub use lights::{LightSampling, LightSettings, LightUnit};
+pub use photons::{Emission, MAX_BOUNCES, Mode, PhotonSettings, Sampler};
+pub use picture::{Crop, PictureSettings};
+
+use crate::error::{Error, Result};
+
+/// Settings of one render: a part for each stage.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    pub lights: LightSettings,
+    pub photons: PhotonSettings,
+    pub estimate: EstimateSettings,
+    pub picture: PictureSettings,
+}
+
+impl Settings {
+    /// The settings after a change.
+    ///
+    /// ```
+    /// use caustica::settings::Settings;
+    ///
+    /// let settings = Settings::default().with(|s| s.picture.spp = 16);
+    /// assert_eq!((settings.picture.spp, settings.estimate.neighbors), (16, 100));
+    /// ```
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
+    }
+
+    /// Checks every value against its range, and those of different parts against each other.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] with the first that is out of range.
+    pub fn check(&self) -> Result<()> {
+        self.lights.check()?;
+        self.photons.check()?;
+        self.estimate.check()?;
+        self.picture.check()?;
+        // Numbers for sampling are counted in 32 bits over all samples of a pixel, with four paths of each.
+        let each = self.picture.light_samples.max(self.photons.final_gather).max(4);
+        let most = (1_u64 << 32) / u64::from(each);
+        if u64::from(self.picture.spp) > most {
+            let problem = format!("must be at most {most} with these light samples and rays of final gathering");
+            return fail("spp", self.picture.spp.to_string(), &problem);
+        }
+        Ok(())
+    }
+}
+
+/// The error of a setting outside its range.
+fn fail(name: &'static str, value: String, problem: &str) -> Result<()> {
+    Err(Error::Setting { name, value, problem: problem.to_string() })
+}

@@ -1,0 +1,95 @@
+//! Settings of a picture: its pixels, the camera, samples of each pixel and of its direct light.
+
+use serde::{Deserialize, Serialize};
+
+use super::fail;
+use crate::{error::Result, pixel_filter::PixelFilter};
+
+/// Part of a picture, in pixels of the whole from its upper left corner; at least one pixel each way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Crop {
+    pub column: u32,
+    pub row: u32,
+    pub width: u32,
+    pub height: u32,
+}
+
+impl Crop {
+    /// Whether a rectangle of the whole picture has pixels of this part.
+    #[must_use]
+    pub fn touches(&self, (column, row): (u32, u32), (width, height): (u32, u32)) -> bool {
+        let overlap = |a: u32, a_size: u32, b: u32, b_size: u32| a < b + b_size && b < a + a_size;
+        overlap(self.column, self.width, column, width) && overlap(self.row, self.height, row, height)
+    }
+}
+
+/// What one picture is made by.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PictureSettings {
+    /// Picture in pixels; `None`: 512 high, as wide as the camera's aspect says.
+    pub size: Option<(u32, u32)>,
+    /// The part of the picture that is rendered; `None`: all.
+    pub crop: Option<Crop>,
+    /// Name or index of the camera in the file; `None`: the first.
+    pub camera: Option<String>,
+    /// Camera samples per pixel, ≥ 1.
+    pub spp: u32,
+    pub pixel_filter: PixelFilter,
+    /// Diameter of the lens, metres, ≥ 0; 0: a pinhole, all is sharp.
+    pub aperture: f32,
+    /// Distance of the sharp plane along the camera's axis, metres, > 0; with an aperture only.
+    pub focus: Option<f32>,
+    /// Samples of the direct light of emissive surfaces and the environment per visible point, 1 to 4096.
+    pub light_samples: u32,
+}
+
+impl Default for PictureSettings {
+    fn default() -> Self {
+        Self {
+            size: None,
+            crop: None,
+            camera: None,
+            spp: 4,
+            pixel_filter: PixelFilter::Box,
+            aperture: 0.0,
+            focus: None,
+            light_samples: 4,
+        }
+    }
+}
+
+impl PictureSettings {
+    /// The part of a picture of that size that is rendered.
+    #[must_use]
+    pub fn window(&self, (width, height): (u32, u32)) -> Crop {
+        self.crop.unwrap_or(Crop { column: 0, row: 0, width, height })
+    }
+
+    /// The table of the pixel filter; a single sample by the box filter is the pixel's centre.
+    #[must_use]
+    pub fn pixel_filter_offsets(&self) -> Vec<f32> {
+        if self.spp == 1 && self.pixel_filter == PixelFilter::Box { vec![0.0; 2] } else { self.pixel_filter.offsets() }
+    }
+
+    /// Checks every value against its range.
+    ///
+    /// # Errors
+    /// [`crate::Error::Setting`] with the first that is out of range.
+    pub fn check(&self) -> Result<()> {
+        if self.spp == 0 {
+            return fail("spp", "0".to_string(), "must be at least 1");
+        }
+        if !(1..=4096).contains(&self.light_samples) {
+            return fail("light-samples", self.light_samples.to_string(), "must be from 1 to 4096");
+        }
+        if !(self.aperture >= 0.0 && self.aperture.is_finite()) {
+            return fail("aperture", self.aperture.to_string(), "must be at least 0");
+        }
+        match self.focus {
+            None if self.aperture > 0.0 => fail("aperture", self.aperture.to_string(), "needs a focus"),
+            Some(f) if !(f > 0.0 && f.is_finite()) => fail("focus", f.to_string(), "must be above 0"),
+            _ => Ok(()),
+        }
+    }
+}

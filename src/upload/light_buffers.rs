@@ -1,0 +1,117 @@
+//! The lights' part of bind group 0: all that shines, the tables by which passes choose from it, targets, environment.
+
+use crate::{
+    bvh::{Bvh, MediaProbe, too_deep},
+    emitters::{
+        environment_map::EnvironmentMap,
+        light_table::{Choices, LightTable},
+        set_media,
+        targets::{delta_targets, scene_target},
+    },
+    error::Result,
+    gpu::{Buffer, Gpu},
+    layout::Surroundings,
+    scene::Scene,
+    settings::LightSettings,
+};
+
+/// A table on the device, `array<LightChoice>`.
+#[derive(Debug)]
+pub struct ChoiceBuffer {
+    pub buffer: Buffer,
+    /// See [`Choices::turns`].
+    pub turns: u32,
+}
+
+/// The lights on the device.
+#[derive(Debug)]
+pub struct LightBuffers {
+    /// As uploaded.
+    pub table: LightTable,
+    /// For photon paths, for those aimed at mirrors and glass, and for direct light of what has an extent.
+    pub photons: ChoiceBuffer,
+    pub aimed: ChoiceBuffer,
+    pub direct: ChoiceBuffer,
+    /// Spheres around mirrors and glass; the sphere around the scene lies before them.
+    pub delta_targets: u32,
+    pub has_environment: bool,
+    pub warnings: Vec<String>,
+    lights: Buffer,
+    targets: Buffer,
+    surroundings: Buffer,
+    environment: Buffer,
+    environment_cells: Buffer,
+    environment_rows: Buffer,
+}
+
+impl LightBuffers {
+    /// Uploads all that shines.
+    ///
+    /// # Errors
+    /// As [`LightTable::new`], and [`crate::Error::Limit`] if the lights exceed a binding.
+    pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
+        let around = scene_target(scene);
+        let targets = delta_targets(scene);
+        let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, gpu.max_binding()));
+        let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
+        let probe = MediaProbe::new(scene, bvh);
+        let buried = table.lights.iter_mut().map(|light| set_media(light, &probe)).filter(|fits| !fits).count();
+        let upload = |label: &str, choices: &Choices| -> Result<ChoiceBuffer> {
+            Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, turns: choices.turns })
+        };
+        let spheres: Vec<[f32; 4]> =
+            [&around].into_iter().chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
+        let (sine, cosine) = map.as_ref().map_or(0.0, |map| map.rotation).sin_cos();
+        let surroundings = Surroundings {
+            center: around.center.to_array(),
+            radius: around.radius,
+            columns: map.as_ref().map_or(0, |map| map.columns),
+            rows: map.as_ref().map_or(0, |map| map.rows),
+            rotation_cos: cosine,
+            rotation_sin: sine,
+        };
+        let pixels = map.as_ref().map_or(&[][..], |map| &map.pixels);
+        let cells = map.as_ref().map_or(&[][..], |map| &map.cells);
+        let rows = map.as_ref().map_or(&[][..], |map| &map.marginal);
+        Ok(Self {
+            photons: upload("photon light choices", &table.for_photons(settings))?,
+            aimed: upload("aimed light choices", &table.for_aimed_photons(&targets, &around, settings))?,
+            direct: upload("direct light choices", &table.for_direct_light())?,
+            delta_targets: targets.len() as u32,
+            has_environment: map.is_some(),
+            warnings: reduced(scene, map.as_ref()).into_iter().chain(too_deep("lights", buried)).collect(),
+            lights: gpu.storage_with("lights", &table.lights)?,
+            targets: gpu.storage_with("targets", &spheres)?,
+            surroundings: gpu.uniform("surroundings", &surroundings),
+            environment: gpu.storage_with("environment", pixels)?,
+            environment_cells: gpu.storage_with("environment cells", cells)?,
+            environment_rows: gpu.storage_with("environment rows", rows)?,
+            table,
+        })
+    }
+
+    /// The variables that all passes share; a pass binds its `choices` besides.
+    #[must_use]
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 6] {
+        [
+            ("lights", &self.lights),
+            ("targets", &self.targets),
+            ("surroundings", &self.surroundings),
+            ("environment", &self.environment),
+            ("environment_cells", &self.environment_cells),
+            ("environment_rows", &self.environment_rows),
+        ]
+    }
+}
+
+/// What to say where the environment map had to be made smaller.
+fn reduced(scene: &Scene, map: Option<&EnvironmentMap>) -> Option<String> {
+    let (environment, map) = (scene.environment.as_ref()?, map?);
+    let (from, to) = ((environment.width, environment.height), (map.columns, map.rows));
+    (from != to).then(|| {
+        format!(
+            "the environment {} was averaged from {} x {} to {} x {} pixels to fit the device",
+            environment.name, from.0, from.1, to.0, to.1
+        )
+    })
+}

@@ -1,0 +1,146 @@
+//! Bind group 0: the scene on the device. Owner of `shaders/bindings/scene.wesl`.
+
+use std::borrow::Cow;
+
+use bytemuck::Pod;
+
+use super::light_buffers::LightBuffers;
+use crate::{
+    bvh::Bvh,
+    emitters::light_table::{LightTable, emission_in},
+    error::Result,
+    gpu::{Buffer, Gpu, Kernel},
+    layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
+    scene::{Material, Scene, Surface},
+    settings::{LightUnit, Sampler, Settings},
+};
+
+/// The scene's buffers.
+#[derive(Debug)]
+pub struct SceneBuffers {
+    nodes: Buffer,
+    primitives: Windows,
+    normals: Buffer,
+    materials: Buffer,
+    has_spheres: bool,
+    /// Children that a traversal can postpone.
+    stack: usize,
+    sampler: Sampler,
+    /// Some surface both reflects and transmits.
+    pub has_dielectrics: bool,
+    pub lights: LightBuffers,
+}
+
+/// An array in one binding, or in two where it exceeds one.
+#[derive(Debug)]
+struct Windows {
+    low: Buffer,
+    high: Buffer,
+    /// Elements in `low` if `high` is used, else 0.
+    window: u64,
+}
+
+impl SceneBuffers {
+    /// Uploads the scene.
+    ///
+    /// # Errors
+    /// [`crate::Error::Limit`] if the primitives exceed two bindings, or the nodes or normals one; as [`LightBuffers::new`].
+    pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &Settings) -> Result<Self> {
+        let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.lights.unit)).collect();
+        let lights = LightBuffers::new(gpu, scene, bvh, &settings.lights)?;
+        Ok(Self {
+            nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
+            primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &lights.table))?,
+            normals: gpu.storage_with("normals", &bvh.normals)?,
+            materials: gpu.storage_with("materials", &materials)?,
+            has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
+            has_spheres: !scene.spheres.is_empty(),
+            // In steps, so that few variants of a kernel are compiled.
+            stack: bvh.most_postponed().max(1).next_multiple_of(16),
+            sampler: settings.photons.sampler,
+            lights,
+        })
+    }
+
+    /// Compiles a kernel that uses the scene.
+    #[must_use]
+    pub fn kernel(&self, gpu: &Gpu, stem: &str) -> Kernel {
+        self.kernel_with(gpu, stem, &[])
+    }
+
+    /// The same with further `override` constants.
+    #[must_use]
+    pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
+        let mut overrides = vec![
+            ("SAMPLER", f64::from(self.sampler())),
+            ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
+            ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
+            ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
+            ("SPLIT", f64::from(u8::from(self.primitives.window > 0))),
+            ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
+        ];
+        overrides.extend_from_slice(others);
+        Kernel::new(gpu, stem, &overrides)
+    }
+
+    fn sampler(&self) -> u32 {
+        match self.sampler {
+            Sampler::Sobol => layout::SAMPLER_SOBOL,
+            Sampler::Random => layout::SAMPLER_RANDOM,
+        }
+    }
+
+    /// The scene's variables, followed by others.
+    #[must_use]
+    pub fn with<'a>(&'a self, others: &[(&'a str, &'a Buffer)]) -> Vec<(&'a str, &'a Buffer)> {
+        let mut all = vec![
+            ("nodes", &self.nodes),
+            ("primitives", &self.primitives.low),
+            ("primitives_high", &self.primitives.high),
+            ("normals", &self.normals),
+            ("materials", &self.materials),
+        ];
+        all.extend(self.lights.bindings());
+        all.extend_from_slice(others);
+        all
+    }
+}
+
+impl Windows {
+    fn new<T: Pod>(gpu: &Gpu, label: &str, data: &[T]) -> Result<Self> {
+        let fits = usize::try_from(gpu.max_binding() / size_of::<T>() as u64).unwrap_or(usize::MAX);
+        let (low, high) = data.split_at(data.len().min(fits));
+        let window = if high.is_empty() { 0 } else { low.len() as u64 };
+        Ok(Self { low: gpu.storage_with(label, low)?, high: gpu.storage_with(label, high)?, window })
+    }
+}
+
+fn window_or_all(window: u64) -> f64 {
+    if window == 0 { f64::from(u32::MAX) } else { window as f64 }
+}
+
+/// The primitives, each with the light that it is, and those of delta surfaces marked.
+fn marked<'a>(primitives: &'a [Primitive], scene: &Scene, lights: &LightTable) -> Cow<'a, [Primitive]> {
+    let is_delta: Vec<bool> = scene.materials.iter().map(|m| m.surface.is_delta()).collect();
+    if !lights.has_surfaces() && !is_delta.contains(&true) {
+        return Cow::Borrowed(primitives);
+    }
+    let bits = |material: u32| {
+        let delta = is_delta.get((material & !SPHERE_BIT) as usize) == Some(&true);
+        if delta { material | DELTA_BIT } else { material }
+    };
+    let mark = |p: &Primitive| Primitive { emitter: lights.emitter(p.id), material: bits(p.material), ..*p };
+    primitives.iter().map(mark).collect()
+}
+
+fn material(material: &Material, unit: LightUnit) -> layout::Material {
+    let (kind, color, ior) = match material.surface {
+        Surface::Diffuse { albedo } => (layout::DIFFUSE, albedo, 1.0),
+        Surface::Mirror { tint } => (layout::MIRROR, tint, 1.0),
+        Surface::Glass { ior, tint } => (layout::GLASS, tint, ior),
+        Surface::Pane { ior, tint } => (layout::PANE, tint, ior),
+    };
+    let emission = emission_in(material.emission, unit).to_array();
+    let double_sided = u32::from(material.double_sided);
+    layout::Material { kind, color: color.to_array(), emission, ior, double_sided, ..Default::default() }
+}
