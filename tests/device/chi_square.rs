@@ -16,7 +16,8 @@ const LEAST: f64 = 10.0;
 pub struct Deviate(f64);
 
 impl Deviate {
-    /// Significance 1e-4 on either side: neither too far from the density nor too close for independent samples.
+    /// Significance 1e-4 on either side: neither too far from the density nor too close for
+    /// independent samples.
     pub fn fits(self) -> bool {
         self.0.abs() < 3.72
     }
@@ -57,7 +58,8 @@ pub fn of_unit_square(points: impl IntoIterator<Item = [f64; 2]>) -> Deviate {
     deviate(&counts, &[1.0 / (SIDE * SIDE) as f64; SIDE * SIDE])
 }
 
-/// 1 − cosine of a direction's angle to the axis, exact for narrow cones too, and its azimuth from 0 to 1.
+/// 1 − cosine of a direction's angle to the axis, exact for narrow cones too, and its azimuth from
+/// 0 to 1.
 pub fn height_and_azimuth(direction: [f32; 4], axis: Vec3) -> [f64; 2] {
     let [d, axis] = [Vec3::from_slice(&direction), axis].map(|v| v.as_dvec3().normalize());
     let x = axis.any_orthonormal_vector();

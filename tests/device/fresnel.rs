@@ -2,7 +2,8 @@
 
 use super::probe::{Probe, Row};
 
-/// Largest error of the device's reflectance over cosines and relative indices, if it is that of the indices times `factor`.
+/// Largest error of the device's reflectance over cosines and relative indices, if it is that of
+/// the indices times `factor`.
 fn error(factor: f64) -> f64 {
     let cosines = (0..=1000).map(|i| f64::from(i) / 1000.0);
     let pairs: Vec<(f64, f64)> =
@@ -10,14 +11,16 @@ fn error(factor: f64) -> f64 {
     let rows: Vec<Row> = pairs.iter().map(|&(c, eta)| [[c as f32, eta as f32, 0.0, 0.0], [0.0; 4]]).collect();
     let found = Probe::new("probe_fresnel").run(&rows);
     let off = |((c, eta), found): (&(f64, f64), &[f32; 4])| {
-        // At the critical angle and at grazing incidence the curve is too steep to be compared in f32.
+        // At the critical angle and at grazing incidence the curve is too steep to be compared in
+        // f32.
         let steep = (1.0 - (1.0 - c * c) / (eta * eta)).abs() < 1e-3 || *c == 0.0;
         if steep { 0.0 } else { (f64::from(found[0]) - closed_form(*c, eta * factor)).abs() }
     };
     pairs.iter().zip(&found).map(off).fold(0.0, f64::max)
 }
 
-/// Reflectance of unpolarised light at the cosine of incidence, from the angles (Fresnel 1823); 1 where no angle exists.
+/// Reflectance of unpolarised light at the cosine of incidence, from the angles (Fresnel 1823); 1
+/// where no angle exists.
 fn closed_form(cos_i: f64, eta: f64) -> f64 {
     let angle = cos_i.acos();
     let sine = angle.sin() / eta;

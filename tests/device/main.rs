@@ -2,10 +2,12 @@
 
 mod chi_square;
 mod determinism;
+mod emitter_sampling;
 mod faults;
 mod fresnel;
 mod kd_tree;
 
+mod light_sampling;
 mod limits;
 mod nearest;
 mod probe;

@@ -1,4 +1,5 @@
-//! Probes: kernels of `shaders/probes` that call one function of the shaders for each row of a table.
+//! Probes: kernels of `shaders/probes` that call one function of the shaders for each row of a
+//! table.
 
 use caustica::{
     gpu::{

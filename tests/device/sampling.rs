@@ -1,4 +1,5 @@
-//! Each sampling function draws with its density: chi-square at a significance of 1e-4, over fixed numbers.
+//! Each sampling function draws with its density: chi-square at a significance of 1e-4, over fixed
+//! numbers.
 //!
 //! | test | density | negative control |
 //! |---|---|---|
@@ -18,7 +19,8 @@ use super::{
 
 const AXES: [Vec3; 4] = [Vec3::Z, Vec3::NEG_Z, Vec3::X, vec3(0.48, -0.6, -0.64)];
 
-/// Directions against a density of which `share` tells how much lies below a height, 1 − cos, about the axis.
+/// Directions against a density of which `share` tells how much lies below a height, 1 − cos, about
+/// the axis.
 fn about(axis: Vec3, directions: Vec<[f32; 4]>, share: impl Fn(f64) -> f64) -> Deviate {
     of_unit_square(directions.into_iter().map(|d| {
         let [height, azimuth] = height_and_azimuth(d, axis);
