@@ -4,6 +4,7 @@ mod estimate;
 mod lights;
 mod photons;
 mod picture;
+mod range;
 
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +12,7 @@ pub use estimate::{EstimateSettings, Search};
 pub use lights::{LightSampling, LightSettings, LightUnit};
 pub use photons::{Emission, MAX_BOUNCES, Mode, PhotonSettings, Sampler};
 pub use picture::{Crop, PictureSettings};
+pub use range::{Number, Range};
 
 use crate::error::{Error, Result};
 
