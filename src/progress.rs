@@ -5,10 +5,13 @@ use crate::error::{Error, Result};
 /// What is being done; shown to the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// Reading the scene.
     Load,
+    /// Building the hierarchy and copying the scene to the device.
     Bvh,
     /// Counted in photons stored, of all maps.
     Photons,
+    /// Sorting photons into the grid.
     Grid,
     /// Counted in tiles of camera samples: camera rays, direct light and gather.
     Camera,

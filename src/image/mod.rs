@@ -1,5 +1,6 @@
 //! Pictures: the film's frame, EXR and PNG files, tone mapping, difference measures.
 
+#[cfg(feature = "report")]
 mod canvas;
 pub mod difference;
 mod exr;
@@ -9,6 +10,7 @@ mod png;
 mod radiance;
 mod tonemap;
 
+#[cfg(feature = "report")]
 pub use canvas::{Canvas, Rgb8};
 pub use exr::{EnvironmentOrigin, Origin, read_exr, read_exr_attributes, write_exr};
 pub use file::{check_output, close_files, write_file};
@@ -23,8 +25,9 @@ use crate::settings::Crop;
 pub struct PlaceInWhole {
     /// Width and height of the whole, pixels.
     pub whole: (u32, u32),
-    /// Pixel of the part's upper left corner.
+    /// Column of the upper left pixel of the part in the whole.
     pub column: u32,
+    /// Row of that pixel.
     pub row: u32,
 }
 
@@ -39,7 +42,9 @@ impl PlaceInWhole {
 /// A finished frame, scene-linear, row 0 at the top. All vectors have `width * height` elements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
+    /// Columns.
     pub width: u32,
+    /// Rows.
     pub height: u32,
     /// Where the frame lies, if it is a part of a larger picture.
     pub place: Option<PlaceInWhole>,

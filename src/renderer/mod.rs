@@ -35,7 +35,9 @@ const BYTES_PER_PIXEL: u64 = 160;
 /// A finished render.
 #[derive(Clone, Debug)]
 pub struct Render {
+    /// The picture.
     pub frame: Frame,
+    /// What happened.
     pub stats: Stats,
 }
 

@@ -20,9 +20,13 @@ use crate::error::{Error, Result};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
+    /// How lights are read and sampled.
     pub lights: LightSettings,
+    /// The first pass.
     pub photons: PhotonSettings,
+    /// The radiance estimate.
     pub estimate: EstimateSettings,
+    /// Camera, pixels and samples.
     pub picture: PictureSettings,
 }
 

@@ -2,5 +2,6 @@
 
 mod layers;
 mod layouts;
+mod library;
 mod readme;
 mod scenes;
