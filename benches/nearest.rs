@@ -10,7 +10,7 @@ use caustica::{
     layout::{Gathered, VisiblePoint},
     passes::{
         estimate::gather::{Gather, GatherOptions, GatherSettings, gathered_buffer},
-        maps::photon_map::{MapKernels, PhotonMap, PhotonStore},
+        maps::{MapKernels, PhotonMap, PhotonStore},
     },
     progress::Silent,
     settings::Settings,

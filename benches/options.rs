@@ -30,7 +30,7 @@ const CHANGES: [(&str, bool); 17] = [
 
 fn main() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
-    let reference = read_exr(&folder.join("S1.exr")).expect("the reference reads").radiance;
+    let reference = read_exr(&folder.join("S1.exr")).expect("the reference reads");
     let out = std::env::temp_dir().join(format!("caustica-options-{}.exr", std::process::id()));
     let rounds: u32 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(3);
     let run = |options: &str, size: &str, seed: u32| {
@@ -55,8 +55,8 @@ fn main() {
         for (i, (options, compares)) in CHANGES.iter().enumerate() {
             seconds[i].push(run(options, "256x256", seed));
             if *compares {
-                let picture = read_exr(&out).expect("the program wrote a picture").radiance;
-                errors[i] += rel_mse(&picture, &reference, None) / f64::from(rounds);
+                let picture = read_exr(&out).expect("the program wrote a picture");
+                errors[i] += rel_mse(picture.radiance(), reference.radiance(), None) / f64::from(rounds);
             }
         }
     }

@@ -12,7 +12,7 @@ use caustica::{
         shaders::{Binding, BindingKind, Shader},
     },
     scene::{Material, Scene, Surface, Triangle},
-    settings::Settings,
+    settings::LightSettings,
     upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
@@ -44,7 +44,7 @@ fn compare(gpu: &Gpu, scene: &Scene) {
 
 /// Best of some runs over all rays, after one to warm up.
 fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[Ray]) -> f64 {
-    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &Settings::default()).expect("the scene fits");
+    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &LightSettings::default()).expect("the scene fits");
     let shader = PROBES.iter().find(|shader| shader.stem == "trace_rays").expect("the probe");
     let kernel = buffers.kernel_of(gpu, shader, &[]);
     let count = rays.len() as u64;

@@ -233,6 +233,8 @@ pub struct Counters {
     pub non_finite: u32,
     /// High word of `lost`.
     pub lost_high: u32,
+    /// Shadow rays of one pass of direct light over a tile's points.
+    pub shadow_rays: u32,
 }
 
 impl Counters {
@@ -381,18 +383,12 @@ pub struct FirstHit {
     pub alpha: f32,
 }
 
-/// Sums over a tile's samples of one pixel.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct TilePixel {
-    pub radiance: [f32; 3],
-    pub alpha: f32,
-    pub normal: [f32; 3],
-    pub depth: f32,
-    pub albedo: [f32; 3],
-    /// Samples that are not in the sums, as these would not be finite with them.
-    pub non_finite: u32,
-}
+/// Rows of four numbers that a camera sample writes for the output layers: those of [`FirstHit`].
+pub const LAYER_ROWS: usize = 2;
+
+/// Sums over a tile's samples of one pixel, by rows: radiance with the number of samples that are not
+/// in its sum, as it would not be finite with them; then the rows of the samples.
+pub type PixelSums = [[f32; 4]; LAYER_ROWS + 1];
 
 /// Which light `light_directly` takes; one without extent.
 #[repr(C)]

@@ -38,7 +38,7 @@ pub(super) fn encode_rgb8(pixels: &[u8], width: u32, height: u32) -> io::Result<
 fn to_srgb8(frame: &Frame, exposure: f32, curve: Tonemap) -> Vec<u8> {
     let scale = exposure.exp2();
     let pixel = |radiance: &[f32; 3]| curve.apply(radiance.map(|x| x * scale)).map(to_byte);
-    frame.radiance.iter().flat_map(pixel).collect()
+    frame.radiance().iter().flat_map(pixel).collect()
 }
 
 fn to_byte(linear: f32) -> u8 {
@@ -51,8 +51,7 @@ mod tests {
 
     #[test]
     fn a_written_file_holds_the_mapped_pixels() {
-        let radiance = vec![[0.0; 3], [0.09, 0.25, 4.0]];
-        let frame = Frame { width: 2, height: 1, radiance, ..Frame::default() };
+        let frame = Frame::new(2, 1, &[[0.0; 3], [0.09, 0.25, 4.0]]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         write_png(&path, &frame, 1.0, Tonemap::None).unwrap();

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     Error, Result,
-    image::{EnvironmentOrigin, Origin},
+    image::{EnvironmentProvenance, Provenance},
     settings::Settings,
     stats::Stats,
 };
@@ -136,15 +136,15 @@ impl Scene {
 
     /// What a picture's file is to tell of where it comes from.
     #[must_use]
-    pub fn origin<'a>(&'a self, settings: &'a Settings, stats: &'a Stats) -> Origin<'a> {
-        let environment = self.environment.as_ref().map(|environment| EnvironmentOrigin {
+    pub fn origin<'a>(&'a self, settings: &'a Settings, stats: &'a Stats) -> Provenance<'a> {
+        let environment = self.environment.as_ref().map(|environment| EnvironmentProvenance {
             name: &environment.name,
             hash: &environment.hash,
             radiance: (environment.pixels.len() == 1).then(|| environment.pixels[0]),
             strength: environment.strength,
             rotation: environment.rotation,
         });
-        Origin { scene: &self.file_name, scene_hash: &self.hash, environment, settings, stats }
+        Provenance { scene: &self.file_name, scene_hash: &self.hash, environment, settings, stats }
     }
 
     /// The camera of that name, or of that number in [`Scene::cameras`]; the first if none is asked for.

@@ -15,7 +15,7 @@ use crate::{
     },
     layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
     scene::{Material, Scene, Surface},
-    settings::{LightUnit, Sampler, Settings},
+    settings::{LightSettings, LightUnit, Sampler},
 };
 
 /// The scene's buffers.
@@ -28,10 +28,19 @@ pub struct SceneBuffers {
     has_spheres: bool,
     /// Children that a traversal can postpone.
     stack: usize,
-    sampler: Sampler,
     /// Some surface both reflects and transmits.
     pub has_dielectrics: bool,
     pub lights: LightBuffers,
+}
+
+/// The `override` constant that says where a kernel's numbers for sampling come from.
+#[must_use]
+pub fn sampler_constant(sampler: Sampler) -> (&'static str, f64) {
+    let number = match sampler {
+        Sampler::Sobol => layout::SAMPLER_SOBOL,
+        Sampler::Random => layout::SAMPLER_RANDOM,
+    };
+    ("SAMPLER", f64::from(number))
 }
 
 /// An array in one binding, or in two where it exceeds one.
@@ -48,9 +57,9 @@ impl SceneBuffers {
     ///
     /// # Errors
     /// [`crate::Error::Limit`] if the primitives exceed two bindings, or the nodes or normals one; as [`LightBuffers::new`].
-    pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &Settings) -> Result<Self> {
-        let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.lights.unit)).collect();
-        let lights = LightBuffers::new(gpu, scene, bvh, &settings.lights)?;
+    pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
+        let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.unit)).collect();
+        let lights = LightBuffers::new(gpu, scene, bvh, settings)?;
         Ok(Self {
             nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
             primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &lights.table))?,
@@ -60,7 +69,6 @@ impl SceneBuffers {
             has_spheres: !scene.spheres.is_empty(),
             // In steps, so that few variants of a kernel are compiled.
             stack: bvh.most_postponed().max(1).next_multiple_of(16),
-            sampler: settings.photons.sampler,
             lights,
         })
     }
@@ -82,7 +90,6 @@ impl SceneBuffers {
     #[must_use]
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
-            ("SAMPLER", f64::from(self.sampler())),
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
@@ -91,13 +98,6 @@ impl SceneBuffers {
         ];
         overrides.extend_from_slice(others);
         Kernel::of(gpu, shader, &overrides)
-    }
-
-    fn sampler(&self) -> u32 {
-        match self.sampler {
-            Sampler::Sobol => layout::SAMPLER_SOBOL,
-            Sampler::Random => layout::SAMPLER_RANDOM,
-        }
     }
 
     /// The scene's variables, followed by others.

@@ -25,7 +25,7 @@ use super::{
 };
 pub fn upload(scene: &Scene, sampling: LightSampling) -> SceneBuffers {
     let settings = Settings::default().with(|s| s.lights.sampling = sampling);
-    SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &settings).expect("the scene fits")
+    SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &settings.lights).expect("the scene fits")
 }
 
 /// Rows of a probe over the scene, its lights chosen by power.

@@ -49,13 +49,12 @@ fn twins() -> Vec<Twin> {
         Path { origin, flags, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
         VisiblePoint { position, valid, weight, offset, ng, media_outer, ns, media_inner }
-        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high }
+        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
         Store { staged, first_photon, photons, map_bit }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media }
         FinalStep { ray, rays, points, pad }
         FirstHit { normal, depth, albedo, alpha }
-        TilePixel { radiance, alpha, normal, depth, albedo, non_finite }
         DirectLight { light, points, pad0, pad1 }
         EmitterSample { points, sample, samples, light_count }
         Cell { lo, wi_lo, hi, wi_hi }

@@ -171,7 +171,7 @@ impl<'s> Gather<'s> {
     }
 
     /// Has the kernels compiled for maps of one window, while others run.
-    pub fn compile_ahead(&mut self, gpu: &Gpu, settings: &GatherSettings) {
+    pub fn prefetch(&mut self, gpu: &Gpu, settings: &GatherSettings) {
         self.compile(gpu, Variant::of(settings, 1));
     }
 
