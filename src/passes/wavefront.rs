@@ -26,6 +26,7 @@ pub struct Wavefront {
 }
 
 /// A kernel and the buffers that it uses besides the scene and those of the wavefront, by name.
+#[derive(Debug)]
 pub struct Step<'b> {
     pub kernel: &'b Kernel,
     pub buffers: &'b [(&'b str, &'b Buffer)],

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use caustica::{
     bvh::Bvh,
     scene::{Environment, Material, Scene, Surface},
-    settings::{LightSettings, Mode, Settings},
+    settings::{LightSettings, Mode},
     upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
