@@ -1,10 +1,10 @@
-//! Words of a file in what is said of it.
+//! Text from files, made safe for one-line messages.
 
-/// Characters of a line: names in it may go on without end.
+/// Maximum number of characters of a line: names in a file have any length.
 const MOST: usize = 400;
 
-/// A text that may hold words of a file, as one line of bounded length: what would move the cursor or colour the screen is
-/// escaped.
+/// Converts a text that may contain names from a file to one line of bounded length. Escapes
+/// control characters, which could move the cursor or colour the terminal.
 pub(super) fn one_line(text: &str) -> String {
     let escape = |c: char| if c.is_control() { c.escape_default().collect() } else { String::from(c) };
     let mut line: String = text.chars().take(MOST).map(escape).collect();
