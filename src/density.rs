@@ -1,8 +1,9 @@
 //! Kernels of the radiance estimate: weights of photons over the disc of radius r around a point.
 //!
 //! The device knows r, the distance of the (k+1)-th photon, only after the photons are summed. It
-//! therefore sums the moments Φ tᵐ, t = 1 − (d/s)ᵖ, for a length s slightly below r, and computes Σ
-//! K(d/r) Φ from them. This requires a kernel that is a polynomial in qᵖ, q = d/r, or in 1 − qᵖ.
+//! therefore sums the moments Φ tᵐ, t = 1 − (d/s)ᵖ, for a length s slightly below r, and
+//! computes Σ K(d/r) Φ from them. This requires a kernel that is a polynomial in qᵖ, q = d/r, or in
+//! 1 − qᵖ.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,15 +22,15 @@ pub enum DensityKernel {
     /// 1 − (1 − exp(−β q²/2)) / (1 − exp(−β)), β = 1.953 (Jensen 2001, section 7.2.2; his factor α
     /// is part of the mean).
     Gaussian,
-    /// (1 − q²)² (Silverman 1986, "Density Estimation", equation 4.5, in two dimensions 3/π (1 −
-    /// q²)²).
+    /// (1 − q²)² (Silverman 1986, "Density Estimation", equation 4.5, in two dimensions 3/π
+    /// (1 − q²)²).
     Silverman,
 }
 
 /// β of Jensen's Gaussian.
 const BETA: f64 = 1.953;
 /// Maximum number of coefficients of a polynomial, that is, of moments that the device sums.
-pub const MOST_MOMENTS: usize = 5;
+pub const MAX_MOMENTS: usize = 5;
 
 /// A kernel with its parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,9 +45,9 @@ pub struct Density {
 pub struct Polynomial {
     /// 1 or 2.
     pub power: u32,
-    /// Number of coefficients in use, 1 to [`MOST_MOMENTS`].
+    /// Number of coefficients in use, 1 to [`MAX_MOMENTS`].
     pub moments: u32,
-    pub coefficients: [f64; MOST_MOMENTS],
+    pub coefficients: [f64; MAX_MOMENTS],
 }
 
 impl DensityKernel {
@@ -92,7 +93,7 @@ impl Density {
     #[must_use]
     pub fn polynomial(self) -> Polynomial {
         let of = |power, given: &[f64]| {
-            let mut coefficients = [0.0; MOST_MOMENTS];
+            let mut coefficients = [0.0; MAX_MOMENTS];
             coefficients[..given.len()].copy_from_slice(given);
             Polynomial { power, moments: given.len() as u32, coefficients }
         };
@@ -116,11 +117,11 @@ impl Polynomial {
 
     /// Coefficients of the same polynomial in 1 − qᵖ.
     #[must_use]
-    pub fn from_rim(&self) -> [f64; MOST_MOMENTS] {
+    pub fn from_rim(&self) -> [f64; MAX_MOMENTS] {
         // Horner's scheme at 1 − s.
-        self.coefficients.iter().rev().fold([0.0; MOST_MOMENTS], |sum, c| {
+        self.coefficients.iter().rev().fold([0.0; MAX_MOMENTS], |sum, c| {
             let mut next = sum;
-            (1..MOST_MOMENTS).for_each(|m| next[m] -= sum[m - 1]);
+            (1..MAX_MOMENTS).for_each(|m| next[m] -= sum[m - 1]);
             next[0] += c;
             next
         })
@@ -132,8 +133,8 @@ impl Polynomial {
         (0..).zip(self.coefficients).map(|(m, c)| 2.0 * c / f64::from(self.power * m + 2)).sum()
     }
 
-    /// Relative radius q within which the given fraction of the integral of the kernel lies, for 0
-    /// ≤ fraction ≤ 1.
+    /// Relative radius q within which the given fraction of the integral of the kernel lies, for
+    /// 0 ≤ fraction ≤ 1.
     #[must_use]
     pub fn quantile(&self, fraction: f64) -> f64 {
         let integral = |q: f64| -> f64 {
@@ -156,8 +157,8 @@ fn gaussian(q2: f64) -> f64 {
 
 /// Coefficients of the polynomial that interpolates `f` at the Chebyshev nodes of [0, 1], by
 /// Newton's divided differences.
-fn interpolated(f: impl Fn(f64) -> f64) -> [f64; MOST_MOMENTS] {
-    const N: usize = MOST_MOMENTS;
+fn interpolated(f: impl Fn(f64) -> f64) -> [f64; MAX_MOMENTS] {
+    const N: usize = MAX_MOMENTS;
     let node = |i: usize| 0.5 + 0.5 * ((2 * i + 1) as f64 * std::f64::consts::PI / (2 * N) as f64).cos();
     let nodes: [f64; N] = std::array::from_fn(node);
     let mut differences = nodes.map(f);

@@ -24,10 +24,10 @@ pub enum PixelFilter {
 
 /// Standard deviation of the Gaussian filter, pixels.
 const SIGMA: f64 = 0.5;
-/// Number of steps of the offset table of a filter other than the box, and of the integral from
-/// which it is computed.
-const STEPS: usize = 1 << 12;
-const PARTS: usize = 1 << 16;
+/// Steps of the offset table of a filter other than the box.
+const TABLE_STEPS: usize = 1 << 12;
+/// Steps of the integral from which the table is computed.
+const INTEGRAL_STEPS: usize = 1 << 16;
 
 impl PixelFilter {
     /// Filter radius along each axis, pixels.
@@ -64,18 +64,18 @@ impl PixelFilter {
         if self == PixelFilter::Box {
             return vec![-radius as f32, radius as f32];
         }
-        let width = 2.0 * radius / PARTS as f64;
+        let width = 2.0 * radius / INTEGRAL_STEPS as f64;
         let edge = |i: usize| -radius + i as f64 * width;
         let mut integral = vec![0.0];
-        for i in 0..PARTS {
+        for i in 0..INTEGRAL_STEPS {
             integral.push(integral[i] + width * self.weight(edge(i) + 0.5 * width));
         }
         let offset = |step: usize| {
-            let wanted = integral[PARTS] * step as f64 / STEPS as f64;
-            let part = integral.partition_point(|&sum| sum < wanted).clamp(1, PARTS) - 1;
+            let wanted = integral[INTEGRAL_STEPS] * step as f64 / TABLE_STEPS as f64;
+            let part = integral.partition_point(|&sum| sum < wanted).clamp(1, INTEGRAL_STEPS) - 1;
             (edge(part) + width * (wanted - integral[part]) / (integral[part + 1] - integral[part])) as f32
         };
-        (0..=STEPS).map(offset).collect()
+        (0..=TABLE_STEPS).map(offset).collect()
     }
 }
 

@@ -119,12 +119,12 @@ fn bounds(primitive: &Primitive) -> Bounds {
 
 /// Largest length of (corner normal − geometric normal) that still counts as flat: below the
 /// precision of the encoding.
-const FLAT: f32 = 1e-4;
+const FLAT_TOLERANCE: f32 = 1e-4;
 
 fn corner_normals(triangle: &Triangle) -> Normals {
     let flat = triangle.geometric_normal();
     let [n0, n1, n2] = triangle.normals.map(octahedral);
-    let flat_shaded = u32::from(triangle.normals.iter().all(|normal| (*normal - flat).length() < FLAT));
+    let flat_shaded = u32::from(triangle.normals.iter().all(|normal| (*normal - flat).length() < FLAT_TOLERANCE));
     Normals { n0, n1, n2, flat_shaded }
 }
 

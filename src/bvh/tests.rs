@@ -147,7 +147,7 @@ fn fault(bvh: &Bvh) -> Option<String> {
 }
 
 #[test]
-fn holds_all_and_finds_what_brute_force_finds() {
+fn holds_every_primitive_and_agrees_with_brute_force() {
     for (triangles, spheres, size) in
         [(0, 0, 1.0), (1, 0, 1.0), (0, 1, 1.0), (2, 0, 1.0), (3, 1, 1.0), (5, 0, 1.0), (40, 9, 0.5), (3000, 200, 0.1)]
     {
@@ -175,7 +175,7 @@ fn looseness(node: &BvhNode, given: Bounds) -> Option<f32> {
 }
 
 #[test]
-fn boxes_in_few_bits_are_tight_and_hold_what_they_should() {
+fn quantized_boxes_are_tight_and_conservative() {
     let along_x = |low: f32, high: f32| Bounds { min: Vec3::new(low, 0.0, 0.0), max: Vec3::new(high, 1.0, 1.0) };
     let mut random = Random(3);
     for corner in [0.0, 1.0, -1.0, 1e6, -1e6, 1e18] {
@@ -255,7 +255,7 @@ fn same_tree_on_any_number_of_threads() {
 }
 
 #[test]
-fn flat_and_smooth_triangles_are_told_apart() {
+fn flat_and_smooth_triangles_are_distinguished() {
     let mut scene = random_scene(1, 1, 1.0, 5);
     assert_eq!(Bvh::build(&scene).normals.iter().map(|n| n.flat_shaded).sum::<u32>(), 1);
     scene.triangles[0].normals[1] = (scene.triangles[0].normals[1] + Vec3::splat(0.01)).normalize();

@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_lies_outside_is_cut_off() {
+    fn drawing_is_clipped() {
         let mut canvas = Canvas::new(4, 3, [9; 3]);
         canvas.fill((2, 1), (100, u32::MAX), [1, 2, 3]);
         canvas.set(4, 0, [0; 3]);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn text_leaves_ink() {
+    fn text_is_drawn() {
         let mut canvas = Canvas::new(40, 12, [0; 3]);
         let blank = canvas.clone();
         canvas.write(" ", (20, 1), &FONT_6X10, [255; 3], Alignment::Center);

@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn alike_is_nothing_and_growing_errors_grow() {
+    fn the_error_is_zero_for_equal_pictures_and_grows() {
         let reference: Vec<Color> = picture(ramp);
         let error = |strength: f32| {
             let wrong: Vec<Color> = reference.iter().map(|p| p.map(|x| x * (1.0 + strength))).collect();

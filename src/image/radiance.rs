@@ -22,7 +22,7 @@ const MAX_PIXELS: u64 = 1 << 27;
 
 /// Size limits by file length: pixels that any file may claim, and pixels per byte beyond that.
 /// Deflate, the strongest compression of the formats, expands one byte to at most 1032.
-const PIXELS_BEFORE_DOUBT: u64 = 1 << 20;
+const UNCHECKED_PIXELS: u64 = 1 << 20;
 const PIXELS_PER_BYTE: u64 = 1032;
 
 /// Magic bytes of the two formats.
@@ -92,14 +92,14 @@ fn checked_size(width: u64, height: u64, length: usize) -> std::result::Result<(
         (Ok(w @ 1..), Ok(h @ 1..)) if width * height <= MAX_PIXELS => (w, h),
         _ => return Err(format!("is {width} x {height} pixels; 1 to {MAX_PIXELS} pixels are read").into()),
     };
-    if u64::from(width) * u64::from(height) > PIXELS_BEFORE_DOUBT + PIXELS_PER_BYTE * length as u64 {
+    if u64::from(width) * u64::from(height) > UNCHECKED_PIXELS + PIXELS_PER_BYTE * length as u64 {
         return Err(format!("is damaged: {length} bytes do not hold {width} x {height} pixels").into());
     }
     Ok((width, height))
 }
 
 /// Converts an error of the Radiance HDR decoder.
-fn of_hdr(error: ImageError) -> Problem {
+fn hdr_problem(error: ImageError) -> Problem {
     match error {
         ImageError::IoError(_) => "is damaged: it ends too early".into(),
         ImageError::Unsupported(error) => format!("cannot be read: {error}").into(),
@@ -108,7 +108,7 @@ fn of_hdr(error: ImageError) -> Problem {
 }
 
 /// Converts an error of the OpenEXR decoder.
-fn of_exr(error: exr::error::Error) -> Problem {
+fn exr_problem(error: exr::error::Error) -> Problem {
     match error {
         exr::error::Error::NotSupported(what) => format!("cannot be read: {what}").into(),
         exr::error::Error::Invalid(what) => format!("is damaged: {what}").into(),
@@ -118,12 +118,12 @@ fn of_exr(error: exr::error::Error) -> Problem {
 
 fn decode_hdr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
     // The strict decoder accepts only one of the signatures in use; this one accepts any.
-    let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(of_hdr)?;
+    let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(hdr_problem)?;
     let exposure = decoder.metadata().exposure.unwrap_or(1.0);
     let (width, height) = decoder.dimensions();
     let (width, height) = checked_size(width.into(), height.into(), bytes.len())?;
     let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
-    decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(of_hdr)?;
+    decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(hdr_problem)?;
     let note = format!("its EXPOSURE of {exposure} is not undone, as in other renderers");
     Ok(RadiancePicture { width, height, pixels, notes: Vec::from_iter((exposure != 1.0).then_some(note)) })
 }
@@ -147,7 +147,7 @@ fn channels(header: &Header) -> Option<Channels> {
 
 // Decodes on one thread: a panic in a worker thread of the exr crate would end the process.
 fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(of_exr)?;
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(exr_problem)?;
     let part = meta.headers.iter().filter(|header| !header.deep).find_map(|header| Some((header, channels(header)?)));
     let (header, channels) = part.ok_or("has neither the channels R, G and B nor the luminance Y alone")?;
     if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
@@ -171,7 +171,7 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
                 .all_attributes()
                 .non_parallel()
                 .from_buffered(Cursor::new(bytes))
-                .map_err(of_exr)?
+                .map_err(exr_problem)?
                 .layer_data
                 .channel_data
                 .pixels
@@ -186,7 +186,7 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
                 .all_attributes()
                 .non_parallel()
                 .from_buffered(Cursor::new(bytes))
-                .map_err(of_exr)?
+                .map_err(exr_problem)?
                 .layer_data
                 .channel_data
                 .pixels

@@ -102,7 +102,7 @@ fn radiance_files_of_either_signature_are_read() {
 }
 
 #[test]
-fn what_is_no_radiance_is_mended_and_said() {
+fn invalid_radiance_is_repaired_and_noted() {
     let (inf, nan) = (f32::INFINITY, f32::NAN);
     let bytes =
         |y: [f32; 4]| exr(2, Vec2(0, 0), &[("B", floats(&[0.0; 4])), ("G", floats(&[7.0; 4])), ("R", floats(&y))]);
@@ -165,7 +165,7 @@ fn what_cannot_be_read_is_one_line() {
 }
 
 #[test]
-fn files_that_are_none_are_refused_before_they_are_read() {
+fn other_files_are_refused_by_their_first_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let refused = |bytes: &[u8]| {
         let path = folder.path().join("sky.hdr");

@@ -21,14 +21,14 @@ pub enum Tonemap {
 }
 
 /// Largest finite half float: upper limit of the input of a curve, which keeps infinity out.
-const BRIGHTEST: f32 = 65504.0;
+const MAX_INPUT: f32 = 65504.0;
 
 impl Tonemap {
     /// Maps linear Rec.709 to linear display values in [0, 1]. Negative values and NaN become
     /// black.
     #[must_use]
     pub fn apply(self, color: [f32; 3]) -> [f32; 3] {
-        let c = color.map(|x| if x > 0.0 { x.min(BRIGHTEST) } else { 0.0 });
+        let c = color.map(|x| if x > 0.0 { x.min(MAX_INPUT) } else { 0.0 });
         let mapped = match self {
             Self::Neutral => neutral(c),
             Self::Aces => aces(c),
@@ -93,8 +93,8 @@ mod tests {
     #[test]
     fn curves_have_their_known_values() {
         // Neutral, from the formula of the specification by hand: below the compression it
-        // subtracts 0.04, near black x²/0.16 remains, and grey 2 becomes 1 - 0.24²/(1.96 + 0.24 -
-        // 0.76) = 0.96.
+        // subtracts 0.04, near black x²/0.16 remains, and grey 2 becomes
+        // 1 - 0.24²/(1.96 + 0.24 - 0.76) = 0.96.
         assert_near(Tonemap::Neutral.apply([0.5, 0.4, 0.3]), [0.46, 0.36, 0.26]);
         assert_near(Tonemap::Neutral.apply([0.04; 3]), [0.01; 3]);
         assert_near(Tonemap::Neutral.apply([2.0; 3]), [0.96; 3]);

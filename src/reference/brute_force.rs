@@ -14,9 +14,12 @@ pub struct Found {
 
 impl Found {
     /// Chooses photons and radius from `near`, the squared distances and indices of the nearest
-    /// photons in ascending order. More than `k`: the first `k`, and the distance of the next one.
-    /// `m <= k`: the first `m - 1`, and the distance of the last one. `m <= k` and a `max_radius`,
-    /// inside which all of them lie: all of them, and that radius.
+    /// photons in ascending order.
+    ///
+    /// * More than `k` photons: the first `k`, and the distance of the next one.
+    /// * `m <= k` photons: the first `m - 1`, and the distance of the last one.
+    /// * `m <= k` photons and a `max_radius`, inside which all of them lie: all of them, and that
+    ///   radius.
     #[must_use]
     pub fn of(near: &[(f32, u32)], k: u32, max_radius: Option<f32>) -> Self {
         let (count, radius_squared) = match (near.get(k as usize), max_radius) {

@@ -13,7 +13,7 @@ use glam::Vec3;
 use super::{Found, brute_force::squared_distance};
 
 /// Subtrees of fewer photons are balanced without a task of their own.
-const SEQUENTIAL: usize = 4096;
+const MIN_TASK: usize = 4096;
 
 /// A balanced kd-tree of photons.
 #[derive(Clone, Debug)]
@@ -154,7 +154,7 @@ fn balance(nodes: &mut [Node]) {
     let order = |a: &Node, b: &Node| a.position[axis].total_cmp(&b.position[axis]).then(a.photon.cmp(&b.photon));
     let (left, root, right) = nodes.select_nth_unstable_by(left_size(nodes.len()), order);
     root.axis = axis as u8;
-    if left.len() < SEQUENTIAL {
+    if left.len() < MIN_TASK {
         balance(left);
         balance(right);
     } else {
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn every_node_divides_its_part() {
+    fn every_node_splits_its_subtree() {
         for count in [0, 1, 2, 3, 31, 32, 33, 1000] {
             let tree = KdTree::new(&positions(count));
             assert_eq!(tree.len(), count);

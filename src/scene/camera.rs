@@ -64,8 +64,8 @@ impl Camera {
             (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min))
         };
         let half = if half == Vec3::ZERO { Vec3::ONE } else { half };
-        let turn = Quat::from_rotation_y(AZIMUTH.to_radians()) * Quat::from_rotation_x(-ELEVATION.to_radians());
-        let [right, up, back] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| turn * axis);
+        let rotation = Quat::from_rotation_y(AZIMUTH.to_radians()) * Quat::from_rotation_x(-ELEVATION.to_radians());
+        let [right, up, back] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| rotation * axis);
         let yfov = ANGLE_OF_VIEW.to_radians();
         let slope = FILL * (0.5 * yfov).tan();
         // Each corner of the box requires a distance at which it is in view.

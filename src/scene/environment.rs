@@ -44,7 +44,7 @@ impl Environment {
     /// [`Error::Setting`] if the strength or rotation is out of range, or if the strength makes the
     /// brightest pixel infinite.
     pub fn load(path: &Path, strength: f32, rotation: f32) -> Result<Self> {
-        check_turn(strength, rotation)?;
+        check_parameters(strength, rotation)?;
         Self::from_bytes(&read_radiance_bytes(path)?, path, strength, rotation)
     }
 
@@ -53,7 +53,7 @@ impl Environment {
     /// # Errors
     /// As [`Environment::load`].
     pub fn from_bytes(bytes: &[u8], path: &Path, strength: f32, rotation: f32) -> Result<Self> {
-        check_turn(strength, rotation)?;
+        check_parameters(strength, rotation)?;
         let picture = decode_radiance(path, bytes)?;
         let brightest = picture.pixels.as_flattened().iter().copied().fold(0.0, f32::max);
         if !(brightest * strength).is_finite() {
@@ -131,7 +131,7 @@ fn wrong(name: &'static str, value: f32, problem: &str) -> Error {
     Error::Setting { name, value: value.to_string(), problem: problem.to_owned() }
 }
 
-fn check_turn(strength: f32, rotation: f32) -> Result<()> {
+fn check_parameters(strength: f32, rotation: f32) -> Result<()> {
     if !(strength.is_finite() && strength >= 0.0) {
         return Err(wrong("environment strength", strength, "is not a number from 0"));
     }
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn directions_lie_where_three_js_has_them() {
+    fn directions_map_as_in_three_js() {
         let map = map();
         // u = 0.5 + atan2(z, x)/2π: +X is the middle of the map, +Z three quarters, -Z one quarter,
         // -X both ends. Between two columns both have weight one half; the horizon lies between
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seam_is_none_and_pixels_blend() {
+    fn interpolation_is_bilinear_without_a_seam() {
         let map = map();
         let at = |u: f32| {
             let (sin, cos) = (std::f32::consts::TAU * (u - 0.5)).sin_cos();
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_uniform_one_is_the_same_from_everywhere() {
+    fn a_uniform_environment_is_isotropic() {
         let (sky, other) = (Environment::uniform(Vec3::new(1.0, 2.0, 3.0)), Environment::uniform(Vec3::ONE));
         for d in [Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(-0.6, 0.0, 0.8)] {
             assert_near(sky.radiance(d), Vec3::new(1.0, 2.0, 3.0));

@@ -17,8 +17,8 @@ pub const LUMENS_PER_WATT: f32 = 683.0;
 pub enum LightKind {
     /// Isotropic.
     Point,
-    /// Full intensity within the inner cone, none outside the outer one; half angles in radians, 0
-    /// ≤ inner < outer ≤ π/2.
+    /// Full intensity within the inner cone, none outside the outer one; half angles in radians,
+    /// 0 ≤ inner < outer ≤ π/2.
     Spot { inner: f32, outer: f32 },
     /// Parallel light from infinitely far away.
     Directional,
@@ -74,13 +74,14 @@ impl Light {
 
 /// Minimum width, in cosines, of the falloff between the cones of a spot (KHR_lights_punctual,
 /// "Inner and Outer Cone Angles").
-pub const LEAST_FALLOFF: f32 = 0.001;
+pub const MIN_FALLOFF: f32 = 0.001;
 
-/// Integral over the sphere of a spot's falloff `clamp((cos θ − cos outer) / (cos inner − cos
-/// outer), 0, 1)²`, steradians: 2π ((1 − cos inner) + (cos inner − cos outer)/3).
+/// Integral over the sphere of a spot's falloff, sr. The falloff is
+/// `clamp((cos θ − cos outer) / (cos inner − cos outer), 0, 1)²`, its integral
+/// 2π ((1 − cos inner) + (cos inner − cos outer)/3).
 fn spot_solid_angle(inner: f32, outer: f32) -> f32 {
     let (inner, outer) = (f64::from(inner).cos(), f64::from(outer).cos());
-    let width = (inner - outer).max(f64::from(LEAST_FALLOFF));
+    let width = (inner - outer).max(f64::from(MIN_FALLOFF));
     // In a cone so narrow that the falloff extends past its axis, full intensity is never reached.
     let reached = ((1.0 - outer) / width).min(1.0);
     let full = (1.0 - outer - width).max(0.0);

@@ -25,7 +25,7 @@ mod words;
 pub use camera::{Camera, Projection};
 pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};
 pub use environment::Environment;
-pub use light::{LEAST_FALLOFF, LUMENS_PER_WATT, Light, LightKind};
+pub use light::{LUMENS_PER_WATT, Light, LightKind, MIN_FALLOFF};
 pub use load_options::LoadOptions;
 pub use material::{Material, Surface};
 pub use shape::{Bounds, Sphere, Triangle};
@@ -110,21 +110,21 @@ impl Scene {
     /// Whether a surface has a delta BSDF, so that there can be caustics.
     #[must_use]
     pub fn has_delta(&self) -> bool {
-        self.shows(|material| material.surface.is_delta())
+        self.uses_material(|material| material.surface.is_delta())
     }
 
     /// Whether a surface emits light.
     #[must_use]
     pub fn has_emission(&self) -> bool {
-        self.shows(|material| material.emission != Vec3::ZERO)
+        self.uses_material(|material| material.emission != Vec3::ZERO)
     }
 
     /// Whether a triangle or sphere has a material that satisfies the predicate.
-    fn shows(&self, such: impl Fn(&Material) -> bool) -> bool {
-        let such: Vec<bool> = self.materials.iter().map(such).collect();
-        let is_such = |material: u32| such.get(material as usize) == Some(&true);
-        self.triangles.iter().any(|triangle| is_such(triangle.material))
-            || self.spheres.iter().any(|sphere| is_such(sphere.material))
+    fn uses_material(&self, predicate: impl Fn(&Material) -> bool) -> bool {
+        let satisfied: Vec<bool> = self.materials.iter().map(predicate).collect();
+        let satisfies = |material: u32| satisfied.get(material as usize) == Some(&true);
+        self.triangles.iter().any(|triangle| satisfies(triangle.material))
+            || self.spheres.iter().any(|sphere| satisfies(sphere.material))
     }
 
     /// Adds a soft uniform sky ([`Environment::sky`]) to a scene without any light, and a warning.
