@@ -1,6 +1,7 @@
-//! Seconds that the driver takes to compile each kernel, without its disk cache.
+//! Benchmark: compile time of each kernel in the driver, without its disk cache.
 //!
-//! `cargo bench --bench compile`. Each kernel runs one workgroup over zeroed buffers, twice; the first run compiles.
+//! `cargo bench --bench compile`. Each kernel runs one workgroup over zeroed buffers, twice; the
+//! first run includes compilation.
 
 use std::{process::Command, time::Instant};
 
@@ -9,9 +10,10 @@ use caustica::gpu::{
     shaders::{BindingKind, SHADERS},
 };
 
-/// Set in the process that measures: Mesa reads its environment when it is loaded.
+/// Environment variable of the measuring process. Mesa reads it when it is loaded, so that the
+/// benchmark starts itself again with it.
 const MEASURING: (&str, &str) = ("MESA_SHADER_CACHE_DISABLE", "true");
-/// Bytes of each zeroed buffer.
+/// Size of each zeroed buffer, bytes.
 const BYTES: u64 = 1 << 16;
 
 fn main() {
@@ -36,7 +38,7 @@ fn main() {
         gpu.wait().expect("the device works");
         let start = Instant::now();
         let kernel = Kernel::new(&gpu, shader.stem, &[]);
-        // One that does not ask for its number is a single invocation.
+        // A kernel without an invocation index runs as a single invocation.
         let invocations = if named.iter().any(|(name, _)| *name == "first_invocation") { 64 } else { 1 };
         let run = || {
             let mut encoder = gpu.encoder();

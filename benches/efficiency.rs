@@ -1,14 +1,15 @@
-//! Efficiency of whole renders: 1 / (relMSE · seconds of the process), against the references at 256 x 256.
+//! Benchmark: efficiency of whole renders, 1 / (relMSE · process seconds), against the references
+//! at 256 x 256.
 //!
-//! `cargo bench --bench efficiency`. Runs the program as a user would, driver cache warm, five times a setting; the
-//! table gives the median time.
+//! `cargo bench --bench efficiency`. Runs the program as a user would, with a warm driver cache,
+//! five times per setting. The table gives the median time.
 
 use std::{path::Path, process::Command, time::Instant};
 
 use caustica::image::{difference::rel_mse, read_exr};
 
 const RUNS: usize = 5;
-/// What is asked for, beside the size.
+/// Options of each measurement, besides the size.
 const SETTINGS: [&str; 4] = [
     "--photons 200k --spp 4",
     "--photons 200k --spp 4 --share 0",

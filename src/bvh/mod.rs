@@ -1,9 +1,10 @@
-//! Bounding volume hierarchy in the layout that the shaders traverse: a binary tree whose levels are then joined to nodes
-//! of up to [`WIDTH`] children with their boxes in few bits, so that a ray loads little.
+//! Bounding volume hierarchy in the layout that the shaders traverse. A binary tree is built first;
+//! its levels are then collapsed into nodes of up to [`WIDTH`] children with quantized bounding
+//! boxes, so that a ray loads few bytes.
 //!
-//! Node 0 is the root and always there: a scene with fewer than two primitives, of which no binary tree can be made, is filled
-//! up with triangles without area, which no ray hits. Following farther children later, a traversal postpones at most
-//! [`BVH_STACK`] of them.
+//! Node 0 is the root and always exists: a scene with fewer than two primitives, which gives no
+//! binary tree, is padded with degenerate triangles that no ray hits. A traversal defers the
+//! farther children and keeps at most [`BVH_STACK`] of them on its stack.
 
 use glam::Vec3;
 use obvhs::BvhBuildParams;
@@ -25,32 +26,32 @@ mod node;
 mod tests;
 mod widen;
 
-/// Children of a node at most.
+/// Maximum number of children of a node.
 pub const WIDTH: usize = 4;
 
-/// Primitives of a leaf at most.
+/// Maximum number of primitives of a leaf.
 pub const MAX_LEAF: u32 = 4;
 
-/// [`Primitive::id`] of a triangle that only fills up.
+/// [`Primitive::id`] of a padding triangle.
 pub const FILLER: u32 = u32::MAX;
 
-/// Nodes and primitives for the shaders.
+/// Nodes and primitives in device layout.
 #[derive(Clone, Debug, Default)]
 pub struct Bvh {
-    /// Interior nodes, parents before children; node 0 is the root.
+    /// Interior nodes, parents before children. Node 0 is the root.
     pub nodes: Vec<BvhNode>,
-    /// In the order of the leaves.
+    /// Primitives in leaf order.
     pub primitives: Vec<Primitive>,
-    /// One for each primitive.
+    /// Normals of each primitive, parallel to `primitives`.
     pub normals: Vec<Normals>,
 }
 
 impl Bvh {
-    /// Builds the tree over all triangles and spheres: PLOC with reinsertion (Meister and Bittner 2018, 2021). The
-    /// same scene gives the same tree, on any number of threads.
+    /// Builds the tree over all triangles and spheres: PLOC with reinsertion (Meister and Bittner
+    /// 2018, 2021). Equal scenes give equal trees on any number of threads.
     ///
     /// # Panics
-    /// With 2^28 triangles and spheres or more; files are refused long before.
+    /// If there are 2^28 triangles and spheres or more. The loader refuses such files earlier.
     #[must_use]
     pub fn build(scene: &Scene) -> Self {
         let mut primitives: Vec<Primitive> = Vec::with_capacity(scene.triangles.len() + scene.spheres.len());
@@ -70,15 +71,15 @@ impl Bvh {
         Self { normals: primitives.iter().map(normals).collect(), nodes, primitives }
     }
 
-    /// Children that a traversal postpones at most.
+    /// Maximum number of children that a traversal holds on its stack.
     #[must_use]
-    pub fn most_postponed(&self) -> usize {
-        // Those above each node.
-        let mut postponed = vec![0_usize; self.nodes.len()];
+    pub fn max_stack_depth(&self) -> usize {
+        // Deferred children on the stack when the traversal enters each node.
+        let mut deferred = vec![0_usize; self.nodes.len()];
         let mut most = 0;
         for (i, node) in self.nodes.iter().enumerate() {
-            let here = postponed[i] + node.children().count() - 1;
-            node.children().filter(|child| child.count == 0).for_each(|child| postponed[child.first as usize] = here);
+            let here = deferred[i] + node.children().count() - 1;
+            node.children().filter(|child| child.count == 0).for_each(|child| deferred[child.first as usize] = here);
             most = most.max(here);
         }
         debug_assert!(most <= BVH_STACK);
@@ -106,7 +107,7 @@ fn sphere_primitive(sphere: &Sphere) -> Primitive {
     }
 }
 
-/// Box around a primitive as the shaders see it.
+/// Bounding box of a primitive as the shaders see it.
 fn bounds(primitive: &Primitive) -> Bounds {
     let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(Vec3::from_array);
     if primitive.material & SPHERE_BIT != 0 {
@@ -116,17 +117,19 @@ fn bounds(primitive: &Primitive) -> Bounds {
     Bounds { min: v0.min(v1).min(v2), max: v0.max(v1).max(v2) }
 }
 
-/// Largest difference of a corner's normal from the geometric one that the encoding cannot tell.
-const FLAT: f32 = 1e-4;
+/// Largest length of (corner normal − geometric normal) that still counts as flat: below the
+/// precision of the encoding.
+const FLAT_TOLERANCE: f32 = 1e-4;
 
 fn corner_normals(triangle: &Triangle) -> Normals {
     let flat = triangle.geometric_normal();
     let [n0, n1, n2] = triangle.normals.map(octahedral);
-    let flat_shaded = u32::from(triangle.normals.iter().all(|normal| (*normal - flat).length() < FLAT));
+    let flat_shaded = u32::from(triangle.normals.iter().all(|normal| (*normal - flat).length() < FLAT_TOLERANCE));
     Normals { n0, n1, n2, flat_shaded }
 }
 
-/// The tree before conversion. On one thread: the order of equal keys in the parallel sorts is nobody's promise.
+/// Builds the tree before conversion. Runs on one thread: the parallel sorts do not promise an
+/// order of equal keys.
 fn build_binary(bounds: &[Bounds]) -> Bvh2 {
     let boxes: Vec<Aabb> = bounds.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
     let parameters = BvhBuildParams {
@@ -137,13 +140,13 @@ fn build_binary(bounds: &[Bounds]) -> Bvh2 {
         post_collapse_reinsertion_batch_ratio_multiplier: 2.0,
         sort_precision: SortPrecision::U64,
         max_prims_per_leaf: MAX_LEAF,
-        // In tests of a primitive, for a level of the binary tree.
+        // Cost of one level of the binary tree, in primitive tests.
         collapse_traversal_cost: 1.5,
     };
     let build = || build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
     match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
         Ok(pool) => pool.install(build),
-        // Without a thread to spare, this thread's pool does it.
+        // Falls back to the pool of this thread if no thread can be started.
         Err(_) => build(),
     }
 }

@@ -68,7 +68,7 @@ impl SceneBuffers {
             has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
             has_spheres: !scene.spheres.is_empty(),
             // In steps, so that few variants of a kernel are compiled.
-            stack: bvh.most_postponed().max(1).next_multiple_of(16),
+            stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
             lights,
         })
     }

@@ -121,7 +121,7 @@ fn finds_what_brute_force_finds() {
     ] {
         let scene = shapes(triangles, spheres, size, middle);
         let bvh = Bvh::build(&scene);
-        if bvh.most_postponed() <= 16 {
+        if bvh.max_stack_depth() <= 16 {
             short += 1
         } else {
             long += 1
