@@ -3,9 +3,14 @@
 
 use glam::Vec3;
 
-use super::{MAX_LEAF, WIDTH};
 use crate::layout::{BVH_INDEX_BITS, BvhNode};
 use crate::scene::Bounds;
+
+/// Children of a node at most.
+pub const WIDTH: usize = 4;
+
+/// Primitives of a leaf at most.
+pub const MAX_LEAF: u32 = 4;
 
 // The primitives of a leaf less one have two bits.
 const _: () = assert!(MAX_LEAF <= 4);

@@ -9,8 +9,9 @@ use json::mesh::{Mode, Primitive};
 use json::validation::Checked;
 use serde::Deserialize;
 
-use super::accessor::{Document, Format, MAX_ZEROS, Unpacked};
+use super::accessor::Document;
 use super::fault::{Read, fault};
+use super::format::{Format, MAX_ZEROS, Unpacked};
 
 const NAME: &str = "KHR_draco_mesh_compression";
 

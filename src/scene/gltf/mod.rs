@@ -21,6 +21,7 @@ mod draco;
 mod extensions;
 mod fault;
 mod files;
+mod format;
 mod instances;
 mod lights;
 mod materials;
@@ -86,7 +87,7 @@ fn assemble(
     mut hash: Sha256,
     mut notes: Notes,
 ) -> Read<Scene> {
-    let document = Document::new(root, buffers::read(root, resources, &mut hash)?)?;
+    let document = Document::new(root, buffers::read(root, resources, &mut hash)?)?.with_primitives(draco::decode)?;
     document.check()?;
     skins::check(&document)?;
     let shapes = meshes::check(&document, &mut notes)?;
