@@ -159,15 +159,149 @@ fn circles<'a>(uses: &Uses<'a>) -> Vec<Vec<&'a str>> {
     knots.into_iter().collect()
 }
 
+/// Folders in which circles are left. One that has none any more must go from here.
+const OPEN: [&str; 7] = ["compare/", "gpu/", "image/", "passes/", "renderer/", "scene/", "settings/"];
+
 #[test]
 fn no_circle_of_files() {
-    let sources = read_sources();
-    let sources: Vec<(&str, String)> = sources.iter().map(|(path, text)| (path.as_str(), text.clone())).collect();
-    let sources = Sources::new(&sources);
-    let uses = sources.uses();
+    let texts = read_sources();
+    let sources: Vec<(&str, String)> = texts.iter().map(|(path, text)| (path.as_str(), text.clone())).collect();
+    let uses = Sources::new(&sources).uses();
     assert!(uses.values().map(BTreeSet::len).sum::<usize>() > 300, "paths are resolved");
-    let found: Vec<String> = circles(&uses).iter().map(|knot| told(knot, &uses)).collect();
+    let found = circles(&uses);
+    let is_open = |knot: &[&str]| OPEN.iter().any(|folder| knot.iter().all(|file| file.starts_with(folder)));
+    let new: Vec<String> = found.iter().filter(|knot| !is_open(knot)).map(|knot| told(knot, &uses)).collect();
+    assert!(new.is_empty(), "{}", new.join("\n"));
+    let closed = |folder: &&str| !found.iter().any(|knot| knot[0].starts_with(folder));
+    let closed: Vec<_> = OPEN.iter().copied().filter(closed).collect();
+    assert!(closed.is_empty(), "no circle is left in these, take them out of OPEN: {closed:?}");
+}
+
+/// Circles among made-up files, one line each.
+fn knots(sources: &[(&str, &str)]) -> Vec<String> {
+    let sources: Vec<(&str, String)> = sources.iter().map(|(path, text)| (*path, (*text).to_string())).collect();
+    let uses = Sources::new(&sources).uses();
+    circles(&uses).iter().map(|knot| knot.join(" ")).collect()
+}
+
+#[test]
+fn circles_are_found() {
+    let two = "a/x.rs a/y.rs";
+    for (parent, x, y, expected) in [
+        ("mod x; mod y;", "use super::y::Y;", "use super::x::X;", &[two][..]),
+        ("mod x; mod y;", "use super::y::Y;", "fn f() { super::x::g() }", &[two]),
+        ("mod x; mod y;", "use crate::{b::B, a::{y::{self, Y}}};", "use super::x;", &[two]),
+        ("mod x; mod y; pub use x::X; pub use y::Y;", "use super::Y;", "use crate::a::X;", &[two]),
+        ("mod x; mod y; pub use x::f as g;", "use super::y::Y;", "use super::g;", &[two]),
+        // The parent defines what its child uses, and uses the child.
+        ("mod x; mod y; use x::X; struct A;", "use super::A;", "", &["a/mod.rs a/x.rs"]),
+        ("mod x; mod y; struct A; fn f() { x::g() }", "use super::{A, y::Y};", "", &["a/mod.rs a/x.rs"]),
+        // None.
+        ("mod x; mod y; pub use x::X; pub use y::Y;", "use super::Y;", "", &[]),
+        ("mod x; mod y;", "use super::y::Y;", "#[cfg(test)] mod tests { use super::super::x::X; }", &[]),
+        ("mod x; mod y;", "use super::y::Y;", "// use super::x::X;\nuse std::x::X;", &[]),
+    ] {
+        let found = knots(&[("lib.rs", "mod a;"), ("a/mod.rs", parent), ("a/x.rs", x), ("a/y.rs", y)]);
+        assert_eq!(found, expected, "{parent} | {x} | {y}");
+    }
+}
+
+/// The files and folders of a folder from the lowest to the highest: each uses those before it only. Its `mod.rs` may
+/// use all.
+const ORDERS: [(&str, &[&str]); 3] = [
+    ("passes", &["maps", "wavefront", "photons", "estimate", "camera"]),
+    (
+        "study",
+        &[
+            // Plan.
+            "numbers", "question", "plan", "grid", "preset", //
+            // Run.
+            "cost", "radii", "cells", "job", "picture", "corners", "spread", "measure", "run", //
+            // Report.
+            "findings", "claims", "chart", "plots", "sheet", "page", "summary", "table", "write",
+        ],
+    ),
+    (
+        "scene/gltf",
+        &[
+            // The file and its bytes.
+            "fault",
+            "topology",
+            "container",
+            "extensions",
+            "files",
+            "memory",
+            "strict_json",
+            "root", //
+            "format",
+            "buffers",
+            "meshopt",
+            "accessor",
+            "draco", //
+            // What it holds.
+            "materials",
+            "nodes",
+            "cameras",
+            "lights",
+            "spheres",
+            "instances",
+            "primitives",
+            "skins",
+            "meshes", //
+            // The scene.
+            "shown",
+            "placing",
+        ],
+    ),
+];
+
+/// Uses of a later file of the same folder, and files without a rank, one line each.
+fn against_order(folder: &str, order: &[&str], uses: &Uses) -> Vec<String> {
+    let entry = |file: &str| {
+        let below = file.strip_prefix(folder)?.strip_prefix('/')?;
+        Some(below.split('/').next()?.trim_end_matches(".rs").to_string()).filter(|name| name != "mod")
+    };
+    let rank = |name: &str| order.iter().position(|n| *n == name);
+    let mut found = Vec::new();
+    for (file, targets) in uses {
+        let Some(name) = entry(file) else { continue };
+        let Some(own) = rank(&name) else {
+            found.push(format!("{file}: {name} has no rank within {folder}; give it one here"));
+            continue;
+        };
+        let later = targets.iter().filter(|t| entry(t).and_then(|name| rank(&name)).is_some_and(|r| r > own));
+        found.extend(later.map(|target| format!("{file} uses {target}, which comes later")));
+    }
+    found
+}
+
+#[test]
+fn files_of_a_folder_use_earlier_ones() {
+    let texts = read_sources();
+    let sources: Vec<(&str, String)> = texts.iter().map(|(path, text)| (path.as_str(), text.clone())).collect();
+    let uses = Sources::new(&sources).uses();
+    let found: Vec<String> = ORDERS.iter().flat_map(|(folder, order)| against_order(folder, order, &uses)).collect();
     assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn uses_of_later_files_are_found() {
+    let of = |maps: &str, camera: &str| {
+        let sources = [
+            ("passes/mod.rs", "pub mod maps; pub mod camera;"),
+            ("passes/maps/mod.rs", "pub mod sort; pub use sort::Sort;"),
+            ("passes/maps/sort.rs", maps),
+            ("passes/camera.rs", camera),
+        ];
+        let sources: Vec<(&str, String)> = sources.iter().map(|(path, text)| (*path, (*text).to_string())).collect();
+        against_order("passes", &["maps", "camera"], &Sources::new(&sources).uses())
+    };
+    assert_eq!(of("use crate::layout::X;", "use super::maps::Sort;"), Vec::<String>::new());
+    let wrong = ["passes/maps/sort.rs uses passes/camera.rs, which comes later"];
+    assert_eq!(of("use super::super::camera::Camera;", ""), wrong);
+    assert_eq!(of("use crate::passes::{self, camera};", ""), wrong);
+    let unknown = Sources::new(&[("passes/new.rs", String::new())]).uses();
+    assert_eq!(against_order("passes", &["maps"], &unknown).len(), 1);
 }
 
 fn told(knot: &[&str], uses: &Uses) -> String {

@@ -118,7 +118,17 @@ fn constants() -> Vec<(&'static str, u64)> {
         BOUND_LANES,
         SEARCH_STATE_BYTES,
         DISC_BYTES,
-        GATHER_STATE_BYTES
+        GATHER_STATE_BYTES,
+        MAX_WORKGROUPS,
+        PATH_MASK,
+        PLACE_SHIFT,
+        PLACE_MASK,
+        KEY_BITS,
+        PACKET_BLOCK,
+        QUERY_BLOCK,
+        PILOT_STRIDE,
+        FIRST_PILOT_STRIDE,
+        MOST_RAYS
     ]
     .to_vec()
 }
@@ -259,6 +269,22 @@ fn this_test_knows_every_struct_and_constant_of_the_host() {
     assert!(missing.is_empty(), "add to this test: {missing:?}");
 }
 
+/// Constants of the host that bound an array or a buffer there and have no name of their own in the shaders.
+const WITHOUT_A_NAME: [&str; 3] = ["SEARCH_STATE_BYTES", "DISC_BYTES", "GATHER_STATE_BYTES"];
+
+#[test]
+fn every_constant_of_the_host_stands_in_some_kernel() {
+    let in_kernel = |name: &str| SHADERS.iter().any(|s| names_value(s.wgsl, name));
+    let without: Vec<_> = constants().into_iter().map(|(name, _)| name).filter(|name| !in_kernel(name)).collect();
+    assert_eq!(without, WITHOUT_A_NAME, "the host has constants that no kernel names, or a name was added to one");
+    assert!(names_value(GOOD, "SPHERE_BIT") && !names_value(GOOD, "DELTA_BIT"), "control");
+}
+
+fn names_value(wgsl: &str, name: &str) -> bool {
+    let module = naga::front::wgsl::parse_str(wgsl).expect("composed shaders are valid");
+    named_values(&module).iter().any(|(n, _)| n == name)
+}
+
 #[test]
 fn every_struct_of_the_host_lies_in_some_kernels_buffer() {
     let bound: Vec<String> = SHADERS.iter().flat_map(|s| bound_names(s.wgsl)).collect();
@@ -280,6 +306,7 @@ fn bound_names(wgsl: &str) -> Vec<String> {
 const GOOD: &str = "
     const WORKGROUP_SIZE: u32 = 64u;
     const SPHERE_BIT = 1u << 31u;
+    const PLACE_MASK = 0xfffu;
     struct Photon { position: vec3f, wi: u32, flux: vec3f, normal: u32 }
     struct Path {
         origin: vec3f, flags: u32, direction: vec3f, bounces: u32, beta: vec3f, media_count: u32, media: array<u32, 4>,
@@ -306,6 +333,7 @@ fn each_kind_of_disagreement_is_reported() {
         (", normal: u32 }", ", normal: u32, more: u32 }", "Photon takes"),
         ("SPHERE_BIT = 1u << 31u", "SPHERE_BIT = 1u << 30u", "SPHERE_BIT is"),
         ("= 64u", "= 32u", "WORKGROUP_SIZE is"),
+        ("PLACE_MASK = 0xfffu", "PLACE_MASK = 0x7ffu", "PLACE_MASK is"),
         ("@workgroup_size(WORKGROUP_SIZE)", "@workgroup_size(8, 8)", "workgroups of"),
         ("media: array<u32, 4>", "media: array<Medium, 4>", "Medium lies in a buffer"),
         ("struct Photon", "@group(2) @binding(1) var<storage> s: array<SearchState>; struct Photon", "SearchState"),
