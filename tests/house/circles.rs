@@ -249,7 +249,7 @@ const ORDERS: [(&str, &[&str]); 3] = [
             "skins",
             "meshes", //
             // The scene.
-            "shown",
+            "mesh_cache",
             "placing",
         ],
     ),

@@ -269,14 +269,25 @@ fn this_test_knows_every_struct_and_constant_of_the_host() {
     assert!(missing.is_empty(), "add to this test: {missing:?}");
 }
 
-/// Constants of the host that bound an array or a buffer there and have no name of their own in the shaders.
-const WITHOUT_A_NAME: [&str; 3] = ["SEARCH_STATE_BYTES", "DISC_BYTES", "GATHER_STATE_BYTES"];
+/// Constants that no kernel names: sizes of structs; values that a kernel reads from a field or tells by the others of
+/// their kind; a bound of the host's own. Their values are not compared.
+const NOT_NAMED: [&str; 8] = [
+    "SEARCH_STATE_BYTES",
+    "DISC_BYTES",
+    "GATHER_STATE_BYTES",
+    "GLASS",
+    "STREAM_PHOTON",
+    "STREAM_CAUSTIC",
+    "SAMPLER_SOBOL",
+    "MAX_TARGETS",
+];
 
 #[test]
-fn every_constant_of_the_host_stands_in_some_kernel() {
+fn every_other_constant_of_the_host_stands_in_some_kernel() {
     let in_kernel = |name: &str| SHADERS.iter().any(|s| names_value(s.wgsl, name));
-    let without: Vec<_> = constants().into_iter().map(|(name, _)| name).filter(|name| !in_kernel(name)).collect();
-    assert_eq!(without, WITHOUT_A_NAME, "the host has constants that no kernel names, or a name was added to one");
+    let is_missing = |name: &&str| !NOT_NAMED.contains(name) && !in_kernel(name);
+    let missing: Vec<_> = constants().into_iter().map(|(name, _)| name).filter(is_missing).collect();
+    assert!(missing.is_empty(), "no kernel names {missing:?}, so nothing compares their values");
     assert!(names_value(GOOD, "SPHERE_BIT") && !names_value(GOOD, "DELTA_BIT"), "control");
 }
 
