@@ -10,6 +10,8 @@ use bytemuck::{Pod, Zeroable};
 pub const WORKGROUP_SIZE: u32 = 64;
 /// Bits of the index of a node or a primitive where more stands above it.
 pub const BVH_INDEX_BITS: u32 = 28;
+/// Workgroups per dimension that every adapter can dispatch.
+pub const MAX_WORKGROUPS: u32 = 65_535;
 /// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.
 pub const BVH_STACK: usize = 48;
 /// Media that a path can be inside of at once.
@@ -313,6 +315,11 @@ pub const MAX_TARGETS: u32 = 32;
 
 /// Set in the key of a staged photon that belongs to the caustic map.
 pub const CAUSTIC_BIT: u32 = 0x8000_0000;
+/// Key of a staged photon: the low bits are the path within its batch,
+pub const PATH_MASK: u32 = 0x7ffff;
+/// and from this bit on, as many as the mask has, the photon's number on its path.
+pub const PLACE_SHIFT: u32 = 19;
+pub const PLACE_MASK: u32 = 0xfff;
 
 /// What `store_photons` needs to know; see there.
 #[repr(C)]
@@ -427,6 +434,18 @@ pub struct FinalStep {
 /// Photons of a finest cell of the photon grid; cells of a coarser one.
 pub const CELL_PHOTONS: u32 = 16;
 pub const CELL_FAN: u32 = 8;
+/// Bits per axis in one word of a Hilbert key.
+pub const KEY_BITS: u32 = 10;
+/// Packets that are searched together: a block.
+pub const PACKET_BLOCK: u32 = 8;
+/// Queries of a block.
+pub const QUERY_BLOCK: u32 = 32;
+/// One block of so many is a pilot, which is searched before the others,
+pub const PILOT_STRIDE: u32 = 8;
+/// and one of so many before these.
+pub const FIRST_PILOT_STRIDE: u32 = 64;
+/// Rays that survey one disc at most.
+pub const MOST_RAYS: u32 = 150;
 
 /// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert curve, or
 /// [`CELL_FAN`] cells of the next finer level. Cells lie level by level, the coarsest, which is one cell, first.

@@ -4,9 +4,14 @@
 
 use glam::Vec3;
 
-use super::{MAX_LEAF, WIDTH};
 use crate::layout::{BVH_INDEX_BITS, BvhNode};
 use crate::scene::Bounds;
+
+/// Maximum number of children of a node.
+pub const WIDTH: usize = 4;
+
+/// Maximum number of primitives of a leaf.
+pub const MAX_LEAF: u32 = 4;
 
 // The primitive count of a leaf, less one, is stored in two bits.
 const _: () = assert!(MAX_LEAF <= 4);

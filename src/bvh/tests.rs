@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::{Bvh, BvhChild, MAX_LEAF, WIDTH, bounds};
+use super::{Bvh, BvhChild, MAX_LEAF, WIDTH, build::bounds, build::build_binary};
 use crate::layout::{BVH_STACK, BvhNode, Primitive, SPHERE_BIT};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
@@ -226,7 +226,7 @@ fn deferred_children_fit_on_the_stack() {
         let s = 1.02_f32.powi(i - 2000);
         scene.triangles.push(triangle([Vec3::ZERO, Vec3::new(s, 0.0, s), Vec3::new(0.0, s, s)]));
     }
-    let deep = super::build_binary(&Bvh::build(&scene).primitives.iter().map(bounds).collect::<Vec<_>>());
+    let deep = build_binary(&Bvh::build(&scene).primitives.iter().map(bounds).collect::<Vec<_>>());
     assert!(
         super::convert::height(&deep) > super::convert::MAX_HEIGHT as usize,
         "the scene must need the limit: {}",

@@ -225,8 +225,7 @@ fn starting_at(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, first: u64
     })
 }
 
-/// Workgroups per dimension that every adapter can dispatch.
-const MAX_WORKGROUPS: u64 = 65_535;
+const MAX_WORKGROUPS: u64 = crate::layout::MAX_WORKGROUPS as u64;
 
 /// Folds a count of workgroups to two dimensions; all rows but the last are full, none is needless.
 fn fold(workgroups: u64) -> (u32, u32) {

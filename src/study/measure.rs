@@ -6,7 +6,7 @@ use super::{
     Combination, Plan, Radii,
     cells::Measured,
     corners::corner_region,
-    grid::short,
+    numbers::short,
     plan::Look,
     spread::{bias, noise},
 };

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::claims::Question;
+use super::question::Question;
 use crate::{
     error::{Error, Result},
     image::{Frame, Tonemap},

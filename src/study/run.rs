@@ -246,7 +246,7 @@ impl Study<'_> {
                 "{}: our own finer render, the mean of {} passes of {} photons a map, k = {}, {} samples a pixel",
                 subject.scene.file_name,
                 f.passes,
-                super::grid::short(f.photons),
+                super::numbers::short(f.photons),
                 f.neighbors,
                 f.spp
             )),
