@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::{
     Buffer, Commands, Gpu,
-    shaders::{BindingKind, Shader, shader},
+    shaders::{BindingKind, SHADERS, Shader, shader},
 };
 
 /// The bind group that says which part of a dispatch runs: owned here, filled for each dispatch (`shaders/bindings/dispatch.wesl`).
@@ -87,26 +87,33 @@ impl Program {
 }
 
 impl Kernel {
-    /// The kernel `stem`, which other threads begin to compile; `overrides` sets its `override` constants. Names that this
-    /// kernel does not have are passed over, so that one list serves several kernels.
+    /// The kernel `stem`, which other threads begin to compile; `overrides` sets its `override` constants. Names that only
+    /// other kernels have are passed over, so that one list serves several kernels.
     ///
     /// # Panics
-    /// If no kernel has that stem.
+    /// If no kernel has that stem, or none a constant of one of the names.
     #[must_use]
     pub fn new(gpu: &Gpu, stem: &str, overrides: &[(&str, f64)]) -> Self {
         let shader = shader(stem);
+        for (name, _) in overrides {
+            assert!(SHADERS.iter().any(|s| s.overrides.contains(name)), "{stem}: no kernel has an override {name}");
+        }
         let value = |name: &str| overrides.iter().find(|(n, _)| *n == name).map(|(_, value)| *value);
         let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();
         Self(gpu.compiler.program(&gpu.device, &gpu.parts.layout, shader, constants))
     }
 
-    /// Binds buffers by the names of the shader's variables. Names that this kernel does not use are passed over, so
+    /// Binds buffers by the names of the shader's variables. Names that only other kernels use are passed over, so
     /// that one list serves several kernels.
     ///
     /// # Panics
-    /// If a variable of the kernel has no buffer in the list.
+    /// If a variable of the kernel has no buffer in the list, or no kernel has a variable of one of the names.
     #[must_use]
     pub fn bind(&self, gpu: &Gpu, buffers: &[(&str, &Buffer)]) -> Bindings {
+        for (name, _) in buffers {
+            let is_known = SHADERS.iter().any(|s| s.bindings.iter().any(|b| b.name == *name));
+            assert!(is_known, "{}: no kernel binds {name}", self.0.shader.stem);
+        }
         let find = |name: &str| {
             buffers
                 .iter()
@@ -259,7 +266,10 @@ fn layout_entry(binding: u32, kind: BindingKind) -> wgpu::BindGroupLayoutEntry {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
+    use std::{
+        panic::{AssertUnwindSafe, catch_unwind},
+        sync::Arc,
+    };
 
     use super::{Kernel, fold};
     use crate::gpu::{Gpu, shaders::SHADERS};
@@ -270,11 +280,29 @@ mod tests {
         let same = |a: &[(&str, f64)], b: &[(&str, f64)]| {
             Arc::ptr_eq(&Kernel::new(&gpu, "gather", a).0, &Kernel::new(&gpu, "gather", b).0)
         };
-        assert!(same(&[("WINDOWS", 1.0)], &[("NOT_OF_THIS_KERNEL", 3.0), ("WINDOWS", 1.0)]));
+        assert!(same(&[("WINDOWS", 1.0)], &[("STACK_WORDS", 3.0), ("WINDOWS", 1.0)]));
         assert!(!same(&[("WINDOWS", 1.0)], &[("WINDOWS", 2.0)]), "control: constants matter");
         // Those that were asked for and never used hold up nobody.
         let all: Vec<_> = SHADERS.iter().map(|shader| Kernel::new(&gpu, shader.stem, &[])).collect();
         drop((gpu, all));
+    }
+
+    #[test]
+    fn names_that_no_kernel_has_are_bugs() {
+        let gpu = Gpu::open(None).expect("tests need an adapter");
+        let buffer = gpu.storage::<u32>("anything", 1).expect("fits");
+        let message = |what: &dyn Fn()| {
+            let panic = catch_unwind(AssertUnwindSafe(what)).expect_err("it panics");
+            panic.downcast::<String>().map_or_else(|_| String::new(), |text| *text)
+        };
+        let kernel = Kernel::new(&gpu, "merge_bounds", &[("WINDOWS", 1.0)]);
+        let wrong_override = message(&|| drop(Kernel::new(&gpu, "merge_bounds", &[("WINDOW", 1.0)])));
+        assert_eq!(wrong_override, "merge_bounds: no kernel has an override WINDOW");
+        let name = kernel.0.shader.bindings[0].name;
+        let wrong_binding = message(&|| drop(kernel.bind(&gpu, &[(name, &buffer), ("photon", &buffer)])));
+        assert_eq!(wrong_binding, "merge_bounds: no kernel binds photon");
+        // Control: those of other kernels are passed over.
+        drop(kernel.bind(&gpu, &[(name, &buffer), ("points", &buffer)]));
     }
 
     #[test]
