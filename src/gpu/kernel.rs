@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use super::{
-    Buffer, Commands, Gpu,
+    Buffer, Commands, Gpu, Table,
     shaders::{BindingKind, SHADERS, Shader, shader},
 };
 
@@ -12,7 +12,11 @@ const PART_GROUP: u32 = 3;
 
 /// A compute kernel. Several that are equal share what was compiled.
 #[derive(Clone, Debug)]
-pub struct Kernel(Arc<Program>);
+pub struct Kernel {
+    program: Arc<Program>,
+    /// Those of which its dispatches read, by the names of the shader's variables.
+    tables: Vec<(&'static str, Table)>,
+}
 
 /// The buffers of one dispatch, one bind group per group that the kernel uses.
 #[derive(Debug)]
@@ -98,46 +102,56 @@ impl Kernel {
         for (name, _) in overrides {
             assert!(SHADERS.iter().any(|s| s.overrides.contains(name)), "{stem}: no kernel has an override {name}");
         }
-        let value = |name: &str| overrides.iter().find(|(n, _)| *n == name).map(|(_, value)| *value);
+        let of_device = [("LANES", f64::from(gpu.lanes))];
+        let value = |name: &str| overrides.iter().chain(&of_device).find(|(n, _)| *n == name).map(|(_, value)| *value);
         let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();
-        Self(gpu.compiler.program(&gpu.device, &gpu.parts.layout, shader, constants))
+        let program = gpu.compiler.program(&gpu.device, &gpu.parts.layout, shader, constants);
+        Self { program, tables: Vec::new() }
+    }
+
+    /// The kernel with tables for all its dispatches. Names that only other kernels use are passed over.
+    #[must_use]
+    pub fn with_tables(mut self, tables: &[(&'static str, &Table)]) -> Self {
+        let binds = |name: &str| self.program.shader.bindings.iter().any(|b| b.name == name);
+        let used = tables.iter().filter(|(name, _)| binds(name));
+        self.tables = used.map(|(name, table)| (*name, (*table).clone())).collect();
+        self
     }
 
     /// Binds buffers by the names of the shader's variables. Names that only other kernels use are passed over, so
     /// that one list serves several kernels.
     ///
     /// # Panics
-    /// If a variable of the kernel has no buffer in the list, or no kernel has a variable of one of the names.
+    /// If a variable of the kernel has no buffer in the list, nor a table in [`Self::with_tables`], or no kernel has a variable of one of the names.
     #[must_use]
     pub fn bind(&self, gpu: &Gpu, buffers: &[(&str, &Buffer)]) -> Bindings {
         for (name, _) in buffers {
             let is_known = SHADERS.iter().any(|s| s.bindings.iter().any(|b| b.name == *name));
-            assert!(is_known, "{}: no kernel binds {name}", self.0.shader.stem);
+            assert!(is_known, "{}: no kernel binds {name}", self.program.shader.stem);
         }
         let find = |name: &str| {
-            buffers
-                .iter()
-                .find(|(n, _)| *n == name)
-                .unwrap_or_else(|| panic!("{}: no buffer is bound to {name}", self.0.shader.stem))
-                .1
+            let buffer = buffers.iter().find(|(n, _)| *n == name).map(|(_, buffer)| buffer.as_entire_binding());
+            let table = self.tables.iter().find(|(n, _)| *n == name).map(|(_, table)| table.view());
+            let found = buffer.or(table.map(wgpu::BindingResource::TextureView));
+            found.unwrap_or_else(|| panic!("{}: nothing is bound to {name}", self.program.shader.stem))
         };
         let group = |(g, layout): (usize, &Option<wgpu::BindGroupLayout>)| {
             let entries: Vec<_> = self
-                .0
+                .program
                 .shader
                 .bindings
                 .iter()
                 .filter(|b| b.group as usize == g)
-                .map(|b| wgpu::BindGroupEntry { binding: b.index, resource: find(b.name).as_entire_binding() })
+                .map(|b| wgpu::BindGroupEntry { binding: b.index, resource: find(b.name) })
                 .collect();
             let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some(self.0.shader.stem),
+                label: Some(self.program.shader.stem),
                 layout: layout.as_ref()?,
                 entries: &entries,
             });
             Some((g as u32, bind_group))
         };
-        Bindings(self.0.compiled().layouts.iter().enumerate().filter_map(group).collect())
+        Bindings(self.program.compiled().layouts.iter().enumerate().filter_map(group).collect())
     }
 
     /// Runs `invocations` invocations, in workgroups of [`crate::layout::WORKGROUP_SIZE`] folded to two dimensions
@@ -155,13 +169,13 @@ impl Kernel {
 
     fn record(&self, commands: &mut Commands, bindings: &Bindings, most: u64, arguments: Option<&Buffer>) {
         let gpu = commands.gpu;
-        let stem = self.0.shader.stem;
+        let stem = self.program.shader.stem;
         let record = |pass: &mut wgpu::ComputePass<'_>, first: u64, invocations: u64| {
-            pass.set_pipeline(&self.0.compiled().pipeline);
+            pass.set_pipeline(&self.program.compiled().pipeline);
             for (group, bind_group) in &bindings.0 {
                 pass.set_bind_group(*group, bind_group, &[]);
             }
-            if self.0.can_be_cut() {
+            if self.program.can_be_cut() {
                 pass.set_bind_group(PART_GROUP, &gpu.parts.from(gpu, first), &[]);
             }
             match arguments {
@@ -173,7 +187,7 @@ impl Kernel {
                 }
             }
         };
-        match self.0.can_be_cut() {
+        match self.program.can_be_cut() {
             true => commands.dispatch(stem, most, record),
             false => {
                 assert_eq!(most, 1, "{stem}: a kernel without invocation_index is a single invocation");
@@ -248,20 +262,18 @@ fn group_layout(device: &wgpu::Device, shader: &Shader, group: u32) -> Option<wg
 }
 
 fn layout_entry(binding: u32, kind: BindingKind) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty: match kind {
-                BindingKind::Uniform => wgpu::BufferBindingType::Uniform,
-                BindingKind::ReadOnly => wgpu::BufferBindingType::Storage { read_only: true },
-                BindingKind::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
-            },
-            has_dynamic_offset: false,
-            min_binding_size: None,
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let ty = match kind {
+        BindingKind::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+        BindingKind::ReadOnly => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+        BindingKind::ReadWrite => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+        BindingKind::Table => wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Uint,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
         },
-        count: None,
-    }
+    };
+    wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
 }
 
 #[cfg(test)]
@@ -278,7 +290,7 @@ mod tests {
     fn equal_kernels_are_compiled_once() {
         let gpu = Gpu::open(None).expect("tests need an adapter");
         let same = |a: &[(&str, f64)], b: &[(&str, f64)]| {
-            Arc::ptr_eq(&Kernel::new(&gpu, "gather", a).0, &Kernel::new(&gpu, "gather", b).0)
+            Arc::ptr_eq(&Kernel::new(&gpu, "gather", a).program, &Kernel::new(&gpu, "gather", b).program)
         };
         assert!(same(&[("WINDOWS", 1.0)], &[("STACK_WORDS", 3.0), ("WINDOWS", 1.0)]));
         assert!(!same(&[("WINDOWS", 1.0)], &[("WINDOWS", 2.0)]), "control: constants matter");
@@ -298,7 +310,7 @@ mod tests {
         let kernel = Kernel::new(&gpu, "merge_bounds", &[("WINDOWS", 1.0)]);
         let wrong_override = message(&|| drop(Kernel::new(&gpu, "merge_bounds", &[("WINDOW", 1.0)])));
         assert_eq!(wrong_override, "merge_bounds: no kernel has an override WINDOW");
-        let name = kernel.0.shader.bindings[0].name;
+        let name = kernel.program.shader.bindings[0].name;
         let wrong_binding = message(&|| drop(kernel.bind(&gpu, &[(name, &buffer), ("photon", &buffer)])));
         assert_eq!(wrong_binding, "merge_bounds: no kernel binds photon");
         // Control: those of other kernels are passed over.
