@@ -98,9 +98,16 @@ impl Kernel {
     /// If no kernel has that stem, or none a constant of one of the names.
     #[must_use]
     pub fn new(gpu: &Gpu, stem: &str, overrides: &[(&str, f64)]) -> Self {
-        let shader = shader(stem);
+        Self::of(gpu, shader(stem), overrides)
+    }
+
+    /// The same of an entry of another table: the probes of the tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn of(gpu: &Gpu, shader: &'static Shader, overrides: &[(&str, f64)]) -> Self {
         for (name, _) in overrides {
-            assert!(SHADERS.iter().any(|s| s.overrides.contains(name)), "{stem}: no kernel has an override {name}");
+            let is_known = SHADERS.iter().chain([shader]).any(|s| s.overrides.contains(name));
+            assert!(is_known, "{}: no kernel has an override {name}", shader.stem);
         }
         let of_device = [("LANES", f64::from(gpu.lanes))];
         let value = |name: &str| overrides.iter().chain(&of_device).find(|(n, _)| *n == name).map(|(_, value)| *value);
@@ -126,7 +133,8 @@ impl Kernel {
     #[must_use]
     pub fn bind(&self, gpu: &Gpu, buffers: &[(&str, &Buffer)]) -> Bindings {
         for (name, _) in buffers {
-            let is_known = SHADERS.iter().any(|s| s.bindings.iter().any(|b| b.name == *name));
+            let mut all = SHADERS.iter().chain([self.program.shader]);
+            let is_known = all.any(|s| s.bindings.iter().any(|b| b.name == *name));
             assert!(is_known, "{}: no kernel binds {name}", self.program.shader.stem);
         }
         let find = |name: &str| {

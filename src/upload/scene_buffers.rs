@@ -9,7 +9,10 @@ use crate::{
     bvh::Bvh,
     emitters::light_table::{LightTable, emission_in},
     error::Result,
-    gpu::{Buffer, Gpu, Kernel, Table},
+    gpu::{
+        Buffer, Gpu, Kernel, Table,
+        shaders::{Shader, shader},
+    },
     layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
     scene::{Material, Scene, Surface},
     settings::{LightUnit, Sampler, Settings},
@@ -71,6 +74,13 @@ impl SceneBuffers {
     /// The same with further `override` constants.
     #[must_use]
     pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
+        self.kernel_of(gpu, shader(stem), others)
+    }
+
+    /// The same of an entry of another table: the probes of the tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
             ("SAMPLER", f64::from(self.sampler())),
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
@@ -82,7 +92,7 @@ impl SceneBuffers {
         overrides.extend_from_slice(others);
         let [pixels, cells, rows] = self.lights.tables();
         let tables = [("normals", &self.normals), ("materials", &self.materials), pixels, cells, rows];
-        Kernel::new(gpu, stem, &overrides).with_tables(&tables)
+        Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }
 
     fn sampler(&self) -> u32 {
