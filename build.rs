@@ -63,6 +63,7 @@ fn shader_entry(stem: &str, wgsl: &str) -> String {
         }
         let kind = match var.space {
             naga::AddressSpace::Uniform => "Uniform",
+            naga::AddressSpace::Handle => "Table",
             naga::AddressSpace::Storage { access } if access.contains(naga::StorageAccess::STORE) => "ReadWrite",
             _ => "ReadOnly",
         };
@@ -74,9 +75,11 @@ fn shader_entry(stem: &str, wgsl: &str) -> String {
         )
         .expect("a String can be written");
     }
+    let workgroup_size: u32 = entry.workgroup_size.iter().product();
     let overrides: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
     format!(
-        "    Shader {{ stem: {stem:?}, wgsl: {wgsl:?}, overrides: &{overrides:?}, bindings: &[\n{bindings}    ] }},\n"
+        "    Shader {{ stem: {stem:?}, wgsl: {wgsl:?}, overrides: &{overrides:?}, bindings: &[\n{bindings}    ], \
+         workgroup_size: {workgroup_size} }},\n"
     )
 }
 

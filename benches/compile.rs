@@ -6,7 +6,7 @@
 use std::{process::Command, time::Instant};
 
 use caustica::gpu::{
-    Buffer, Gpu, Kernel,
+    Buffer, Gpu, Kernel, Table,
     shaders::{BindingKind, SHADERS},
 };
 
@@ -29,15 +29,18 @@ fn main() {
         let buffers: Vec<(&str, Buffer)> = shader
             .bindings
             .iter()
+            .filter(|b| b.kind != BindingKind::Table)
             .map(|b| match b.kind {
                 BindingKind::Uniform => (b.name, gpu.uniform("zeros", &[0_u32; 256])),
                 _ => (b.name, gpu.storage::<u8>("zeros", BYTES).expect("a small buffer fits")),
             })
             .collect();
         let named: Vec<_> = buffers.iter().map(|(name, buffer)| (*name, buffer)).collect();
+        let zeros = Table::new(&gpu, "zeros", &[[0_u32; 4]; 64]).expect("a small table fits");
+        let tables: Vec<_> = shader.bindings.iter().map(|b| (b.name, &zeros)).collect();
         gpu.wait().expect("the device works");
         let start = Instant::now();
-        let kernel = Kernel::new(&gpu, shader.stem, &[]);
+        let kernel = Kernel::new(&gpu, shader.stem, &[]).with_tables(&tables);
         // A kernel without an invocation index runs as a single invocation.
         let invocations = if named.iter().any(|(name, _)| *name == "first_invocation") { 64 } else { 1 };
         let run = || {

@@ -65,6 +65,9 @@ pub struct Normals {
     pub flat_shaded: u32,
 }
 
+/// Texels in a row of a table (`gpu::Table`): the least width of a texture that every device has.
+pub const TABLE_COLUMNS: u32 = 2048;
+
 /// Kinds of [`Material`].
 pub const DIFFUSE: u32 = 0;
 pub const MIRROR: u32 = 1;
@@ -641,9 +644,7 @@ pub struct GridStep {
 }
 
 /// Bytes of `SearchState` in the shaders, in which a query waits for its next dispatch.
-pub const SEARCH_STATE_BYTES: usize = 64;
-/// Bytes of `Disc` in the shaders: the surface around a query.
-pub const DISC_BYTES: usize = 48;
+pub const SEARCH_STATE_BYTES: usize = 112;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
 pub const GATHER_STATE_BYTES: usize = 1072;
 

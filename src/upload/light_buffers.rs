@@ -9,7 +9,7 @@ use crate::{
         targets::{delta_targets, scene_target},
     },
     error::Result,
-    gpu::{Buffer, Gpu},
+    gpu::{Buffer, Gpu, Table},
     layout::Surroundings,
     scene::Scene,
     settings::LightSettings,
@@ -39,9 +39,9 @@ pub struct LightBuffers {
     lights: Buffer,
     targets: Buffer,
     surroundings: Buffer,
-    environment: Buffer,
-    environment_cells: Buffer,
-    environment_rows: Buffer,
+    environment: Table,
+    environment_cells: Table,
+    environment_rows: Table,
 }
 
 impl LightBuffers {
@@ -52,7 +52,8 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = delta_targets(scene);
-        let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, gpu.max_binding()));
+        let most = gpu.max_binding().min(gpu.max_table());
+        let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
         let probe = MediaProbe::new(scene, bvh);
         let buried = table.lights.iter_mut().map(|light| set_media(light, &probe)).filter(|fits| !fits).count();
@@ -83,20 +84,23 @@ impl LightBuffers {
             lights: gpu.storage_with("lights", &table.lights)?,
             targets: gpu.storage_with("targets", &spheres)?,
             surroundings: gpu.uniform("surroundings", &surroundings),
-            environment: gpu.storage_with("environment", pixels)?,
-            environment_cells: gpu.storage_with("environment cells", cells)?,
-            environment_rows: gpu.storage_with("environment rows", rows)?,
+            environment: Table::new(gpu, "environment", pixels)?,
+            environment_cells: Table::new(gpu, "environment cells", cells)?,
+            environment_rows: Table::new(gpu, "environment rows", rows)?,
             table,
         })
     }
 
     /// The variables that all passes share; a pass binds its `choices` besides.
     #[must_use]
-    pub fn bindings(&self) -> [(&'static str, &Buffer); 6] {
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 3] {
+        [("lights", &self.lights), ("targets", &self.targets), ("surroundings", &self.surroundings)]
+    }
+
+    /// The tables that all passes share.
+    #[must_use]
+    pub fn tables(&self) -> [(&'static str, &Table); 3] {
         [
-            ("lights", &self.lights),
-            ("targets", &self.targets),
-            ("surroundings", &self.surroundings),
             ("environment", &self.environment),
             ("environment_cells", &self.environment_cells),
             ("environment_rows", &self.environment_rows),

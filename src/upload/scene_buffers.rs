@@ -10,7 +10,7 @@ use crate::{
     emitters::light_table::{LightTable, emission_in},
     error::Result,
     gpu::{
-        Buffer, Gpu, Kernel,
+        Buffer, Gpu, Kernel, Table,
         shaders::{Shader, shader},
     },
     layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
@@ -23,8 +23,8 @@ use crate::{
 pub struct SceneBuffers {
     nodes: Buffer,
     primitives: Windows,
-    normals: Buffer,
-    materials: Buffer,
+    normals: Table,
+    materials: Table,
     has_spheres: bool,
     /// Children that a traversal can postpone.
     stack: usize,
@@ -56,15 +56,16 @@ impl SceneBuffers {
     /// Uploads the scene.
     ///
     /// # Errors
-    /// [`crate::Error::Limit`] if the primitives exceed two bindings, or the nodes or normals one; as [`LightBuffers::new`].
+    /// [`crate::Error::Limit`] if the primitives exceed two bindings, the nodes one, or normals or
+    /// materials a table; as [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.unit)).collect();
         let lights = LightBuffers::new(gpu, scene, bvh, settings)?;
         Ok(Self {
             nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
             primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &lights.table))?,
-            normals: gpu.storage_with("normals", &bvh.normals)?,
-            materials: gpu.storage_with("materials", &materials)?,
+            normals: Table::new(gpu, "normals", &bvh.normals)?,
+            materials: Table::new(gpu, "materials", &materials)?,
             has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
             has_spheres: !scene.spheres.is_empty(),
             // In steps, so that few variants of a kernel are compiled.
@@ -97,7 +98,9 @@ impl SceneBuffers {
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
         ];
         overrides.extend_from_slice(others);
-        Kernel::of(gpu, shader, &overrides)
+        let [pixels, cells, rows] = self.lights.tables();
+        let tables = [("normals", &self.normals), ("materials", &self.materials), pixels, cells, rows];
+        Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }
 
     /// The scene's variables, followed by others.
@@ -107,8 +110,6 @@ impl SceneBuffers {
             ("nodes", &self.nodes),
             ("primitives", &self.primitives.low),
             ("primitives_high", &self.primitives.high),
-            ("normals", &self.normals),
-            ("materials", &self.materials),
         ];
         all.extend(self.lights.bindings());
         all.extend_from_slice(others);

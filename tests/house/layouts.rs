@@ -116,7 +116,6 @@ fn constants() -> Vec<(&'static str, u64)> {
         SCAN_SPAN,
         BOUND_LANES,
         SEARCH_STATE_BYTES,
-        DISC_BYTES,
         GATHER_STATE_BYTES,
         MAX_WORKGROUPS,
         PATH_MASK,
@@ -127,17 +126,15 @@ fn constants() -> Vec<(&'static str, u64)> {
         QUERY_BLOCK,
         PILOT_STRIDE,
         FIRST_PILOT_STRIDE,
-        MOST_RAYS
+        MOST_RAYS,
+        TABLE_COLUMNS
     ]
     .to_vec()
 }
 
 /// Structs that only the device fills and reads, and the bytes that the host allots them.
-const OPAQUE: [(&str, usize); 3] = [
-    ("SearchState", layout::SEARCH_STATE_BYTES),
-    ("GatherState", layout::GATHER_STATE_BYTES),
-    ("Disc", layout::DISC_BYTES),
-];
+const OPAQUE: [(&str, usize); 2] =
+    [("SearchState", layout::SEARCH_STATE_BYTES), ("GatherState", layout::GATHER_STATE_BYTES)];
 
 fn opaque_bytes(name: Option<&str>) -> Option<u32> {
     OPAQUE.iter().find(|(n, _)| Some(*n) == name).map(|(_, bytes)| *bytes as u32)
@@ -166,11 +163,16 @@ fn disagreements(wgsl: &str) -> Vec<String> {
     found
 }
 
-/// Structs that lie in storage or uniform buffers, also inside of others.
+/// Structs that kernels take from the texels of tables.
+const IN_TABLES: [&str; 2] = ["Material", "Normals"];
+
+/// Structs that lie in storage or uniform buffers, also inside of others, and those in tables.
 fn bound_structs(module: &Module) -> Vec<Handle<Type>> {
     let in_buffer = |space| matches!(space, AddressSpace::Storage { .. } | AddressSpace::Uniform);
     let mut open: Vec<_> =
         module.global_variables.iter().filter(|(_, v)| in_buffer(v.space)).map(|(_, v)| v.ty).collect();
+    let is_in_table = |ty: &Type| ty.name.as_deref().is_some_and(|name| IN_TABLES.contains(&name));
+    open.extend(module.types.iter().filter(|(_, ty)| is_in_table(ty)).map(|(handle, _)| handle));
     let mut found = Vec::new();
     while let Some(handle) = open.pop() {
         match &module.types[handle].inner {

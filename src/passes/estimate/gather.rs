@@ -5,7 +5,7 @@ use crate::{
     density::Density,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{self, DISC_BYTES, GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
+    layout::{self, GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
     passes::maps::{
         photon_map::PhotonMap,
         radix_sort::{RadixSort, scan_levels},
@@ -151,7 +151,6 @@ struct Scratch {
     entries: [Buffer; 2],
     states: Buffer,
     sums: Buffer,
-    discs: Buffer,
     open: Buffer,
 }
 
@@ -217,7 +216,7 @@ impl<'s> Gather<'s> {
         let polynomial = settings.density.polynomial();
         let compiled = self.compile(gpu, Variant::of(settings, map.windows()));
         if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
-            self.scratch = Some(Scratch::new(gpu, count.min(BATCH), self.options.surveys())?);
+            self.scratch = Some(Scratch::new(gpu, count.min(BATCH))?);
         }
         let [first_four @ .., fifth] = polynomial.from_rim().map(|c| c as f32);
         let quantile = |i| polynomial.quantile((i as f64 + 0.5) / SURVEY_SAMPLES as f64) as f32;
@@ -271,7 +270,6 @@ impl<'s> Gather<'s> {
             ("states", &scratch.states),
             ("open_count", &scratch.open),
             ("sums_left", &scratch.sums),
-            ("discs", &scratch.discs),
             ("radii", radii),
             ("radiance", radiance),
             ("gathered", gathered),
@@ -291,7 +289,6 @@ impl<'s> Gather<'s> {
             if dispatches == 0 {
                 encoder.clear_buffer(&scratch.states, 0, None);
                 encoder.clear_buffer(&scratch.sums, 0, None);
-                encoder.clear_buffer(&scratch.discs, 0, None);
             }
             encoder.clear_buffer(&scratch.open, 0, None);
             for (bindings, stride) in search_bindings.iter().zip(STRIDES) {
@@ -373,7 +370,7 @@ impl<'s> Gather<'s> {
 }
 
 impl Scratch {
-    fn new(gpu: &Gpu, capacity: u32, surveys: bool) -> Result<Self> {
+    fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
         let packets = u64::from(capacity.div_ceil(PACKET));
         Ok(Self {
             capacity,
@@ -383,7 +380,6 @@ impl Scratch {
             ],
             states: gpu.storage::<[u8; SEARCH_STATE_BYTES]>("search states", packets * u64::from(PACKET))?,
             sums: gpu.storage::<[u8; GATHER_STATE_BYTES]>("unfinished sums", packets)?,
-            discs: gpu.storage::<[u8; DISC_BYTES]>("discs", if surveys { u64::from(capacity) + 3 } else { 1 })?,
             open: gpu.storage::<u32>("open packets", 1)?,
         })
     }
