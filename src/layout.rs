@@ -12,6 +12,10 @@ pub const WORKGROUP_SIZE: u32 = 64;
 pub const BVH_INDEX_BITS: u32 = 28;
 /// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.
 pub const BVH_STACK: usize = 48;
+/// Bound of the weight by which an interpolated normal changes flux that grazes the geometric surface.
+pub const MAX_NORMAL_WEIGHT: f32 = 8.0;
+/// Rounding of a hit point, as a fraction of the largest coordinate that it is computed from: 2^-19.
+pub const OFFSET_SCALE: f32 = 1.907_348_6e-6;
 /// Media that a path can be inside of at once.
 pub const MEDIA_DEPTH: usize = 4;
 

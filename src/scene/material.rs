@@ -23,19 +23,54 @@ impl Surface {
     pub fn is_delta(&self) -> bool {
         !matches!(self, Surface::Diffuse { .. })
     }
+
+    /// Albedo of the diffuse lobe, or tint of the specular one that has a colour.
+    #[must_use]
+    pub fn color(&self) -> Vec3 {
+        match *self {
+            Surface::Diffuse { albedo } => albedo,
+            Surface::Mirror { tint } | Surface::Glass { tint, .. } | Surface::Pane { tint, .. } => tint,
+        }
+    }
+
+    /// Index of refraction of what lets light through.
+    #[must_use]
+    pub fn ior(&self) -> Option<f32> {
+        match *self {
+            Surface::Glass { ior, .. } | Surface::Pane { ior, .. } => Some(ior),
+            Surface::Diffuse { .. } | Surface::Mirror { .. } => None,
+        }
+    }
+
+    /// What fills the solid that it bounds.
+    #[must_use]
+    pub fn medium(&self) -> Option<Medium> {
+        match *self {
+            Surface::Glass { ior, .. } => Some(Medium { ior }),
+            Surface::Diffuse { .. } | Surface::Mirror { .. } | Surface::Pane { .. } => None,
+        }
+    }
 }
 
 impl fmt::Display for Surface {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (what, ior, color) = match *self {
-            Surface::Diffuse { albedo } => ("diffuse", None, albedo),
-            Surface::Mirror { tint } => ("mirror", None, tint),
-            Surface::Glass { ior, tint } => ("solid glass", Some(ior), tint),
-            Surface::Pane { ior, tint } => ("thin pane", Some(ior), tint),
+        let what = match self {
+            Surface::Diffuse { .. } => "diffuse",
+            Surface::Mirror { .. } => "mirror",
+            Surface::Glass { .. } => "solid glass",
+            Surface::Pane { .. } => "thin pane",
         };
+        let color = self.color();
         write!(f, "{what} ({} {} {})", color.x, color.y, color.z)?;
-        ior.map_or(Ok(()), |ior| write!(f, ", ior {ior}"))
+        self.ior().map_or(Ok(()), |ior| write!(f, ", ior {ior}"))
     }
+}
+
+/// What fills a solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium {
+    /// Index of refraction.
+    pub ior: f32,
 }
 
 /// A named surface.

@@ -76,14 +76,16 @@ fn twins() -> Vec<Twin> {
 }
 
 macro_rules! constants {
-    ($($name:ident),+ $(,)?) => { [$((stringify!($name), layout::$name as u64)),+] };
+    ($($name:ident),+ $(,)?) => { [$((stringify!($name), layout::$name as f64)),+] };
 }
 
-fn constants() -> Vec<(&'static str, u64)> {
+fn constants() -> Vec<(&'static str, f64)> {
     constants![
         WORKGROUP_SIZE,
         BVH_INDEX_BITS,
         BVH_STACK,
+        MAX_NORMAL_WEIGHT,
+        OFFSET_SCALE,
         MEDIA_DEPTH,
         MARGIN_CELL,
         MARGIN_SAMPLES,
@@ -222,12 +224,13 @@ fn rust_type(module: &Module, handle: Handle<Type>) -> String {
     }
 }
 
-/// Constants and overrides of the module with their whole-number values; `None` where the value is none.
-fn named_values(module: &Module) -> Vec<(String, Option<u64>)> {
+/// Constants and overrides of the module with their values; `None` where the value is not a literal number.
+fn named_values(module: &Module) -> Vec<(String, Option<f64>)> {
     let number = |init: Handle<Expression>| match module.global_expressions[init] {
-        Expression::Literal(Literal::U32(n)) => Some(u64::from(n)),
-        Expression::Literal(Literal::I32(n)) => u64::try_from(n).ok(),
-        Expression::Literal(Literal::AbstractInt(n)) => u64::try_from(n).ok(),
+        Expression::Literal(Literal::U32(n)) => Some(f64::from(n)),
+        Expression::Literal(Literal::I32(n)) => Some(f64::from(n)),
+        Expression::Literal(Literal::F32(x)) => Some(f64::from(x)),
+        Expression::Literal(Literal::AbstractInt(n)) => Some(n as f64),
         _ => None,
     };
     let constants = module.constants.iter().map(|(_, c)| (c.name.clone(), number(c.init)));
