@@ -107,13 +107,22 @@ pub struct Material {
     pub kind: u32,
     /// Radiance that its front side sends out, W/(m² sr).
     pub emission: [f32; 3],
-    /// Index of refraction, of glass and panes.
+    /// Index of refraction of panes.
     pub ior: f32,
     /// 1 if its back sends out as much.
     pub double_sided: u32,
+    /// Index of the [`Medium`] in the solid, of glass.
+    pub medium: u32,
     pub pad0: u32,
     pub pad1: u32,
-    pub pad2: u32,
+}
+
+/// What fills a solid.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Medium {
+    /// Index of refraction.
+    pub ior: f32,
 }
 
 /// Kinds of [`Light`]: those without extent,
@@ -149,7 +158,7 @@ pub struct Light {
     pub emission: [f32; 3],
     /// Area of a surface, m²; 1 without one.
     pub area: f32,
-    /// Media in which paths start on the front, and on the back of a surface: materials, each plus one, outermost first; 0 for
+    /// Media in which paths start on the front, and on the back of a surface: their indices, each plus one, outermost first; 0 for
     /// none. See [`crate::bvh::MediaProbe`].
     pub media: [u32; MEDIA_DEPTH],
     pub back_media: [u32; MEDIA_DEPTH],
@@ -194,7 +203,7 @@ pub struct Path {
     pub beta: [f32; 3],
     /// Depth of the stack of media.
     pub media_count: u32,
-    /// Materials of the media around the path, outermost first.
+    /// Indices of the media around the path, outermost first.
     pub media: [u32; MEDIA_DEPTH],
 }
 
@@ -228,7 +237,7 @@ pub struct VisiblePoint {
     /// Geometric normal, unit, on the viewer's side.
     pub ng: [f32; 3],
     /// Media around the point as in [`Light::media`], 16 bits each: the two outermost, and below the others. 0 and 0 for none, and
-    /// where one of them is not among the first 65,535 materials.
+    /// where one of them is not among the first 65,535.
     pub media_outer: u32,
     /// Interpolated normal, unit, on the viewer's side of the geometric one.
     pub ns: [f32; 3],

@@ -84,3 +84,55 @@ pub struct Material {
     /// Its back sends out as much.
     pub double_sided: bool,
 }
+
+/// The media of a scene. Each material that bounds a solid has a medium of its own, so that a path knows which solid it leaves.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MediaTable {
+    pub media: Vec<Medium>,
+    /// Index of the medium of each material.
+    of_materials: Vec<Option<u32>>,
+}
+
+impl MediaTable {
+    /// The media that `materials` bound, in their order.
+    #[must_use]
+    pub fn new(materials: &[Material]) -> Self {
+        let mut table = Self::default();
+        for material in materials {
+            let medium = material.surface.medium();
+            table.of_materials.push(medium.map(|_| table.media.len() as u32));
+            table.media.extend(medium);
+        }
+        table
+    }
+
+    /// Index of the medium that a material bounds.
+    #[must_use]
+    pub fn of(&self, material: u32) -> Option<u32> {
+        self.of_materials[material as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_solids_have_media_and_each_its_own() {
+        let surfaces = [
+            Surface::Pane { ior: 1.3, tint: Vec3::ONE },
+            Surface::Glass { ior: 1.5, tint: Vec3::ONE },
+            Surface::Diffuse { albedo: Vec3::ONE },
+            Surface::Glass { ior: 1.5, tint: Vec3::ZERO },
+        ];
+        let materials = surfaces.map(|surface| Material {
+            name: String::new(),
+            surface,
+            emission: Vec3::ZERO,
+            double_sided: false,
+        });
+        let table = MediaTable::new(&materials);
+        assert_eq!(table.media, [Medium { ior: 1.5 }; 2]);
+        assert_eq!([0, 1, 2, 3].map(|material| table.of(material)), [None, Some(0), None, Some(1)]);
+    }
+}

@@ -44,7 +44,8 @@ fn twins() -> Vec<Twin> {
         RayHit { tuv, primitive }
         Primitive { v0, material, e1, id, e2, emitter }
         Normals { n0, n1, n2, flat_shaded }
-        Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }
+        Material { color, kind, emission, ior, double_sided, medium, pad0, pad1 }
+        Medium { ior }
         Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
         LightChoice { cdf, probability }
         Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
@@ -312,12 +313,11 @@ fn each_kind_of_disagreement_is_reported() {
         ("SPHERE_BIT = 1u << 31u", "SPHERE_BIT = 1u << 30u", "SPHERE_BIT is"),
         ("= 64u", "= 32u", "WORKGROUP_SIZE is"),
         ("@workgroup_size(WORKGROUP_SIZE)", "@workgroup_size(8, 8)", "workgroups of"),
-        ("media: array<u32, 4>", "media: array<Medium, 4>", "Medium lies in a buffer"),
+        ("media: array<u32, 4>", "media: array<Stranger, 4>", "Stranger lies in a buffer"),
         ("struct Photon", "@group(2) @binding(1) var<storage> s: array<SearchState>; struct Photon", "SearchState"),
     ] {
         assert!(GOOD.contains(from));
-        let bad =
-            format!("struct Medium {{ material: u32 }} struct SearchState {{ a: u32 }}\n{}", GOOD.replace(from, to));
+        let bad = format!("struct Stranger {{ a: u32 }} struct SearchState {{ a: u32 }}\n{}", GOOD.replace(from, to));
         let found = disagreements(&bad);
         assert!(found.iter().any(|line| line.contains(said)), "{to}: {found:?}");
     }
