@@ -194,8 +194,8 @@ pub struct Surroundings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Path {
     pub origin: [f32; 3],
-    /// What the kernel that follows the path remembers of it, see `bounce_photons` and `trace_camera`.
-    pub flags: u32,
+    /// What is remembered of the path, by accessors of its kind in `shaders/lib/transport/path.wesl`.
+    pub history: u32,
     pub direction: [f32; 3],
     /// Surfaces met so far.
     pub bounces: u32,
@@ -339,8 +339,6 @@ pub const AIM: u32 = 16;
 /// before belongs to the global map.
 pub const CAUSTICS_APART: u32 = 32;
 
-/// Photon paths have their group of lights in the bits of [`Path::flags`] from this one on.
-pub const GROUP_SHIFT: u32 = 2;
 /// Targets that caustic paths are aimed at, at most.
 pub const MAX_TARGETS: u32 = 32;
 

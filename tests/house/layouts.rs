@@ -49,7 +49,7 @@ fn twins() -> Vec<Twin> {
         Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
         LightChoice { cdf, probability }
         Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
-        Path { origin, flags, direction, bounces, beta, media_count, media }
+        Path { origin, history, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
         VisiblePoint { position, valid, weight, offset, ng, media_outer, ns, media_inner }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high }
@@ -110,7 +110,6 @@ fn constants() -> Vec<(&'static str, f64)> {
         FOLLOW_DIFFUSE,
         AIM,
         CAUSTICS_APART,
-        GROUP_SHIFT,
         MAX_TARGETS,
         CAUSTIC_BIT,
         SAMPLER_RANDOM,
@@ -288,12 +287,12 @@ const GOOD: &str = "
     const SPHERE_BIT = 1u << 31u;
     struct Photon { position: vec3f, wi: u32, flux: vec3f, normal: u32 }
     struct Path {
-        origin: vec3f, flags: u32, direction: vec3f, bounces: u32, beta: vec3f, media_count: u32, media: array<u32, 4>,
+        origin: vec3f, history: u32, direction: vec3f, bounces: u32, beta: vec3f, media_count: u32, media: array<u32, 4>,
     }
     @group(1) @binding(0) var<storage, read> photons: array<Photon>;
     @group(2) @binding(0) var<storage, read_write> paths: array<Path>;
     @compute @workgroup_size(WORKGROUP_SIZE)
-    fn probe() { paths[0].flags = photons[0].normal | SPHERE_BIT; }
+    fn probe() { paths[0].history = photons[0].normal | SPHERE_BIT; }
 ";
 
 #[test]
