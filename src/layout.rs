@@ -244,8 +244,8 @@ pub struct VisiblePoint {
     pub media_inner: u32,
 }
 
-/// What happens to a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^19 paths of at most 4095 bounces, so that
-/// what is counted once a bounce stays below 2^31; the host adds batches up in 64 bits.
+/// What happens to a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^18 paths of at most 4095 bounces, so that
+/// what is counted once a bounce stays below 2^30; the host adds batches up in 64 bits.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Counters {
@@ -342,8 +342,27 @@ pub const CAUSTICS_APART: u32 = 32;
 /// Targets that caustic paths are aimed at, at most.
 pub const MAX_TARGETS: u32 = 32;
 
-/// Set in the key of a staged photon that belongs to the caustic map.
-pub const CAUSTIC_BIT: u32 = 0x8000_0000;
+/// Kinds of photon maps, and how many there are.
+pub const GLOBAL_MAP: u32 = 0;
+pub const CAUSTIC_MAP: u32 = 1;
+pub const MAP_KINDS: u32 = 2;
+
+/// Key of a staged photon: its path in the batch, its place among the path's photons of its map, and the kind of the map,
+/// for which two bits are left.
+pub const PATH_MASK: u32 = 0x3_ffff;
+pub const PLACE_SHIFT: u32 = 18;
+pub const PLACE_MASK: u32 = 0xfff;
+pub const KIND_SHIFT: u32 = 30;
+
+/// The photon maps of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum MapKind {
+    /// Light that a diffuse surface scattered, or that comes straight from a light.
+    Global = GLOBAL_MAP,
+    /// Light that came through mirrors or glass.
+    Caustic = CAUSTIC_MAP,
+}
 
 /// What `store_photons` needs to know; see there.
 #[repr(C)]
@@ -352,8 +371,8 @@ pub struct Store {
     pub staged: u32,
     pub first_photon: u32,
     pub photons: u32,
-    /// [`CAUSTIC_BIT`] for the caustic map, else 0.
-    pub map_bit: u32,
+    /// The map, a [`MapKind`].
+    pub kind: u32,
 }
 
 /// Where the numbers for sampling come from; see `shaders/lib/core/sampler.wesl`.

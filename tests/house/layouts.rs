@@ -54,7 +54,7 @@ fn twins() -> Vec<Twin> {
         VisiblePoint { position, valid, weight, offset, ng, media_outer, ns, media_inner }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
-        Store { staged, first_photon, photons, map_bit }
+        Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media }
         FinalStep { ray, rays, points, pad }
         FirstHit { normal, depth, albedo, alpha }
@@ -111,7 +111,13 @@ fn constants() -> Vec<(&'static str, f64)> {
         AIM,
         CAUSTICS_APART,
         MAX_TARGETS,
-        CAUSTIC_BIT,
+        GLOBAL_MAP,
+        CAUSTIC_MAP,
+        MAP_KINDS,
+        PATH_MASK,
+        PLACE_SHIFT,
+        PLACE_MASK,
+        KIND_SHIFT,
         SAMPLER_RANDOM,
         SAMPLER_SOBOL,
         CELL_PHOTONS,
