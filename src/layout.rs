@@ -125,7 +125,7 @@ pub struct Medium {
     pub ior: f32,
 }
 
-/// Kinds of [`Light`]: those without extent,
+/// Kinds of [`Light`]: punctual ones,
 pub const POINT_LIGHT: u32 = 0;
 pub const SPOT_LIGHT: u32 = 1;
 pub const DIRECTIONAL_LIGHT: u32 = 2;
@@ -135,7 +135,7 @@ pub const SPHERE_LIGHT: u32 = 4;
 /// and what comes from all around.
 pub const ENVIRONMENT_LIGHT: u32 = 5;
 
-/// Anything that shines: a light without extent, an emissive triangle or sphere, or the environment. Its power is
+/// Anything that shines: a punctual light, an emissive triangle or sphere, or the environment. Its power is
 /// `emission · area · solid_angle`, but for directional lights and the environment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -174,13 +174,19 @@ pub struct LightChoice {
     pub probability: f32,
 }
 
-/// What lies around the scene.
+/// Sphere around all geometry.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Surroundings {
-    /// Sphere around all geometry, metres.
+pub struct SceneSphere {
+    /// Metres.
     pub center: [f32; 3],
     pub radius: f32,
+}
+
+/// Size and rotation of the environment map.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct EnvironmentInfo {
     /// Pixels of the environment map; 0 and 0 without one.
     pub columns: u32,
     pub rows: u32,
@@ -446,7 +452,7 @@ pub struct TilePixel {
     pub non_finite: u32,
 }
 
-/// Which light `light_directly` takes; one without extent.
+/// Which punctual light `light_directly` takes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DirectLight {

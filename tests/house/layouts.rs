@@ -48,7 +48,8 @@ fn twins() -> Vec<Twin> {
         Medium { ior }
         Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
         LightChoice { cdf, probability }
-        Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
+        SceneSphere { center, radius }
+        EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
         Path { origin, history, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
         VisiblePoint { position, valid, weight, offset, ng, media_outer, ns, media_inner }
