@@ -4,14 +4,16 @@ use std::ops::{Index, IndexMut};
 
 use serde::{Deserialize, Serialize};
 
+use crate::layout::{CAUSTIC_MAP, GLOBAL_MAP};
+
 /// Which photons a map holds. Its number is that of the photons' keys on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MapKind {
     /// All that the mode stores but caustics.
-    Global,
+    Global = GLOBAL_MAP as isize,
     /// Photons that met specular surfaces last: L S+ D.
-    Caustic,
+    Caustic = CAUSTIC_MAP as isize,
 }
 
 impl MapKind {

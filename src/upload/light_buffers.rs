@@ -10,7 +10,7 @@ use crate::{
     },
     error::Result,
     gpu::{Buffer, Gpu, Table},
-    layout::Surroundings,
+    layout::{EnvironmentInfo, SceneSphere},
     scene::Scene,
     settings::LightSettings,
 };
@@ -38,7 +38,8 @@ pub struct LightBuffers {
     pub warnings: Vec<String>,
     lights: Buffer,
     targets: Buffer,
-    surroundings: Buffer,
+    scene_sphere: Buffer,
+    environment_info: Buffer,
     environment: Table,
     environment_cells: Table,
     environment_rows: Table,
@@ -63,9 +64,8 @@ impl LightBuffers {
         let spheres: Vec<[f32; 4]> =
             [&around].into_iter().chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
         let (sine, cosine) = map.as_ref().map_or(0.0, |map| map.rotation).sin_cos();
-        let surroundings = Surroundings {
-            center: around.center.to_array(),
-            radius: around.radius,
+        let scene_sphere = SceneSphere { center: around.center.to_array(), radius: around.radius };
+        let environment_info = EnvironmentInfo {
             columns: map.as_ref().map_or(0, |map| map.columns),
             rows: map.as_ref().map_or(0, |map| map.rows),
             rotation_cos: cosine,
@@ -83,7 +83,8 @@ impl LightBuffers {
             warnings: reduced(scene, map.as_ref()).into_iter().chain(too_deep("lights", buried)).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
             targets: gpu.storage_with("targets", &spheres)?,
-            surroundings: gpu.uniform("surroundings", &surroundings),
+            scene_sphere: gpu.uniform("scene sphere", &scene_sphere),
+            environment_info: gpu.uniform("environment info", &environment_info),
             environment: Table::new(gpu, "environment", pixels)?,
             environment_cells: Table::new(gpu, "environment cells", cells)?,
             environment_rows: Table::new(gpu, "environment rows", rows)?,
@@ -93,8 +94,13 @@ impl LightBuffers {
 
     /// The variables that all passes share; a pass binds its `choices` besides.
     #[must_use]
-    pub fn bindings(&self) -> [(&'static str, &Buffer); 3] {
-        [("lights", &self.lights), ("targets", &self.targets), ("surroundings", &self.surroundings)]
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 4] {
+        [
+            ("lights", &self.lights),
+            ("targets", &self.targets),
+            ("scene_sphere", &self.scene_sphere),
+            ("environment_info", &self.environment_info),
+        ]
     }
 
     /// The tables that all passes share.

@@ -14,7 +14,7 @@ use crate::{
         shaders::{Shader, shader},
     },
     layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
-    scene::{Material, Scene, Surface},
+    scene::{Material, MediaTable, Scene, Surface},
     settings::{LightSettings, LightUnit, Sampler},
 };
 
@@ -25,6 +25,7 @@ pub struct SceneBuffers {
     primitives: Windows,
     normals: Table,
     materials: Table,
+    media: Table,
     has_spheres: bool,
     /// Children that a traversal can postpone.
     stack: usize,
@@ -56,17 +57,21 @@ impl SceneBuffers {
     /// Uploads the scene.
     ///
     /// # Errors
-    /// [`crate::Error::Limit`] if the primitives exceed two bindings, the nodes one, or normals or
-    /// materials a table; as [`LightBuffers::new`].
+    /// [`crate::Error::Limit`] if the primitives exceed two bindings, the nodes one, or normals,
+    /// materials or media a table; as [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
-        let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.unit)).collect();
+        let media = MediaTable::new(&scene.materials);
+        let row = |(m, i)| material(m, media.of(i), settings.unit);
+        let materials: Vec<_> = scene.materials.iter().zip(0..).map(row).collect();
+        let media: Vec<_> = media.media.iter().map(|medium| layout::Medium { ior: medium.ior }).collect();
         let lights = LightBuffers::new(gpu, scene, bvh, settings)?;
         Ok(Self {
             nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
             primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &lights.table))?,
             normals: Table::new(gpu, "normals", &bvh.normals)?,
             materials: Table::new(gpu, "materials", &materials)?,
-            has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
+            media: Table::new(gpu, "media", &media)?,
+            has_dielectrics: scene.materials.iter().any(|m| m.surface.ior().is_some()),
             has_spheres: !scene.spheres.is_empty(),
             // In steps, so that few variants of a kernel are compiled.
             stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
@@ -99,7 +104,8 @@ impl SceneBuffers {
         ];
         overrides.extend_from_slice(others);
         let [pixels, cells, rows] = self.lights.tables();
-        let tables = [("normals", &self.normals), ("materials", &self.materials), pixels, cells, rows];
+        let own = [("normals", &self.normals), ("materials", &self.materials), ("media_table", &self.media)];
+        let tables = [&own[..], &[pixels, cells, rows]].concat();
         Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }
 
@@ -144,14 +150,21 @@ fn marked<'a>(primitives: &'a [Primitive], scene: &Scene, lights: &LightTable) -
     primitives.iter().map(mark).collect()
 }
 
-fn material(material: &Material, unit: LightUnit) -> layout::Material {
-    let (kind, color, ior) = match material.surface {
-        Surface::Diffuse { albedo } => (layout::DIFFUSE, albedo, 1.0),
-        Surface::Mirror { tint } => (layout::MIRROR, tint, 1.0),
-        Surface::Glass { ior, tint } => (layout::GLASS, tint, ior),
-        Surface::Pane { ior, tint } => (layout::PANE, tint, ior),
-    };
-    let emission = emission_in(material.emission, unit).to_array();
-    let double_sided = u32::from(material.double_sided);
-    layout::Material { kind, color: color.to_array(), emission, ior, double_sided, ..Default::default() }
+/// Row of the material table; `medium` is the one that the material bounds.
+fn material(material: &Material, medium: Option<u32>, unit: LightUnit) -> layout::Material {
+    let surface = &material.surface;
+    layout::Material {
+        color: surface.color().to_array(),
+        kind: match surface {
+            Surface::Diffuse { .. } => layout::DIFFUSE,
+            Surface::Mirror { .. } => layout::MIRROR,
+            Surface::Glass { .. } => layout::GLASS,
+            Surface::Pane { .. } => layout::PANE,
+        },
+        emission: emission_in(material.emission, unit).to_array(),
+        ior: surface.ior().unwrap_or(1.0),
+        double_sided: u32::from(material.double_sided),
+        medium: medium.unwrap_or(0),
+        ..Default::default()
+    }
 }

@@ -4,7 +4,7 @@ use super::raw_map::RawMap;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{self, Counters, Photon, PhotonBatch, Store},
+    layout::{Counters, MAP_KINDS, PLACE_MASK, Photon, PhotonBatch, Store},
     map_kind::MapKind,
     passes::wavefront::{Step, Wavefront},
     settings::{MAX_BOUNCES, Sampler},
@@ -14,8 +14,8 @@ use crate::{
 /// Photons that the staging buffer holds per path of a batch; a batch that has more is traced again
 /// in smaller ones.
 const STAGED_PER_PATH: u64 = 2;
-/// Bits of a path's photon count for each kind of map.
-const COUNT_BITS: u32 = 16;
+
+const _: () = assert!(MAX_BOUNCES <= PLACE_MASK, "a key has room for the photons of a path");
 
 /// Kernels of the photon pass.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ pub(crate) struct BatchBuffers {
 /// What one batch did.
 pub(crate) struct BatchResult {
     pub counters: Counters,
-    /// Photons per path, [`COUNT_BITS`] for each kind of map.
+    /// Photons of each path, for each [`MapKind`].
     counts: Vec<u32>,
 }
 
@@ -75,7 +75,7 @@ impl PhotonKernels {
         let emit = Step { kernel: &self.emit, buffers: &own };
         let bounce = Step { kernel: &self.bounce, buffers: &own };
         let counters = buffers.wavefront.run(gpu, scene, (&emit, paths), &bounce, paths, batch.max_bounces)?;
-        Ok(BatchResult { counters, counts: gpu.read(&buffers.counts, 0, paths)? })
+        Ok(BatchResult { counters, counts: gpu.read(&buffers.counts, 0, paths * u64::from(MAP_KINDS))? })
     }
 
     /// Moves a batch's photons of one kind to their places in the map, up to the first path that does
@@ -88,14 +88,12 @@ impl PhotonKernels {
         result: &BatchResult,
         first_path: u64,
     ) -> Result<()> {
-        let shift = COUNT_BITS * kind as u32;
-        let counts = result.counts.iter().map(|c| (c >> shift) & ((1 << COUNT_BITS) - 1));
-        gpu.write(&buffers.places, 0, &map.place(counts, first_path));
+        let counts = result.counts.iter().skip(kind as usize).step_by(MAP_KINDS as usize);
+        gpu.write(&buffers.places, 0, &map.place(counts.copied(), first_path));
         let mut encoder = gpu.encoder();
         for (window, first_photon, photons) in map.photons.parts(map.stored as u32) {
             let staged = result.counters.staged;
-            let map_bit = kind as u32 * layout::CAUSTIC_BIT;
-            let uniform = gpu.uniform("store", &Store { staged, first_photon, photons, map_bit });
+            let uniform = gpu.uniform("store", &Store { staged, first_photon, photons, kind: kind as u32 });
             let bindings = self.store.bind(
                 gpu,
                 &[
@@ -123,7 +121,7 @@ impl BatchBuffers {
             wavefront: Wavefront::new(gpu, "photon", paths)?,
             staged: gpu.storage::<Photon>("staged photons", staging_capacity)?,
             staged_keys: gpu.storage::<u32>("keys of staged photons", staging_capacity)?,
-            counts: gpu.storage::<u32>("photon counts", paths)?,
+            counts: gpu.storage::<u32>("photon counts", paths * u64::from(MAP_KINDS))?,
             places: gpu.storage::<u32>("photon places", paths)?,
             light_photons: gpu.storage::<u32>("photons of lights", groups as u64)?,
             staging_capacity,

@@ -18,7 +18,8 @@ use crate::{
     upload::{SceneBuffers, light_buffers::ChoiceBuffer},
 };
 
-/// Paths of one batch at least and at most: the device must be busy, and the key of a staged photon holds its path.
+/// Minimum and maximum number of paths of one batch: the device must be busy, and the key of a staged
+/// photon holds its path.
 const MIN_BATCH: u64 = 1 << 16;
 const MAX_BATCH: u64 = layout::PATH_MASK as u64 + 1;
 /// Paths over which the growth of a map is watched, at least; a map's capacity if that is more.
