@@ -3,6 +3,7 @@
 mod circles;
 mod layers;
 mod layouts;
+mod library;
 mod readme;
 mod scenes;
 mod shader_names;
