@@ -69,16 +69,19 @@ fn final_gathering_has_the_mean_of_the_estimate() {
         s.picture.spp = 1;
     });
     let plain = mean(&render_scene(&scene, &settings));
-    for emission in [Emission::Aimed, Emission::Unaimed] {
+    let gathered = |scene: &Scene, emission| {
         let gathers = settings.clone().with(|s| {
             s.photons.final_gather = 6;
             s.photons.emission = emission;
         });
-        let gathered = mean(&render_scene(&scene, &gathers));
-        assert!(within(gathered, plain, 0.015), "{emission:?}: {gathered} instead of {plain}");
-        let darker = mean(&render_scene(&without_lamp(1), &gathers));
-        assert!(!within(darker, plain, 0.015), "control: {emission:?}: {darker} without the second lamp");
+        mean(&render_scene(scene, &gathers))
+    };
+    for emission in [Emission::Aimed, Emission::Unaimed] {
+        let found = gathered(&scene, emission);
+        assert!(within(found, plain, 0.015), "{emission:?}: {found} instead of {plain}");
     }
+    let darker = gathered(&without_lamp(1), Emission::Aimed);
+    assert!(!within(darker, plain, 0.015), "control: {darker} without the second lamp");
     for mode in [Mode::Photons, Mode::DirectPhotons, Mode::DirectRays] {
         let wrong = settings.clone().with(|s| {
             s.photons.mode = mode;
