@@ -82,6 +82,18 @@ impl PhotonMaps {
         &self.maps
     }
 
+    /// The global map alone, or the caustic map alone, for pictures of its part of the light.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn only(mut self, global: bool) -> Self {
+        let caustic = self.maps.split_off(self.global);
+        if !global {
+            self.maps = caustic;
+            self.global = 0;
+        }
+        self
+    }
+
     /// What happened up to here: the session's stages and the first pass.
     #[must_use]
     pub fn stats(&self) -> &Stats {
