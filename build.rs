@@ -1,5 +1,6 @@
 //! Composes the WGSL kernels from `shaders/*.wesl` (WESL imports), validates each with naga, and writes the shader
-//! table that `src/gpu/shaders.rs` includes: text, workgroup size and bindings by name.
+//! table that `src/gpu/shaders.rs` includes: text, workgroup size and bindings by name. The probes in `shaders/probes`,
+//! kernels of tests and benchmarks alone, become a second table, which the library does not include.
 
 use std::{env, fmt::Write, fs, path::Path};
 
@@ -8,7 +9,13 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 fn main() {
     println!("cargo::rerun-if-changed=shaders");
     println!("cargo::rerun-if-changed=build.rs");
-    let mut stems: Vec<String> = fs::read_dir("shaders")
+    write_table("shaders", "shader_table.rs");
+    write_table("shaders/probes", "probe_table.rs");
+}
+
+/// Writes the table of all kernels in a folder.
+fn write_table(folder: &str, file: &str) {
+    let mut stems: Vec<String> = fs::read_dir(folder)
         .expect("shaders/ lies beside build.rs")
         .map(|entry| entry.expect("shaders/ can be listed").path())
         .filter(|path| path.extension().is_some_and(|e| e == "wesl"))
@@ -17,21 +24,22 @@ fn main() {
     stems.sort();
     let mut table = String::from("[\n");
     for stem in &stems {
-        table += &shader_entry(stem, &compose(stem));
+        table += &shader_entry(stem, &compose(folder, stem));
     }
     table += "]\n";
     let out = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
-    fs::write(Path::new(&out).join("shader_table.rs"), table).expect("OUT_DIR can be written");
+    fs::write(Path::new(&out).join(file), table).expect("OUT_DIR can be written");
 }
 
 /// The kernel with everything it imports, names as written.
-fn compose(stem: &str) -> String {
+fn compose(folder: &str, stem: &str) -> String {
     let mut compiler = wesl::Wesl::new("shaders");
     compiler.set_mangler(wesl::ManglerKind::None).use_sourcemap(true);
-    let root = format!("package::{stem}").parse().expect("a file stem is a module name");
+    let module = folder.replacen("shaders", "package", 1).replace('/', "::");
+    let root = format!("{module}::{stem}").parse().expect("a file stem is a module name");
     match compiler.compile(&root) {
         Ok(composed) => composed.to_string(),
-        Err(error) => fail(&format!("shaders/{stem}.wesl: {error}")),
+        Err(error) => fail(&format!("{folder}/{stem}.wesl: {error}")),
     }
 }
 
@@ -105,7 +113,7 @@ fn source_line(wgsl: &str, offset: usize) -> Option<String> {
     })?;
     let name = &composed.get(declaration + 1)?.1;
     let lib = ["core", "transport", "gather", "camera"].map(|part| format!("shaders/lib/{part}"));
-    for folder in ["shaders", "shaders/bindings"].into_iter().chain(lib.iter().map(String::as_str)) {
+    for folder in ["shaders", "shaders/bindings", "shaders/probes"].into_iter().chain(lib.iter().map(String::as_str)) {
         for path in fs::read_dir(folder).ok()?.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_file()) {
             let text = fs::read_to_string(&path).ok()?;
             let source = words(&text);

@@ -7,8 +7,10 @@ use std::time::Instant;
 
 use caustica::{
     bvh::Bvh,
-    gpu::Gpu,
-    layout::{Ray, RayHit},
+    gpu::{
+        Gpu,
+        shaders::{Binding, BindingKind, Shader},
+    },
     scene::{Material, Scene, Surface, Triangle},
     settings::Settings,
     upload::SceneBuffers,
@@ -17,7 +19,10 @@ use glam::{Vec3, vec3};
 use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris, ray};
 use rayon::prelude::*;
 
+const PROBES: &[Shader] = &include!(concat!(env!("OUT_DIR"), "/probe_table.rs"));
 const RAYS: usize = 1 << 20;
+/// Origin and direction.
+type Ray = [[f32; 4]; 2];
 const RUNS: usize = 3;
 
 fn main() {
@@ -40,11 +45,12 @@ fn compare(gpu: &Gpu, scene: &Scene) {
 /// Best of some runs over all rays, after one to warm up.
 fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[Ray]) -> f64 {
     let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &Settings::default()).expect("the scene fits");
-    let kernel = buffers.kernel(gpu, "trace_rays");
+    let shader = PROBES.iter().find(|shader| shader.stem == "trace_rays").expect("the probe");
+    let kernel = buffers.kernel_of(gpu, shader, &[]);
     let count = rays.len() as u64;
     let rays = gpu.storage_with("rays", rays).expect("fits");
-    let hits = gpu.storage::<RayHit>("hits", count).expect("fits");
-    let bindings = kernel.bind(gpu, &buffers.with(&[("rays", &rays), ("hits", &hits)]));
+    let hits = gpu.storage::<[f32; 4]>("hits", count).expect("fits");
+    let bindings = kernel.bind(gpu, &buffers.with(&[("inputs", &rays), ("outputs", &hits)]));
     best_of(|| {
         let mut encoder = gpu.encoder();
         kernel.dispatch(&mut encoder, &bindings, count);
@@ -64,7 +70,8 @@ fn native_seconds(scene: &Scene, rays: &[Ray]) -> f64 {
     let ordered: Vec<_> = bvh.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
     let nearest = |ray: &Ray| {
         let mut hit = ray::RayHit::none();
-        let ray = ray::Ray::new_inf(ray.origin.into(), ray.direction.into());
+        let [origin, direction] = ray.map(|[x, y, z, _]| vec3(x, y, z));
+        let ray = ray::Ray::new_inf(origin.into(), direction.into());
         bvh.ray_traverse(ray, &mut hit, |ray, i| ordered[i].intersect(ray));
         hit
     };
@@ -100,7 +107,7 @@ fn rays() -> Vec<Ray> {
         let origin = vec3(unit(i, 1), 0.3 + 0.7 * unit(i, 2), unit(i, 3)) * 1.98 - vec3(0.99, 0.0, 0.99);
         let (z, phi) = (1.0 - 2.0 * unit(i, 4), std::f32::consts::TAU * unit(i, 5));
         let r = (1.0 - z * z).max(0.0).sqrt();
-        Ray { origin: origin.to_array(), direction: [r * phi.cos(), z, r * phi.sin()], ..Ray::default() }
+        [origin.extend(0.0).to_array(), [r * phi.cos(), z, r * phi.sin(), 0.0]]
     };
     (0..RAYS as u32).map(ray).collect()
 }

@@ -31,28 +31,6 @@ pub struct BvhNode {
     pub high: [u32; 4],
 }
 
-/// A ray for `shaders/trace_rays.wesl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Ray {
-    /// Metres.
-    pub origin: [f32; 3],
-    pub pad0: u32,
-    /// Unit vector.
-    pub direction: [f32; 3],
-    pub pad1: u32,
-}
-
-/// What it meets first.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct RayHit {
-    /// Distance, metres, and the weights of a triangle's second and third corner.
-    pub tuv: [f32; 3],
-    /// Index among the tree's primitives; [`u32::MAX`] if there is no hit.
-    pub primitive: u32,
-}
-
 /// Set in [`Primitive::material`] when the primitive is a sphere.
 pub const SPHERE_BIT: u32 = 0x8000_0000;
 

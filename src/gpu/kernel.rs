@@ -94,7 +94,13 @@ impl Kernel {
     /// If no kernel has that stem.
     #[must_use]
     pub fn new(gpu: &Gpu, stem: &str, overrides: &[(&str, f64)]) -> Self {
-        let shader = shader(stem);
+        Self::of(gpu, shader(stem), overrides)
+    }
+
+    /// The same of an entry of another table: the probes of the tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn of(gpu: &Gpu, shader: &'static Shader, overrides: &[(&str, f64)]) -> Self {
         let value = |name: &str| overrides.iter().find(|(n, _)| *n == name).map(|(_, value)| *value);
         let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();
         Self(gpu.compiler.program(&gpu.device, &gpu.parts.layout, shader, constants))

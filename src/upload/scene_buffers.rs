@@ -9,7 +9,10 @@ use crate::{
     bvh::Bvh,
     emitters::light_table::{LightTable, emission_in},
     error::Result,
-    gpu::{Buffer, Gpu, Kernel},
+    gpu::{
+        Buffer, Gpu, Kernel,
+        shaders::{Shader, shader},
+    },
     layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
     scene::{Material, Scene, Surface},
     settings::{LightUnit, Sampler, Settings},
@@ -71,6 +74,13 @@ impl SceneBuffers {
     /// The same with further `override` constants.
     #[must_use]
     pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
+        self.kernel_of(gpu, shader(stem), others)
+    }
+
+    /// The same of an entry of another table: the probes of the tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
             ("SAMPLER", f64::from(self.sampler())),
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
@@ -80,7 +90,7 @@ impl SceneBuffers {
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
         ];
         overrides.extend_from_slice(others);
-        Kernel::new(gpu, stem, &overrides)
+        Kernel::of(gpu, shader, &overrides)
     }
 
     fn sampler(&self) -> u32 {

@@ -5,13 +5,14 @@
 //! | twice | two renders in one process are equal | another seed |
 //! | threads | so are renders by the program with one and with two driver threads, under other names | another seed |
 //! | path 2^32 | random numbers go on there, whatever the batch begins with, and repeat none | numbers of 32 bits begin anew |
-//! | emission | the closed form and rejection in a cube draw the same directions (chi-square) | a cosine distribution |
+//! | emission | the closed form and rejection in a cube draw the same directions (chi-square) | those of a spot |
 
 use std::{fs, path::Path, process::Command};
 
 use caustica::{
     bvh::Bvh,
     layout::{self, Counters, PhotonBatch},
+    scene::{Light, LightKind},
     settings::{Mode, Sampler, Settings},
     upload::SceneBuffers,
 };
@@ -63,10 +64,15 @@ fn read(path: &Path) -> Vec<u8> {
 
 /// Directions of `count` paths from path `first` on, as the kernel draws them.
 fn emitted_directions(first: u64, count: u32, sampler: Sampler, turns: u32) -> Vec<Vec3> {
+    emitted_directions_of(LightKind::Point, first, count, sampler, turns)
+}
+
+/// The same of another kind of light.
+fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampler, turns: u32) -> Vec<Vec3> {
     let gpu = gpu();
     let mut scene = scene(&[diffuse(0.5)]);
     scene.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
-    scene.lights.push(point_light(Vec3::ZERO, 1.0));
+    scene.lights.push(Light { kind, ..point_light(Vec3::ZERO, 1.0) });
     let bvh = Bvh::build(&scene);
     let settings = Settings::default().with(|s| s.photons.sampler = sampler);
     let buffers = SceneBuffers::new(gpu, &scene, &bvh, &settings).expect("the scene fits");
@@ -137,8 +143,9 @@ fn closed_form_and_rejection_draw_the_same_directions() {
     let value = chi_square(&ours, &theirs);
     assert!(value < 181.0, "chi-square {value}");
     assert!(value > 60.0, "chi-square {value} is too small for independent samples");
-    let skewed: Vec<_> = ours.iter().map(|v| (*v + 0.06 * Vec3::Z).normalize()).collect();
-    assert!(chi_square(&skewed, &theirs) > 181.0, "control: directions bent by 6 % pass");
+    let kind = LightKind::Spot { inner: 2.0, outer: 3.1 };
+    let cone = emitted_directions_of(kind, 0, 100_000, Sampler::Random, 1);
+    assert!(chi_square(&cone, &theirs) > 181.0, "control: a spot passes");
 }
 
 #[test]

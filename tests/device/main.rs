@@ -1,8 +1,15 @@
-//! The device and the kernels on it: search, traversal, limits, faults, equal bits.
+//! The device and the kernels on it: search, traversal, sampling, limits, faults, equal bits.
 
+mod chi_square;
 mod determinism;
+mod emitter_sampling;
 mod faults;
+mod fresnel;
 mod kd_tree;
+
+mod light_sampling;
 mod limits;
 mod nearest;
+mod probe;
+mod sampling;
 mod traversal;

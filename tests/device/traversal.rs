@@ -2,13 +2,14 @@
 
 use caustica::{
     bvh::Bvh,
-    layout::{Ray, RayHit},
     scene::{Scene, Sphere, Triangle},
     settings::Settings,
     upload::SceneBuffers,
 };
 use glam::{DVec3, Vec3};
 use support::*;
+
+use super::probe::{Probe, Row};
 
 const RAYS: usize = 4096;
 /// Of [`RAYS`], those that may be decided by rounding: where outlines are grazed or two surfaces lie equally far.
@@ -46,35 +47,27 @@ fn shapes(triangles: usize, spheres: usize, size: f32, middle: Vec3) -> Scene {
 }
 
 /// From everywhere about the cube in all directions, some along the axes.
-fn rays(middle: Vec3) -> Vec<Ray> {
+fn rays(middle: Vec3) -> Vec<Row> {
     let mut random = Random(5);
     let mut ray = |i: usize| {
         let origin = middle + random.point() * 1.5;
         let along = if i.is_multiple_of(16) { Vec3::AXES[i / 16 % 3] } else { random.point().normalize() };
         let direction = if i.is_multiple_of(32) { -along } else { along };
-        Ray { origin: origin.to_array(), direction: direction.to_array(), ..Ray::default() }
+        [origin.extend(0.0).to_array(), direction.extend(0.0).to_array()]
     };
     (0..RAYS).map(&mut ray).collect()
 }
 
 /// Distance of the nearest hit of each ray on the device; infinite if there is none.
-fn on_device(scene: &Scene, bvh: &Bvh, rays: &[Ray]) -> Vec<f64> {
-    let gpu = gpu();
-    let count = rays.len() as u64;
-    let buffers = SceneBuffers::new(gpu, scene, bvh, &Settings::default()).expect("the scene fits");
-    let kernel = buffers.kernel(gpu, "trace_rays");
-    let rays = gpu.storage_with("rays", rays).expect("fits");
-    let hits = gpu.storage::<RayHit>("hits", count).expect("fits");
-    let mut commands = gpu.encoder();
-    kernel.dispatch(&mut commands, &kernel.bind(gpu, &buffers.with(&[("rays", &rays), ("hits", &hits)])), count);
-    gpu.submit(commands);
-    let found: Vec<RayHit> = gpu.read(&hits, 0, count).expect("hits read back");
-    found.iter().map(|hit| if hit.primitive == u32::MAX { f64::INFINITY } else { f64::from(hit.tuv[0]) }).collect()
+fn on_device(scene: &Scene, bvh: &Bvh, rays: &[Row]) -> Vec<f64> {
+    let buffers = SceneBuffers::new(gpu(), scene, bvh, &Settings::default()).expect("the scene fits");
+    let found = Probe::of_scene("trace_rays", &buffers, &buffers.lights.direct).run(rays);
+    found.into_iter().map(|[t, .., primitive]| if primitive < 0.0 { f64::INFINITY } else { t.into() }).collect()
 }
 
 /// The same by testing everything in f64.
-fn by_brute_force(scene: &Scene, ray: &Ray) -> f64 {
-    let (o, d) = (Vec3::from(ray.origin).as_dvec3(), Vec3::from(ray.direction).as_dvec3());
+fn by_brute_force(scene: &Scene, ray: &Row) -> f64 {
+    let [o, d] = ray.map(|[x, y, z, _]| Vec3::new(x, y, z).as_dvec3());
     let triangles = scene.triangles.iter().filter_map(|t| hit_triangle(t.positions.map(Vec3::as_dvec3), o, d));
     let spheres = scene.spheres.iter().filter_map(|s| hit_sphere(s.center.as_dvec3(), f64::from(s.radius), o, d));
     triangles.chain(spheres).fold(f64::INFINITY, f64::min)

@@ -40,8 +40,6 @@ macro_rules! twins {
 fn twins() -> Vec<Twin> {
     twins! {
         BvhNode { grid, low, high }
-        Ray { origin, pad0, direction, pad1 }
-        RayHit { tuv, primitive }
         Primitive { v0, material, e1, id, e2, emitter }
         Normals { n0, n1, n2, flat_shaded }
         Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }

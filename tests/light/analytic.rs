@@ -2,11 +2,11 @@
 //!
 //! | test | closed form | negative control |
 //! |---|---|---|
-//! | closed sphere | L = ρ/π · I/R² · (1 − ρ^B)/(1 − ρ) | the same with B − 1 |
-//! | final gathering | the same series with one bounce more | with B |
-//! | closed box | stored flux = Φ (1 − ρ^B)/(1 − ρ) | the same with B − 1 |
+//! | closed sphere | L = ρ/π · I/R² · (1 − ρ^B)/(1 − ρ), at 4 sigma over seeds | traced with B − 1 |
+//! | final gathering | the same series with one bounce more | traced with B − 1 |
+//! | closed box | stored flux = Φ (1 − ρ^B)/(1 − ρ) | traced with B − 1 |
 //! | bounce limit | stored flux · (1 − ρ) + lost flux = Φ | without the lost flux |
-//! | inverse-square law | L = ρ/π · I/d² | 1/d |
+//! | inverse-square law | L = ρ/π · I/d² | another distance |
 //! | thin wall | black behind | lit in front |
 
 use std::f64::consts::PI;
@@ -31,46 +31,51 @@ fn series(albedo: f64, bounces: u32) -> f64 {
     (1.0 - albedo.powi(bounces as i32)) / (1.0 - albedo)
 }
 
-#[test]
-fn closed_sphere_has_the_radiance_of_the_series() {
+/// A sphere around its light and camera, and the radiance of its direct light.
+fn closed_sphere() -> (Scene, f64) {
     let (radius, intensity) = (2.0, 5.0);
     let mut scene = scene(&[diffuse(ALBEDO as f32)]);
     scene.spheres.push(sphere(Vec3::ZERO, radius, 0));
     scene.lights.push(point_light(Vec3::ZERO, intensity));
     scene.cameras.push(camera(vec3(0.5, 0.0, 0.0), vec3(-1.0, 0.2, 0.3), 100.0));
     let direct = ALBEDO / PI * f64::from(intensity) / f64::from(radius * radius);
+    (scene, direct)
+}
+
+#[test]
+fn closed_sphere_has_the_radiance_of_the_series() {
+    let (scene, direct) = closed_sphere();
+    let right = direct * series(ALBEDO, BOUNCES);
     for mode in [Mode::Photons, Mode::Hybrid] {
-        for neighbors in [10, 100] {
-            // Independent photons: those of a Sobol sequence keep a distance, which makes the (k+1)-th lie farther by up to 1/(2k).
-            let sampler = Sampler::Random;
-            let settings = settings(mode, 150_000, 64).with(|s| {
+        let estimate = |neighbors, sampler, max_bounces| {
+            let settings = settings(mode, 40_000, 32).with(|s| {
                 s.estimate.neighbors = neighbors;
-                s.photons.max_bounces = BOUNCES;
+                s.photons.max_bounces = max_bounces;
                 s.photons.sampler = sampler;
             });
-            let measured = mean(&render_scene(&scene, &settings));
-            let right = direct * series(ALBEDO, BOUNCES);
-            let wrong = direct * series(ALBEDO, BOUNCES - 1);
-            assert!(within(measured, right, 0.015), "{mode:?}, k = {neighbors}: {measured} instead of {right}");
-            assert!(!within(measured, wrong, 0.015), "{mode:?}, k = {neighbors}: control {wrong} passes");
+            Estimate::over_seeds(8, |seed| {
+                mean(&render_scene(&scene, &settings.clone().with(|s| s.photons.seed = seed)))
+            })
+        };
+        for neighbors in [10, 100] {
+            // Independent photons: those of a Sobol sequence keep a distance, which makes the (k+1)-th lie farther by up to 1/(2k).
+            let found = estimate(neighbors, Sampler::Random, BOUNCES);
+            assert!(found.z(right) < 4.0, "{mode:?}, k = {neighbors}: {found:?} instead of {right}");
+            let short = estimate(neighbors, Sampler::Random, BOUNCES - 1);
+            assert!(short.z(right) > 4.0, "control: {mode:?}, k = {neighbors}: {short:?} with a bounce less");
             // The default sampler stays within what its photons' distances may cost.
-            let spread = mean(&render_scene(&scene, &settings.with(|s| s.photons.sampler = Sampler::Sobol)));
             let least = right * (1.0 - 0.5 / f64::from(neighbors));
             let fits = |mean: f64| mean > 0.995 * least && mean < 1.005 * right;
+            let spread = estimate(neighbors, Sampler::Sobol, BOUNCES).mean;
             assert!(fits(spread), "{mode:?}, k = {neighbors}: {spread} is not from {least} to {right}");
-            assert!(!fits(1.06 * spread) && !fits(0.94 * spread), "{mode:?}, k = {neighbors}: control");
+            assert!(!fits(short.mean), "control: {mode:?}, k = {neighbors}: {short:?} fits");
         }
     }
 }
 
 #[test]
 fn final_gathering_adds_the_bounce_that_its_rays_make() {
-    let (radius, intensity) = (2.0, 5.0);
-    let mut scene = scene(&[diffuse(ALBEDO as f32)]);
-    scene.spheres.push(sphere(Vec3::ZERO, radius, 0));
-    scene.lights.push(point_light(Vec3::ZERO, intensity));
-    scene.cameras.push(camera(vec3(0.5, 0.0, 0.0), vec3(-1.0, 0.2, 0.3), 100.0));
-    let direct = ALBEDO / PI * f64::from(intensity) / f64::from(radius * radius);
+    let (scene, direct) = closed_sphere();
     for (mode, first) in [(Mode::Hybrid, 0.0), (Mode::IndirectPhotons, 1.0)] {
         let settings = settings(mode, 50_000, 32).with(|s| {
             s.photons.max_bounces = BOUNCES;
@@ -78,9 +83,9 @@ fn final_gathering_adds_the_bounce_that_its_rays_make() {
         });
         let measured = mean(&render_scene(&scene, &settings));
         let right = direct * (series(ALBEDO, BOUNCES + 1) - first);
-        let wrong = direct * (series(ALBEDO, BOUNCES) - first);
         assert!(within(measured, right, 0.015), "{mode:?}: {measured} instead of {right}");
-        assert!(!within(measured, wrong, 0.015), "{mode:?}: control {wrong} passes");
+        let short = mean(&render_scene(&scene, &settings.clone().with(|s| s.photons.max_bounces = BOUNCES - 1)));
+        assert!(!within(short, right, 0.015), "control: {mode:?}: {short} with a bounce less");
     }
 }
 
@@ -105,12 +110,13 @@ fn closed_box_stores_the_flux_of_the_series() {
     scene.lights.push(point_light(vec3(0.2, 0.3, -0.1), 5.0));
     let settings = settings(Mode::Photons, 300_000, 1).with(|s| s.photons.max_bounces = BOUNCES);
     let (traced, flux) = trace_photons(&scene, &settings);
+    let (_, short) = trace_photons(&scene, &settings.clone().with(|s| s.photons.max_bounces = BOUNCES - 1));
     let power = 4.0 * PI * 5.0;
     for channel in 0..3 {
         let rho = f64::from(albedo[channel]);
-        let (right, wrong) = (power * series(rho, BOUNCES), power * series(rho, BOUNCES - 1));
+        let right = power * series(rho, BOUNCES);
         assert!(within(flux[channel], right, 0.01), "channel {channel}: {} instead of {right}", flux[channel]);
-        assert!(!within(flux[channel], wrong, 0.01), "channel {channel}: control {wrong} passes");
+        assert!(!within(short[channel], right, 0.01), "control: channel {channel}: {} passes", short[channel]);
     }
     // What is neither absorbed nor cut off would be missing: Σ over channels of stored · (1 − ρ) + lost = Φ.
     let absorbed: f64 = (0..3).map(|c| flux[c] * (1.0 - f64::from(albedo[c]))).sum::<f64>() / 3.0;
@@ -128,8 +134,9 @@ fn roulette_alone_ends_paths() {
     let (traced, flux) = trace_photons(&scene, &settings);
     let right = 4.0 * PI / (1.0 - 0.9);
     assert!(within(flux[0], right, 0.02), "{} instead of {right}", flux[0]);
-    assert!(!within(flux[0], 4.0 * PI * series(0.9, 20), 0.02), "control: a limit of 20 bounces passes");
     assert_eq!(traced.lost, 0.0);
+    let (_, limited) = trace_photons(&scene, &settings.clone().with(|s| s.photons.max_bounces = 20));
+    assert!(!within(limited[0], right, 0.02), "control: {} with at most 20 bounces", limited[0]);
 }
 
 /// A floor at height 0 under a light, seen from above over a small field.
@@ -145,7 +152,7 @@ fn floor_under_light(height: f32) -> Scene {
 fn light_falls_with_the_square_of_the_distance() {
     const SEEDS: u32 = 8;
     for (mode, tolerance) in [(Mode::DirectRays, 0.005), (Mode::DirectPhotons, 0.03)] {
-        for height in [1.0, 2.0] {
+        let measured = |height| {
             let one = |seed| {
                 let settings = settings(mode, 200_000, 16).with(|s| {
                     s.estimate.neighbors = 250;
@@ -153,12 +160,13 @@ fn light_falls_with_the_square_of_the_distance() {
                 });
                 mean(&render_scene(&floor_under_light(height), &settings))
             };
-            let measured = (0..SEEDS).map(one).sum::<f64>() / f64::from(SEEDS);
-            let right = 0.5 / PI * 7.0 / f64::from(height * height);
-            assert!(within(measured, right, tolerance), "{mode:?} at {height} m: {measured} instead of {right}");
-            let wrong = 0.5 / PI * 7.0 / f64::from(height);
-            assert!(height == 1.0 || !within(measured, wrong, tolerance), "{mode:?}: control 1/d passes");
-        }
+            (0..SEEDS).map(one).sum::<f64>() / f64::from(SEEDS)
+        };
+        let right = |height: f64| 0.5 / PI * 7.0 / (height * height);
+        let (near, far) = (measured(1.0), measured(2.0));
+        assert!(within(near, right(1.0), tolerance), "{mode:?} at 1 m: {near} instead of {}", right(1.0));
+        assert!(within(far, right(2.0), tolerance), "{mode:?} at 2 m: {far} instead of {}", right(2.0));
+        assert!(!within(far, right(1.9), tolerance) && !within(near, right(2.0), tolerance), "control: {mode:?}");
     }
 }
 

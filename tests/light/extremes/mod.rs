@@ -2,10 +2,10 @@
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
-//! | media: camera | from inside of nested glass, radiance n² L and total reflection as Bouguer's invariant says | as if it started in air |
-//! | media: light | from inside of nested glass the power leaves that is not trapped | as if it started in air |
+//! | media: camera | from inside of nested glass, radiance n² L and total reflection as Bouguer's invariant says | other glass |
+//! | media: light | from inside of nested glass the power leaves that is not trapped | nearer to the middle |
 //! | media: emitters | bulbs, panels and glass that shines start in what is around them | a bulb beside the glass |
-//! | media: final gathering | in nested glass it gives what the map holds there | as if its rays started in air |
+//! | media: final gathering | in nested glass it gives what the map holds there | half the light |
 //! | media: shared | object, light and camera in the same glass: rays and photons agree | half the light |
 //! | numbers: overflow | lights of 3e38: numbers out of range are counted by stage, the film is finite | an ordinary light counts none |
 //! | numbers: strength | lights of 1e-6, 1e9 and 1e30 give the same picture times a factor | another seed |

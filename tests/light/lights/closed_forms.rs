@@ -2,11 +2,11 @@
 //!
 //! | test | closed form | negative control |
 //! |---|---|---|
-//! | spot | E = I f cos³θ/h², f the specification's falloff; flux I Ω | falloff not squared; flux of the whole outer cone |
-//! | directional | E = I cos θ | without the cosine |
-//! | uniform sky | E = π L on an open floor | 2 π L |
-//! | square emitter | Lambert's formula for polygons, facing and askew | the back side, and twice the distance |
-//! | spherical emitter | E = π L (r/d)² cos θ | r/d not squared |
+//! | spot | E = I f cos³θ/h², f the specification's falloff; flux I Ω | another inner cone; a larger floor |
+//! | directional | E = I cos θ | straight from above |
+//! | uniform sky | E = π L on an open floor | 2 % stronger |
+//! | square emitter | Lambert's formula for polygons, facing and askew | the back side; an emitter 5 cm higher |
+//! | spherical emitter | E = π L (r/d)² cos θ | 2 % larger |
 //! | furnace | closed objects of albedo 1 in radiance L look L | albedo 0.9 |
 //! | bright pixel | E = the sum over the map; the camera sees it where it is | the map turned by 20° |
 
@@ -33,18 +33,22 @@ fn irradiance_at(scene: &Scene, eye: Vec3, target: Vec3, light_samples: u32) -> 
 #[test]
 fn a_spot_has_the_falloff_of_the_specification() {
     let (height, inner, outer) = (2.0_f32, 0.3_f32, 0.6_f32);
-    let mut scene = floor(10.0);
-    scene.lights.push(spot(vec3(0.0, height, 0.0), Vec3::NEG_Y, 3.0, inner, outer));
-    for angle in [0.0_f32, 0.2, 0.4, 0.5, 0.57, 0.7] {
+    let measured = |inner: f32, angle: f32| {
+        let mut scene = floor(10.0);
+        scene.lights.push(spot(vec3(0.0, height, 0.0), Vec3::NEG_Y, 3.0, inner, outer));
         let x = height * angle.tan();
-        let measured = irradiance_at(&scene, vec3(x, 4.0, 0.001), vec3(x, 0.0, 0.0), 1);
+        irradiance_at(&scene, vec3(x, 4.0, 0.001), vec3(x, 0.0, 0.0), 1)
+    };
+    for angle in [0.0_f32, 0.2, 0.4, 0.5, 0.57, 0.7] {
+        let found = measured(inner, angle);
         let cosine = f64::from(angle).cos();
-        let [inner, outer] = [inner, outer].map(|a| f64::from(a).cos());
-        let t = ((cosine - outer) / (inner - outer)).clamp(0.0, 1.0);
-        let (right, wrong) = (3.0 * t * t * cosine.powi(3) / 4.0, 3.0 * t * cosine.powi(3) / 4.0);
-        assert!((measured - right).abs() < 0.002 * right + 1e-9, "at {angle}: {measured} instead of {right}");
-        let in_falloff = t > 0.0 && t < 1.0;
-        assert!(!in_falloff || !within(measured, wrong, 0.03), "control: {wrong} passes at {angle}");
+        let [full, none] = [inner, outer].map(|a| f64::from(a).cos());
+        let t = ((cosine - none) / (full - none)).clamp(0.0, 1.0);
+        let right = 3.0 * t * t * cosine.powi(3) / 4.0;
+        let fits = |found: f64| (found - right).abs() < 0.002 * right + 1e-9;
+        assert!(fits(found), "at {angle}: {found} instead of {right}");
+        let other = measured(inner - 0.01, angle);
+        assert!(t == 0.0 || t == 1.0 || !fits(other), "control: {other} of another cone passes at {angle}");
     }
 }
 
@@ -53,53 +57,62 @@ fn photons_of_a_spot_carry_its_exact_flux() {
     // In a ball, the light inside and all directions open to it; and above a floor that it lights from outside the
     // scene's sphere, wider than its cone and narrower than its cone.
     let solid_angle = |inner: f64, outer: f64| 2.0 * PI * ((1.0 - inner.cos()) + (inner.cos() - outer.cos()) / 3.0);
-    let mut ball = scene(&[diffuse(0.5)]);
-    ball.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
-    ball.lights.push(spot(vec3(0.1, 0.3, 0.2), vec3(1.0, 2.0, 3.0), 5.0, 0.4, 1.1));
-    let (measured, right) = (direct_flux(&ball, 40_000), 5.0 * solid_angle(0.4, 1.1));
+    let inside = |inner: f32, outer: f32| {
+        let mut ball = scene(&[diffuse(0.5)]);
+        ball.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
+        ball.lights.push(spot(vec3(0.1, 0.3, 0.2), vec3(1.0, 2.0, 3.0), 5.0, inner, outer));
+        direct_flux(&ball, 40_000)
+    };
+    let (measured, right) = (inside(0.4, 1.1), 5.0 * solid_angle(0.4, 1.1));
     assert!(within(measured, right, 1e-3), "inside: {measured} instead of {right}");
-    assert!(!within(measured, 5.0 * solid_angle(1.1, 1.1), 1e-3), "control: the whole outer cone");
-    let outside = |inner: f32, outer: f32| {
-        let mut scene = floor(1.0);
+    assert!(!within(inside(0.41, 1.1), right, 1e-3), "control: another inner cone passes");
+    let outside = |half: f32, inner: f32, outer: f32| {
+        let mut scene = floor(half);
         scene.lights.push(spot(vec3(0.0, 5.0, 0.0), Vec3::NEG_Y, 5.0, inner, outer));
         direct_flux(&scene, 40_000)
     };
-    let (measured, right) = (outside(0.05, 0.15), 5.0 * solid_angle(0.05, 0.15));
+    let (measured, right) = (outside(1.0, 0.05, 0.15), 5.0 * solid_angle(0.05, 0.15));
     assert!(within(measured, right, 1e-3), "a narrow cone: {measured} instead of {right}");
     // A square of half side a at distance h fills 4 atan(a²/(h √(h² + 2a²))) of a point's view.
-    let (measured, right) = (outside(1.4, 1.5), 20.0 * (1.0 / (5.0 * 27.0_f64.sqrt())).atan());
+    let (measured, right) = (outside(1.0, 1.4, 1.5), 20.0 * (1.0 / (5.0 * 27.0_f64.sqrt())).atan());
     assert!(within(measured, right, 0.01), "a wide cone: {measured} instead of {right}");
-    assert!(!within(1.03 * measured, right, 0.01), "control: 3 % more passes");
+    assert!(!within(outside(1.02, 1.4, 1.5), right, 0.01), "control: a floor 2 % larger passes");
 }
 
 #[test]
 fn a_directional_light_has_the_same_irradiance_everywhere() {
-    let mut scene = floor(4.0);
+    let lit_from = |direction: Vec3| {
+        let mut scene = floor(4.0);
+        scene.lights.push(Light { kind: LightKind::Directional, direction, ..point_light(Vec3::splat(9.0), 3.0) });
+        scene
+    };
     let direction = vec3(1.0, -2.0, 0.5).normalize();
-    scene.lights.push(Light { kind: LightKind::Directional, direction, ..point_light(Vec3::splat(9.0), 3.0) });
-    let cosine = f64::from(-direction.y);
+    let (scene, above) = (lit_from(direction), lit_from(Vec3::NEG_Y));
+    let right = 3.0 * f64::from(-direction.y);
     for target in [Vec3::ZERO, vec3(3.0, 0.0, -2.0)] {
-        let measured = irradiance_at(&scene, target + vec3(0.0, 4.0, 0.001), target, 1);
-        assert!(within(measured, 3.0 * cosine, 0.001), "{measured} instead of {}", 3.0 * cosine);
-        assert!(!within(measured, 3.0, 0.001), "control: without the cosine");
+        let measured = |scene: &Scene| irradiance_at(scene, target + vec3(0.0, 4.0, 0.001), target, 1);
+        assert!(within(measured(&scene), right, 0.001), "{} instead of {right}", measured(&scene));
+        assert!(!within(measured(&above), right, 0.001), "control: straight from above");
     }
     // All that the floor catches: irradiance times area.
-    let (measured, right) = (direct_flux(&scene, 40_000), 3.0 * cosine * 64.0);
+    let (measured, right) = (direct_flux(&scene, 40_000), right * 64.0);
     assert!(within(measured, right, 0.01), "photons: {measured} W instead of {right} W");
-    assert!(!within(1.03 * measured, right, 0.01), "control: 3 % more passes");
+    assert!(!within(direct_flux(&above, 40_000), right, 0.01), "control: photons straight from above");
 }
 
 #[test]
 fn a_uniform_sky_gives_pi_times_its_radiance() {
-    let mut scene = floor(4.0);
-    scene.environment = Some(Environment { strength: 2.0, ..Environment::uniform(Vec3::splat(0.75)) });
-    let measured = irradiance_at(&scene, vec3(1.0, 4.0, 0.001), vec3(1.0, 0.0, 0.0), 16);
-    assert!(within(measured, PI * 1.5, 0.005), "{measured} instead of {}", PI * 1.5);
-    assert!(!within(measured, 2.0 * PI * 1.5, 0.005), "control");
+    let under = |strength: f32| {
+        let sky = Environment { strength, ..Environment::uniform(Vec3::splat(0.75)) };
+        Scene { environment: Some(sky), ..floor(4.0) }
+    };
+    let measured = |strength| irradiance_at(&under(strength), vec3(1.0, 4.0, 0.001), vec3(1.0, 0.0, 0.0), 16);
+    assert!(within(measured(2.0), PI * 1.5, 0.005), "{} instead of {}", measured(2.0), PI * 1.5);
+    assert!(!within(measured(2.04), PI * 1.5, 0.005), "control: a sky 2 % stronger passes");
     // Both sides of the floor: twice its area.
-    let (measured, right) = (direct_flux(&scene, 40_000), PI * 1.5 * 2.0 * 64.0);
-    assert!(within(measured, right, 0.01), "photons: {measured} W instead of {right} W");
-    assert!(!within(1.03 * measured, right, 0.01), "control: 3 % more passes");
+    let (flux, right) = (|strength| direct_flux(&under(strength), 40_000), PI * 1.5 * 2.0 * 64.0);
+    assert!(within(flux(2.0), right, 0.01), "photons: {} W instead of {right} W", flux(2.0));
+    assert!(!within(flux(2.04), right, 0.01), "control: photons of a sky 2 % stronger pass");
 }
 
 /// Irradiance by a polygon of radiance 1, seen counterclockwise from the point (Lambert 1760): half the sum over its edges of the
@@ -110,11 +123,11 @@ fn lambert(point: Vec3, normal: Vec3, corners: &[Vec3]) -> f64 {
     0.5 * (0..corners.len()).map(edge).sum::<f64>().abs()
 }
 
-/// A square of 1 m² at height 2 that shines down, over a floor and beside a wall at x = 1.5; not double-sided.
-fn square_over_floor() -> (Scene, [Vec3; 4]) {
+/// A square of 1 m² that shines down, over a floor and beside a wall at x = 1.5; not double-sided.
+fn square_over_floor(height: f32) -> (Scene, [Vec3; 4]) {
     let mut scene = floor(3.0);
     scene.materials.push(emissive("lamp", 0.0, 2.0, false));
-    let corners = [vec3(-0.5, 2.0, -0.5), vec3(0.5, 2.0, -0.5), vec3(0.5, 2.0, 0.5), vec3(-0.5, 2.0, 0.5)];
+    let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, z)| vec3(x, height, z));
     add_quad(&mut scene, corners[0], Vec3::X, Vec3::Z, 1);
     add_quad(&mut scene, vec3(1.5, 0.0, -3.0), vec3(0.0, 0.0, 6.0), vec3(0.0, 3.0, 0.0), 0);
     (scene, corners)
@@ -122,16 +135,15 @@ fn square_over_floor() -> (Scene, [Vec3; 4]) {
 
 #[test]
 fn a_square_emitter_gives_what_its_form_factor_says() {
-    let (scene, corners) = square_over_floor();
+    let ((scene, corners), (higher, _)) = (square_over_floor(2.0), square_over_floor(2.05));
     let facing = [(vec3(0.1, 0.0, 0.0), Vec3::Y), (vec3(-1.2, 0.0, 0.7), Vec3::Y)];
     let askew = [(vec3(1.5, 1.0, 0.0), Vec3::NEG_X), (vec3(1.5, 0.3, -0.8), Vec3::NEG_X)];
     for (point, normal) in facing.into_iter().chain(askew) {
         let eye = point + 0.4 * normal + vec3(0.0, 0.1, 0.001);
-        let measured = irradiance_at(&scene, eye, point, 64);
+        let measured = |scene| irradiance_at(scene, eye, point, 64);
         let right = 2.0 * lambert(point, normal, &corners);
-        assert!(within(measured, right, 0.01), "at {point}: {measured} instead of {right}");
-        let farther = point + 2.0 * (point - corners[0]);
-        assert!(!within(measured, 2.0 * lambert(farther, normal, &corners), 0.01), "control: {farther} passes");
+        assert!(within(measured(&scene), right, 0.01), "at {point}: {} instead of {right}", measured(&scene));
+        assert!(!within(measured(&higher), right, 0.01), "control: an emitter 5 cm higher passes at {point}");
     }
     // Nothing comes from its back.
     assert_eq!(irradiance_at(&scene, vec3(1.4, 2.6, 0.001), vec3(1.5, 2.5, 0.0), 64), 0.0);
@@ -144,21 +156,28 @@ fn a_square_emitter_gives_what_its_form_factor_says() {
 
 #[test]
 fn a_spherical_emitter_gives_what_its_solid_angle_says() {
-    let mut scene = floor(3.0);
-    scene.materials.push(emissive("bulb", 0.0, 2.0, false));
-    scene.spheres.push(sphere(vec3(0.0, 2.0, 0.0), 0.8, 1));
+    let bulb = |radius: f32| {
+        let mut scene = floor(3.0);
+        scene.materials.push(emissive("bulb", 0.0, 2.0, false));
+        scene.spheres.push(sphere(vec3(0.0, 2.0, 0.0), radius, 1));
+        scene
+    };
     for x in [0.1_f32, 1.0, 2.5] {
         let (point, d2) = (vec3(x, 0.0, 0.0), f64::from(x * x + 4.0));
-        let measured = irradiance_at(&scene, point + vec3(0.0, 0.5, 0.001), point, 64);
+        let measured = |radius| irradiance_at(&bulb(radius), point + vec3(0.0, 0.5, 0.001), point, 64);
         let right = PI * 2.0 * 0.64 / d2 * 2.0 / d2.sqrt();
-        assert!(within(measured, right, 0.005), "at {x}: {measured} instead of {right}");
-        assert!(!within(measured, right / 0.8 * d2.sqrt(), 0.005), "control at {x}");
+        assert!(within(measured(0.8), right, 0.005), "at {x}: {} instead of {right}", measured(0.8));
+        assert!(!within(measured(0.816), right, 0.005), "control: a bulb 2 % larger passes at {x}");
     }
     // Its photons: π L times its area, half of it over the horizon of a large floor below and none lost in a ball.
-    scene.spheres.push(sphere(Vec3::ZERO, 50.0, 0));
-    let (measured, right) = (direct_flux(&scene, 40_000), PI * 2.0 * 4.0 * PI * 0.64);
-    assert!(within(measured, right, 1e-3), "photons: {measured} W instead of {right} W");
-    assert!(!within(measured, 0.9 * right, 1e-3), "control");
+    let flux = |radius| {
+        let mut scene = bulb(radius);
+        scene.spheres.push(sphere(Vec3::ZERO, 50.0, 0));
+        direct_flux(&scene, 40_000)
+    };
+    let right = PI * 2.0 * 4.0 * PI * 0.64;
+    assert!(within(flux(0.8), right, 1e-3), "photons: {} W instead of {right} W", flux(0.8));
+    assert!(!within(flux(0.801), right, 1e-3), "control: photons of a bulb 1 mm larger pass");
 }
 
 #[test]
@@ -231,17 +250,19 @@ fn a_bright_pixel_lights_and_is_seen_where_it_is() {
     let mut scene = scene(&[diffuse(0.5)]);
     let across = normal.cross(Vec3::Y).normalize();
     add_quad(&mut scene, -across - normal.cross(across), 2.0 * across, 2.0 * normal.cross(across), 0);
+    let other = Scene { environment: Some(turned.clone()), ..scene.clone() };
     scene.environment = Some(map.clone());
-    let (right, wrong) = (cosine_sum(&map), cosine_sum(&turned));
+    let right = cosine_sum(&map);
     let point = 0.3 * across;
-    let measured = irradiance_at(&scene, point + normal, point, 16);
-    assert!(within(measured, right, 0.01), "{measured} instead of {right}");
-    assert!(!within(measured, wrong, 0.05), "control: {wrong} with the map turned");
+    let measured = |scene| irradiance_at(scene, point + normal, point, 16);
+    assert!(within(measured(&scene), right, 0.01), "{} instead of {right}", measured(&scene));
+    assert!(!within(measured(&other), right, 0.05), "control: {} with the map turned", measured(&other));
     // Photons: all that the two sides of the square catch.
     let back = irradiance_at(&scene, point - normal, point, 16);
     let flux = direct_flux(&scene, 40_000);
     assert!(within(flux, 4.0 * (right + back), 0.02), "photons: {flux} W instead of {} W", 4.0 * (right + back));
-    assert!(!within(flux, 4.0 * (wrong + back), 0.02), "control: the map turned, photons");
+    let flux = direct_flux(&other, 40_000);
+    assert!(!within(flux, 4.0 * (right + back), 0.02), "control: {flux} W with the map turned");
     // Seen from far above the square: pixel for pixel what the map says.
     let center = vec3(-0.1, 0.63, -0.7);
     scene.cameras = vec![camera(vec3(0.0, 50.0, 0.0), vec3(0.0, 50.0, 0.0) + center, 90.0)];

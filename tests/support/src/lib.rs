@@ -120,6 +120,29 @@ pub fn mean(render: &Render) -> f64 {
     sum / (3 * render.frame.radiance.len()) as f64
 }
 
+/// Mean of independent numbers, and its standard error.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate {
+    pub mean: f64,
+    pub error: f64,
+}
+
+impl Estimate {
+    /// Over the seeds from 0 on.
+    pub fn over_seeds(seeds: u32, of_seed: impl Fn(u32) -> f64) -> Self {
+        let values: Vec<f64> = (0..seeds).map(of_seed).collect();
+        let count = f64::from(seeds);
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        Self { mean, error: (squares / (count * (count - 1.0))).sqrt() }
+    }
+
+    /// Distance from what is expected, in standard errors.
+    pub fn z(&self, expected: f64) -> f64 {
+        (self.mean - expected).abs() / self.error
+    }
+}
+
 /// Whether `value` differs from `expected` by less than a fraction.
 pub fn within(value: f64, expected: f64, fraction: f64) -> bool {
     (value - expected).abs() < fraction * expected.abs()

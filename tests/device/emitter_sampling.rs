@@ -1,0 +1,145 @@
+//! Where one direction can be drawn in several ways, each way knows the density of the others.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | emission | photon paths follow the balance of overlapping targets | a target smaller |
+//! | emitters | directions follow the density that `arriving_at` tells | lamps chosen alike |
+//! | weights | of a direction to a lamp and one by the cosine sum to one | another table of choices |
+
+use std::f64::consts::PI;
+
+use caustica::{emitters::targets::delta_targets, scene::Scene, settings::LightSampling};
+use glam::{DVec3, Vec3, vec3};
+use support::*;
+
+use super::{
+    chi_square::{Directions, SAMPLES, deviate},
+    light_sampling::{probe, sky, upload},
+    probe::{Probe, Row, rows},
+};
+
+/// A point light at the origin and two glass balls of which it sees one behind the other's edge.
+fn aimed(radius: f32) -> Scene {
+    let mut scene = scene(&[glass()]);
+    scene.spheres.push(sphere(vec3(0.5, 3.0, 1.0), 1.0, 0));
+    scene.spheres.push(sphere(vec3(3.0, 7.0, 4.0), radius, 0));
+    scene.lights.push(point_light(Vec3::ZERO, 1.0));
+    scene
+}
+
+#[test]
+fn aimed_emission_follows_the_balance_of_its_targets() {
+    let drawn = |radius: f32| {
+        let scene = aimed(radius);
+        let targets = delta_targets(&scene);
+        assert_eq!(targets.len(), 2);
+        (probe("probe_emission", &scene, &rows(SAMPLES, [0.0, 0.0, 3.0, 0.0])), targets)
+    };
+    let (directions, targets) = drawn(1.5);
+    let sum: f64 = targets.iter().map(|t| t.solid_angle(Vec3::ZERO).expect("from outside")).sum();
+    let covering = |d: DVec3| {
+        let passes = |center: DVec3, radius: f64| d.cross(center).length() <= radius && d.dot(center) > 0.0;
+        targets.iter().filter(|t| passes(t.center.as_dvec3(), t.radius.into())).count() as f64
+    };
+    let grid = Directions { rows: 24, columns: 48 };
+    let densities: Vec<f64> = grid.midpoints(60).into_iter().map(|d| covering(d) / sum).collect();
+    let test =
+        |directions: &[[f32; 4]]| deviate(&grid.counts(directions.iter().copied()), &grid.probabilities(&densities));
+    let found = test(&directions);
+    assert!(found.fits(), "{found:?}");
+    let other = test(&drawn(1.4).0);
+    assert!(!other.fits(), "control: a smaller target: {other:?}");
+    // Flux is intensity over density.
+    let worst = directions.iter().map(|d| {
+        let density = covering(Vec3::from_slice(d).as_dvec3().normalize()) / sum;
+        (f64::from(d[3]) * density - 1.0).abs()
+    });
+    let wrong = worst.filter(|off| *off > 1e-3).count();
+    assert!(wrong < SAMPLES / 1000, "{wrong} paths have another flux than their density says");
+}
+
+/// Lamps and a sky around the origin, none before another one.
+fn lamps() -> Scene {
+    let mut scene = scene(&[]);
+    scene.materials.extend([emissive("panel", 0.0, 3.0, true), emissive("bulb", 0.0, 5.0, false)]);
+    add_quad(&mut scene, vec3(-0.8, 1.5, -0.7), vec3(1.0, 0.3, 0.0), vec3(0.1, 0.0, 1.2), 0);
+    scene.spheres.push(sphere(vec3(2.0, 0.8, 0.4), 0.6, 1));
+    scene.environment = Some(sky(10.0));
+    scene
+}
+
+/// Directions to the lamps, with the densities as drawn, negative where hidden, and as met.
+fn drawn_and_met(samples: &[Row], sampling: LightSampling) -> Vec<([f32; 4], f32)> {
+    let buffers = upload(&lamps(), sampling);
+    let choices = if sampling == LightSampling::Power { &buffers.lights.direct } else { &buffers.lights.photons };
+    let drawn = Probe::of_scene("probe_emitter", &buffers, choices).run(samples);
+    let asked: Vec<Row> = drawn.iter().map(|d| [*d, [0.0, LAMPS, 0.0, 0.0]]).collect();
+    let met = Probe::of_scene("probe_emitter_pdf", &buffers, choices).run(&asked);
+    drawn.into_iter().zip(met).map(|(drawn, met)| (drawn, met[0])).collect()
+}
+
+/// Two triangles, a sphere and the sky.
+const LAMPS: f32 = 4.0;
+
+fn lamp_samples() -> Vec<Row> {
+    let more = rows(2 * SAMPLES, [0.0; 4]);
+    let fifth = more[SAMPLES..].iter().map(|row| row[0][0]);
+    more[..SAMPLES].iter().zip(fifth).map(|(row, fifth)| [row[0], [fifth, LAMPS, 0.0, 0.0]]).collect()
+}
+
+#[test]
+fn emitters_are_sampled_with_the_density_that_is_told() {
+    let visible = |sampling| {
+        let all = drawn_and_met(&lamp_samples(), sampling);
+        all.into_iter().filter(|(d, _)| d[3] > 0.0).map(|(d, _)| d).collect::<Vec<_>>()
+    };
+    let grid = Directions { rows: 16, columns: 32 };
+    let points = grid.midpoints(32).into_iter().map(|d| [d.as_vec3().extend(0.0).to_array(), [0.0, LAMPS, 0.0, 0.0]]);
+    let densities = probe("probe_emitter_pdf", &lamps(), &points.collect::<Vec<_>>());
+    let mut probabilities = grid.probabilities(&densities.iter().map(|d| f64::from(d[0])).collect::<Vec<_>>());
+    // What is drawn from the sky behind a lamp is hidden.
+    let seen: f64 = probabilities.iter().sum();
+    probabilities.iter_mut().for_each(|p| *p /= seen);
+    let drawn = visible(LightSampling::Power);
+    let share = drawn.len() as f64 / SAMPLES as f64;
+    assert!(
+        (share - seen).abs() < 4.0 * (seen * (1.0 - seen) / SAMPLES as f64).sqrt() + 1e-3,
+        "{share} instead of {seen}"
+    );
+    let test = |drawn: Vec<[f32; 4]>| deviate(&grid.counts(drawn), &probabilities);
+    let found = test(drawn);
+    assert!(found.fits(), "{found:?}");
+    let other = test(visible(LightSampling::Uniform));
+    assert!(!other.fits(), "control: lamps chosen alike: {other:?}");
+}
+
+/// Weights of the power heuristic for a direction drawn with density `p` by one way and `q` by the
+/// other (Veach 1997, 9.2.2).
+fn weight(p: f64, q: f64) -> f64 {
+    1.0 / (1.0 + (q / p).powi(2))
+}
+
+#[test]
+fn weights_of_both_ways_to_an_emitter_sum_to_one() {
+    let samples = lamp_samples();
+    let pairs = drawn_and_met(&samples, LightSampling::Power);
+    let other = drawn_and_met(&samples, LightSampling::Uniform);
+    // Densities of the same direction: as drawn, as met after the cosine had drawn it, and the
+    // cosine's own.
+    let sums = |met: &dyn Fn(usize) -> Option<f32>| {
+        let one = |(i, (drawn, _)): (usize, &([f32; 4], f32))| {
+            let cosine = f64::from(drawn[1]) / PI;
+            let (p, met) = (f64::from(drawn[3]), f64::from(met(i)?));
+            (p > 0.0 && cosine > 0.0).then(|| weight(p, cosine) + weight(cosine, met))
+        };
+        pairs.iter().enumerate().filter_map(one).collect::<Vec<f64>>()
+    };
+    let wrong = |sums: &[f64]| sums.iter().filter(|sum| (*sum - 1.0).abs() > 2e-3).count();
+    let right = sums(&|i| Some(pairs[i].1));
+    assert!(right.len() > SAMPLES / 4, "{} directions are visible", right.len());
+    // Directions at an emitter's edge may meet what is beside it.
+    assert!(wrong(&right) < right.len() / 500, "{} of {} pairs of weights", wrong(&right), right.len());
+    let same = |i: usize| (pairs[i].0[..3] == other[i].0[..3]).then_some(other[i].1);
+    let mixed = sums(&same);
+    assert!(wrong(&mixed) > mixed.len() / 2 && mixed.len() > 1000, "control: {} of {}", wrong(&mixed), mixed.len());
+}

@@ -1,0 +1,123 @@
+//! Each sampling function draws with its density: chi-square at a significance of 1e-4, over fixed
+//! numbers.
+//!
+//! | test | density | negative control |
+//! |---|---|---|
+//! | sphere | 1/4π | a cone that leaves a cap out |
+//! | cone | 1/(2π h), narrow and wide | a wider cone |
+//! | hemisphere | cos/π about any axis | a uniform one |
+//! | discs | 1/π, polar and concentric (the lens) | a uniform hemisphere seen from above |
+//! | linear | from a to b | from b to a |
+//! | sampler | one number of a set is uniform over the seeds, alone and with another dimension | a whole set is too even; a dimension with itself |
+
+use glam::{Vec3, vec3};
+
+use super::{
+    chi_square::{Deviate, SAMPLES, height_and_azimuth, of_unit_square},
+    probe::{Probe, Row, rows},
+};
+
+const AXES: [Vec3; 4] = [Vec3::Z, Vec3::NEG_Z, Vec3::X, vec3(0.48, -0.6, -0.64)];
+
+/// Directions against a density of which `share` tells how much lies below a height, 1 − cos, about
+/// the axis.
+fn about(axis: Vec3, directions: Vec<[f32; 4]>, share: impl Fn(f64) -> f64) -> Deviate {
+    of_unit_square(directions.into_iter().map(|d| {
+        let [height, azimuth] = height_and_azimuth(d, axis);
+        [share(height), azimuth]
+    }))
+}
+
+fn cone(axis: Vec3, height: f32) -> Vec<[f32; 4]> {
+    Probe::new("probe_cone").run(&rows(SAMPLES, axis.extend(height).to_array()))
+}
+
+#[test]
+fn the_sphere_is_uniform() {
+    let sphere = Probe::new("probe_sphere").run(&rows(SAMPLES, [0.0; 4]));
+    for axis in AXES {
+        let found = about(axis, sphere.clone(), |h| h / 2.0);
+        assert!(found.fits(), "about {axis}: {found:?}");
+        let capped = about(axis, cone(axis, 1.98), |h| h / 2.0);
+        assert!(!capped.fits(), "control: without a cap about {axis}: {capped:?}");
+    }
+}
+
+#[test]
+fn cones_are_uniform() {
+    for (axis, height) in AXES.into_iter().zip([1e-4, 0.02, 0.5, 1.7]) {
+        let found = about(axis, cone(axis, height), |h| h / f64::from(height));
+        assert!(found.fits(), "of height {height}: {found:?}");
+        let wider = about(axis, cone(axis, 1.03 * height), |h| h / f64::from(height));
+        assert!(!wider.fits(), "control: 3 % higher than {height}: {wider:?}");
+    }
+}
+
+#[test]
+fn the_hemisphere_follows_the_cosine() {
+    // The share below the height h is sin²θ.
+    let share = |h: f64| h * (2.0 - h);
+    for axis in AXES {
+        let drawn = Probe::new("probe_cosine").run(&rows(SAMPLES, axis.extend(0.0).to_array()));
+        let found = about(axis, drawn, share);
+        assert!(found.fits(), "about {axis}: {found:?}");
+        let uniform = about(axis, cone(axis, 1.0), share);
+        assert!(!uniform.fits(), "control: a uniform hemisphere about {axis}: {uniform:?}");
+    }
+}
+
+#[test]
+fn discs_are_uniform() {
+    let square = |x: f32, y: f32| {
+        let (x, y) = (f64::from(x), f64::from(y));
+        [x * x + y * y, y.atan2(x) / std::f64::consts::TAU + 0.5]
+    };
+    let discs = Probe::new("probe_discs").run(&rows(SAMPLES, [0.0; 4]));
+    let polar = of_unit_square(discs.iter().map(|[x, y, ..]| square(*x, *y)));
+    let concentric = of_unit_square(discs.iter().map(|[.., x, y]| square(*x, *y)));
+    assert!(polar.fits() && concentric.fits(), "{polar:?} {concentric:?}");
+    let hemisphere = of_unit_square(cone(Vec3::Z, 1.0).iter().map(|[x, y, ..]| square(*x, *y)));
+    assert!(!hemisphere.fits(), "control: a hemisphere from above: {hemisphere:?}");
+}
+
+#[test]
+fn linear_densities_are_drawn() {
+    let drawn = |a: f32, b: f32| Probe::new("probe_linear").run(&rows(SAMPLES, [a, b, 0.0, 0.0]));
+    for (a, b) in [(1.0, 3.0), (0.0, 2.0), (5.0, 0.0), (1.0, 1.1)] {
+        let share = |x: f64| (f64::from(a) * x + 0.5 * f64::from(b - a) * x * x) / (0.5 * f64::from(a + b));
+        let test = |drawn: Vec<[f32; 4]>| {
+            // The second coordinate is that of the number itself.
+            of_unit_square(drawn.iter().zip(rows(SAMPLES, [0.0; 4])).map(|(d, r)| [share(d[0].into()), r[0][1].into()]))
+        };
+        let (found, other) = (test(drawn(a, b)), test(drawn(b, a)));
+        assert!(found.fits(), "from {a} to {b}: {found:?}");
+        assert!(!other.fits(), "control: from {b} to {a}: {other:?}");
+    }
+}
+
+/// Numbers of the sampler for each row of seed, index, set and dimension.
+fn sampler(keys: impl Iterator<Item = [u32; 4]>) -> Vec<[f64; 4]> {
+    let rows: Vec<Row> = keys.map(|key| [key.map(|k| k as f32), [1.0, 0.0, 0.0, 0.0]]).collect();
+    Probe::new("probe_sampler").run(&rows).into_iter().map(|numbers| numbers.map(f64::from)).collect()
+}
+
+#[test]
+fn scrambled_sobol_numbers_are_uniform_over_the_seeds() {
+    let seeds = 0..SAMPLES as u32;
+    for (index, set, dimension) in [(0, 0, 0), (1, 0, 0), (37, 5, 1), (100_001, 3, 7)] {
+        let numbers = sampler(seeds.clone().map(|seed| [seed, index, set, dimension]));
+        for (x, y) in [(0, 1), (0, 2), (1, 3), (2, 3)] {
+            let found = of_unit_square(numbers.iter().map(|n| [n[x], n[y]]));
+            assert!(found.fits(), "dimensions {x} and {y} of number {index}: {found:?}");
+        }
+        let one = of_unit_square(numbers.iter().map(|n| [(16.0 * n[0]).fract(), (256.0 * n[0]).fract()]));
+        assert!(one.fits(), "finer digits of number {index}: {one:?}");
+        let itself = of_unit_square(numbers.iter().map(|n| [n[0], n[0]]));
+        assert!(!itself.fits(), "control: a dimension with itself: {itself:?}");
+    }
+    let [first, second] = [0, 1].map(|index| sampler(seeds.clone().map(|seed| [seed, index, 0, 0])));
+    assert!(first.iter().zip(&second).all(|(a, b)| (a[0] < 0.5) != (b[0] < 0.5)), "a set has one number in each half");
+    // Control: the numbers of one set are far too even for independent ones.
+    let set = of_unit_square(sampler((0..1 << 16).map(|index| [0, index, 0, 0])).iter().map(|n| [n[0], n[1]]));
+    assert!(!set.fits(), "control: a whole set: {set:?}");
+}
