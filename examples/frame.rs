@@ -1,7 +1,7 @@
-//! Draws the stages of one frame, the pictures of `docs/frame.md`:
-//! `cargo run --release --example frame -- OUTDIR [SCENE]`, by default of `scenes/mirror-and-glass.gltf`.
+//! Draws the stages of one frame, the pictures of `docs/frame.md`, by default of
+//! `scenes/mirror-and-glass.gltf`: `cargo run --release --example frame -- OUTDIR [SCENE]`.
 //!
-//! Light is exposed alike in all pictures of radiance, so that they can be compared and added by eye.
+//! Exposes all pictures of radiance alike, so that they can be compared.
 
 use std::{error::Error, path::Path};
 
@@ -11,7 +11,7 @@ use caustica::{
     layout::{Gathered, VisiblePoint},
     passes::{Gather, GatherOptions, GatherSettings, PhotonMap, estimate::gather::gathered_buffer},
     progress::Silent,
-    renderer::{PhotonMaps, Session},
+    renderer::{PhotonMaps, Render, Session},
     scene::{Camera, Scene},
     settings::{Mode, Settings},
 };
@@ -21,8 +21,8 @@ use glam::Vec3;
 const SIZE: u32 = 224;
 /// Photons of a map that are drawn, at most: more would cover the picture.
 const DOTS: usize = 10_000;
-/// Largest relative difference between the sum of the stages and the picture in one go. Shared estimates are added map by map, so
-/// that only the order of additions differs.
+/// Largest relative difference between the sum of the stages and the picture of one render: only
+/// the order of additions differs.
 const TOLERANCE: f32 = 1e-4;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
@@ -42,25 +42,25 @@ fn main() -> Result<()> {
         Ok(write_file(&folder.join(format!("{name}.png")), &canvas.to_png()?)?)
     };
 
-    // One sample in the middle of each pixel, for what stands at one point.
-    let middles = direct.clone().with(|s| s.picture.spp = 1);
-    let no_maps = session.photon_maps(&direct, &Silent)?;
-    let first_hits = session.picture(&no_maps, &middles, &Silent)?.frame;
+    // One sample at each pixel's centre, for quantities at one point.
+    let centers = direct.clone().with(|s| s.picture.spp = 1);
+    let no_maps = maps(&session, &direct)?;
+    let first_hits = picture(&session, &no_maps, &centers)?.frame;
     save("depth", depth(&first_hits))?;
     save("normals", painted(|i| first_hits.normal[i].map(|c| byte(0.5 + 0.5 * c))))?;
     save("albedo", painted(|i| first_hits.albedo[i].map(|c| byte(srgb_encode(c)))))?;
 
-    let by_rays = session.picture(&no_maps, &direct, &Silent)?;
+    let by_rays = picture(&session, &no_maps, &direct)?;
     save("direct", radiance(&by_rays.frame.radiance))?;
     let mut sum = by_rays.frame.radiance;
 
     let view = View { camera: scene.camera(None)?, first_hits: &first_hits };
     for (name, global) in [("global", true), ("caustic", false)] {
-        let maps = session.photon_maps(&indirect, &Silent)?.only(global);
-        let map = maps.maps().first().ok_or("the scene leaves this map empty")?;
+        let one_map = maps(&session, &indirect)?.only(global);
+        let map = one_map.maps().first().ok_or("the scene leaves this map empty")?;
         save(&format!("{name}-photons"), view.photons(&gpu, map)?)?;
         save(&format!("{name}-radii"), view.radii(&gpu, map, &view.points(&scene), &indirect)?)?;
-        let estimate = session.picture(&maps, &indirect, &Silent)?.frame.radiance;
+        let estimate = picture(&session, &one_map, &indirect)?.frame.radiance;
         save(&format!("{name}-estimate"), radiance(&estimate))?;
         for (sum, pixel) in sum.iter_mut().zip(estimate) {
             *sum = (Vec3::from(*sum) + Vec3::from(pixel)).to_array();
@@ -68,13 +68,20 @@ fn main() -> Result<()> {
     }
     save("sum", radiance(&sum))?;
 
-    let maps = session.photon_maps(&settings, &Silent)?;
-    compare_with_one_go(&session, &maps, &settings, &sum)
+    compare_with_one_go(&session, &settings, &sum)
 }
 
-/// Checks that the stages add up to the picture that `render` makes, and prints what its stages took.
-fn compare_with_one_go(session: &Session, maps: &PhotonMaps, settings: &Settings, sum: &[[f32; 3]]) -> Result<()> {
-    let whole = session.picture(maps, settings, &Silent)?;
+fn maps(session: &Session, settings: &Settings) -> caustica::Result<PhotonMaps> {
+    session.photon_maps(settings, &Silent)
+}
+
+fn picture(session: &Session, maps: &PhotonMaps, settings: &Settings) -> caustica::Result<Render> {
+    session.picture(maps, settings, &Silent)
+}
+
+/// Checks that the stages add up to the picture of one render, and prints that render's seconds.
+fn compare_with_one_go(session: &Session, settings: &Settings, sum: &[[f32; 3]]) -> Result<()> {
+    let whole = picture(session, &maps(session, settings)?, settings)?;
     let relative = |(a, b): (&[f32; 3], &[f32; 3])| {
         let (a, b) = (Vec3::from(*a), Vec3::from(*b));
         (a - b).abs().max_element() / b.max_element().max(1e-3)
@@ -115,7 +122,7 @@ fn depth(frame: &Frame) -> Canvas {
     painted(|i| [byte(grey(frame.depth[i])); 3])
 }
 
-/// The camera, and what the middle of each pixel sees first.
+/// The camera, and the first hits at the centres of pixels.
 struct View<'a> {
     camera: &'a Camera,
     first_hits: &'a Frame,
@@ -127,7 +134,7 @@ impl View<'_> {
         self.camera.half_height_at(1.0, (SIZE, SIZE))
     }
 
-    /// Where the middle of a pixel meets the scene.
+    /// Position that the centre of a pixel sees first.
     fn position(&self, i: usize) -> Vec3 {
         let from_middle = |at: usize| (at as f32 + 0.5) / SIZE as f32 * 2.0 - 1.0;
         let (x, y) = (from_middle(i % SIZE as usize), -from_middle(i / SIZE as usize));
@@ -147,7 +154,7 @@ impl View<'_> {
             return None;
         }
         let i = y as usize * SIZE as usize + x as usize;
-        // The first hit is that of the pixel's middle; at grazing angles depth changes within a pixel.
+        // The first hit is that of the pixel's centre, and depth varies within a pixel.
         (depth < 1.02 * self.first_hits.depth[i]).then_some(i)
     }
 
@@ -166,7 +173,7 @@ impl View<'_> {
         Ok(painted(|i| dots[i].map_or([0; 3], |c: Vec3| c.to_array().map(|c| byte(srgb_encode(c))))))
     }
 
-    /// Queries at the first hits. Those on mirrors and glass are not valid: no photon is stored there.
+    /// Queries at the first hits. They are not valid on mirrors and glass, where no photon is stored.
     fn points(&self, scene: &Scene) -> Vec<VisiblePoint> {
         let on_delta = |p: Vec3| {
             let spheres = scene.spheres.iter().filter(|s| scene.materials[s.material as usize].surface.is_delta());
@@ -195,7 +202,7 @@ impl View<'_> {
         let valid = (0..points.len()).map(radius).filter(|r| *r > 0.0);
         let (least, most) = valid.fold((f32::INFINITY, 0.0_f32), |(l, m), r| (l.min(r), m.max(r)));
         println!("radii: {least:.4} m dark to {most:.4} m bright, logarithmic");
-        // By the logarithm: radii of a caustic and of what lies beside it differ by orders of magnitude.
+        // Logarithmic: radii inside and outside of a caustic differ by orders of magnitude.
         let scaled = |r: f32| (r / least).ln() / (most / least).ln();
         Ok(painted(|i| if radius(i) > 0.0 { heat(scaled(radius(i))) } else { [0; 3] }))
     }

@@ -14,7 +14,7 @@ fn links(text: &str) -> impl Iterator<Item = &str> {
     targets.map(|target| target.split('#').next().unwrap_or_default()).filter(|t| !t.is_empty() && !t.contains("://"))
 }
 
-/// Words in backquotes that are paths from the root. A pattern, or a name in capitals that stands for others, is none.
+/// Words in backquotes that are paths from the root, without patterns and placeholders (`NAME`).
 fn paths(text: &str) -> impl Iterator<Item = &str> {
     let words = text.split('`').skip(1).step_by(2).map(|word| word.split("::").next().unwrap_or_default());
     words.filter(|word| {
