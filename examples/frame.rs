@@ -173,7 +173,7 @@ impl View<'_> {
         Ok(painted(|i| dots[i].map_or([0; 3], |c: Vec3| c.to_array().map(|c| byte(srgb_encode(c))))))
     }
 
-    /// Queries at the first hits. They are not valid on mirrors and glass, where no photon is stored.
+    /// Queries at the first hits; not valid on mirrors and glass, where no photon is stored.
     fn points(&self, scene: &Scene) -> Vec<VisiblePoint> {
         let on_delta = |p: Vec3| {
             let spheres = scene.spheres.iter().filter(|s| scene.materials[s.material as usize].surface.is_delta());
