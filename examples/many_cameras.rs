@@ -5,6 +5,7 @@ use std::{env, path::PathBuf};
 use caustica::{
     Gpu, Result, Scene, Session, Settings, Silent,
     image::{Tonemap, write_png},
+    settings::PictureSettings,
 };
 
 /// Distance between neighbouring cameras, metres.
@@ -25,11 +26,11 @@ fn main() -> Result<()> {
         s.picture.spp = 1;
     });
     let gpu = Gpu::open(None)?;
-    let session = Session::open(&gpu, &scene, &settings, &Silent)?;
-    let maps = session.photon_maps(&settings, &Silent)?;
+    let session = Session::open(&gpu, &scene, &settings.lights, &Silent)?;
+    let maps = session.photon_maps(&settings.photons, &Silent)?;
     for camera in &scene.cameras {
-        let settings = settings.clone().with(|s| s.picture.camera = Some(camera.name.clone()));
-        let made = session.picture(&maps, &settings, &Silent)?;
+        let picture = PictureSettings { camera: Some(camera.name.clone()), ..settings.picture.clone() };
+        let made = session.picture(&maps, &settings.estimate, &picture, &Silent)?;
         write_png(&folder.join(format!("{}.png", camera.name)), &made.frame, 0.0, Tonemap::Neutral)?;
         println!("{}: {:.2} s", camera.name, made.stats.seconds.camera);
     }

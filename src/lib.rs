@@ -77,6 +77,7 @@ mod html;
 pub mod image;
 #[doc(hidden)]
 pub mod layout;
+pub mod map_kind;
 mod memory;
 #[doc(hidden)]
 pub mod passes;

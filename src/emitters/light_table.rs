@@ -1,7 +1,7 @@
 //! All that shines in a scene, as one list for the device, and the tables by which passes choose from it.
 //!
-//! Lights without extent come first, then emissive triangles and spheres, material by material, then the environment. What
-//! a user calls one light is a group: a light without extent, all that shines by one material, the environment.
+//! Punctual lights come first, then emissive triangles and spheres, material by material, then the environment. What
+//! a user calls one light is a group: a punctual light, all that shines by one material, the environment.
 
 use std::{
     collections::BTreeMap,
@@ -18,7 +18,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     layout::{self, LightChoice},
-    scene::{LEAST_FALLOFF, LUMENS_PER_WATT, LightKind, Scene},
+    scene::{LUMENS_PER_WATT, LightKind, MIN_FALLOFF, Scene},
     settings::{LightSampling, LightSettings, LightUnit},
 };
 
@@ -38,7 +38,7 @@ pub struct LightTable {
     /// Sorted by group.
     pub lights: Vec<layout::Light>,
     pub groups: Vec<LightGroup>,
-    /// How many of the lights have no extent: the first ones.
+    /// How many of the lights are punctual: the first ones.
     pub punctual: usize,
     /// Power of each light, W, mean of the channels.
     powers: Vec<f64>,
@@ -166,7 +166,7 @@ impl LightTable {
             LightKind::Point => (layout::POINT_LIGHT, "point", Vec3::ZERO),
             LightKind::Spot { inner, outer } => {
                 let height = 1.0 - f64::from(outer).cos();
-                let width = (f64::from(inner).cos() - f64::from(outer).cos()).max(f64::from(LEAST_FALLOFF));
+                let width = (f64::from(inner).cos() - f64::from(outer).cos()).max(f64::from(MIN_FALLOFF));
                 (layout::SPOT_LIGHT, "spot", Vec3::new(height as f32, width as f32, 0.0))
             }
             LightKind::Directional => (layout::DIRECTIONAL_LIGHT, "directional", Vec3::ZERO),

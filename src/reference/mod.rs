@@ -1,4 +1,5 @@
-//! The same estimate in plain Rust, written to be read: what the device's kernels are measured against.
+//! Reference implementation of the radiance estimate on the CPU, written for readability. Tests and
+//! `caustica compare` hold the kernels against it.
 
 mod brute_force;
 mod estimate;
@@ -6,6 +7,6 @@ mod kd_map;
 mod kd_tree;
 
 pub use brute_force::{Found, brute_force};
-pub use estimate::{MAX_NORMAL_WEIGHT, estimate, usable};
+pub use estimate::{estimate, usable};
 pub use kd_map::{Estimate, KdMap, TIE, are_tied, fingerprint, mix};
 pub use kd_tree::KdTree;

@@ -9,8 +9,8 @@ use crate::{
         targets::{delta_targets, scene_target},
     },
     error::Result,
-    gpu::{Buffer, Gpu},
-    layout::Surroundings,
+    gpu::{Buffer, Gpu, Table},
+    layout::{EnvironmentInfo, SceneSphere},
     scene::Scene,
     settings::LightSettings,
 };
@@ -38,10 +38,11 @@ pub struct LightBuffers {
     pub warnings: Vec<String>,
     lights: Buffer,
     targets: Buffer,
-    surroundings: Buffer,
-    environment: Buffer,
-    environment_cells: Buffer,
-    environment_rows: Buffer,
+    scene_sphere: Buffer,
+    environment_info: Buffer,
+    environment: Table,
+    environment_cells: Table,
+    environment_rows: Table,
 }
 
 impl LightBuffers {
@@ -52,7 +53,8 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = delta_targets(scene);
-        let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, gpu.max_binding()));
+        let most = gpu.max_binding().min(gpu.max_table());
+        let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
         let probe = MediaProbe::new(scene, bvh);
         let buried = table.lights.iter_mut().map(|light| set_media(light, &probe)).filter(|fits| !fits).count();
@@ -62,9 +64,8 @@ impl LightBuffers {
         let spheres: Vec<[f32; 4]> =
             [&around].into_iter().chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
         let (sine, cosine) = map.as_ref().map_or(0.0, |map| map.rotation).sin_cos();
-        let surroundings = Surroundings {
-            center: around.center.to_array(),
-            radius: around.radius,
+        let scene_sphere = SceneSphere { center: around.center.to_array(), radius: around.radius };
+        let environment_info = EnvironmentInfo {
             columns: map.as_ref().map_or(0, |map| map.columns),
             rows: map.as_ref().map_or(0, |map| map.rows),
             rotation_cos: cosine,
@@ -82,21 +83,30 @@ impl LightBuffers {
             warnings: reduced(scene, map.as_ref()).into_iter().chain(too_deep("lights", buried)).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
             targets: gpu.storage_with("targets", &spheres)?,
-            surroundings: gpu.uniform("surroundings", &surroundings),
-            environment: gpu.storage_with("environment", pixels)?,
-            environment_cells: gpu.storage_with("environment cells", cells)?,
-            environment_rows: gpu.storage_with("environment rows", rows)?,
+            scene_sphere: gpu.uniform("scene sphere", &scene_sphere),
+            environment_info: gpu.uniform("environment info", &environment_info),
+            environment: Table::new(gpu, "environment", pixels)?,
+            environment_cells: Table::new(gpu, "environment cells", cells)?,
+            environment_rows: Table::new(gpu, "environment rows", rows)?,
             table,
         })
     }
 
     /// The variables that all passes share; a pass binds its `choices` besides.
     #[must_use]
-    pub fn bindings(&self) -> [(&'static str, &Buffer); 6] {
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 4] {
         [
             ("lights", &self.lights),
             ("targets", &self.targets),
-            ("surroundings", &self.surroundings),
+            ("scene_sphere", &self.scene_sphere),
+            ("environment_info", &self.environment_info),
+        ]
+    }
+
+    /// The tables that all passes share.
+    #[must_use]
+    pub fn tables(&self) -> [(&'static str, &Table); 3] {
+        [
             ("environment", &self.environment),
             ("environment_cells", &self.environment_cells),
             ("environment_rows", &self.environment_rows),
