@@ -12,6 +12,10 @@ pub const WORKGROUP_SIZE: u32 = 64;
 pub const BVH_INDEX_BITS: u32 = 28;
 /// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.
 pub const BVH_STACK: usize = 48;
+/// Bound of the weight by which an interpolated normal changes flux that grazes the geometric surface.
+pub const MAX_NORMAL_WEIGHT: f32 = 8.0;
+/// Rounding of a hit point, as a fraction of the largest coordinate that it is computed from: 2^-19.
+pub const OFFSET_SCALE: f32 = 1.907_348_6e-6;
 /// Media that a path can be inside of at once.
 pub const MEDIA_DEPTH: usize = 4;
 
@@ -81,16 +85,25 @@ pub struct Material {
     pub kind: u32,
     /// Radiance that its front side sends out, W/(m² sr).
     pub emission: [f32; 3],
-    /// Index of refraction, of glass and panes.
+    /// Index of refraction of panes.
     pub ior: f32,
     /// 1 if its back sends out as much.
     pub double_sided: u32,
+    /// Index of the [`Medium`] in the solid, of glass.
+    pub medium: u32,
     pub pad0: u32,
     pub pad1: u32,
-    pub pad2: u32,
 }
 
-/// Kinds of [`Light`]: those without extent,
+/// What fills a solid.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Medium {
+    /// Index of refraction.
+    pub ior: f32,
+}
+
+/// Kinds of [`Light`]: punctual ones,
 pub const POINT_LIGHT: u32 = 0;
 pub const SPOT_LIGHT: u32 = 1;
 pub const DIRECTIONAL_LIGHT: u32 = 2;
@@ -100,7 +113,7 @@ pub const SPHERE_LIGHT: u32 = 4;
 /// and what comes from all around.
 pub const ENVIRONMENT_LIGHT: u32 = 5;
 
-/// Anything that shines: a light without extent, an emissive triangle or sphere, or the environment. Its power is
+/// Anything that shines: a punctual light, an emissive triangle or sphere, or the environment. Its power is
 /// `emission · area · solid_angle`, but for directional lights and the environment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -123,7 +136,7 @@ pub struct Light {
     pub emission: [f32; 3],
     /// Area of a surface, m²; 1 without one.
     pub area: f32,
-    /// Media in which paths start on the front, and on the back of a surface: materials, each plus one, outermost first; 0 for
+    /// Media in which paths start on the front, and on the back of a surface: their indices, each plus one, outermost first; 0 for
     /// none. See [`crate::bvh::MediaProbe`].
     pub media: [u32; MEDIA_DEPTH],
     pub back_media: [u32; MEDIA_DEPTH],
@@ -139,13 +152,19 @@ pub struct LightChoice {
     pub probability: f32,
 }
 
-/// What lies around the scene.
+/// Sphere around all geometry.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Surroundings {
-    /// Sphere around all geometry, metres.
+pub struct SceneSphere {
+    /// Metres.
     pub center: [f32; 3],
     pub radius: f32,
+}
+
+/// Size and rotation of the environment map.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct EnvironmentInfo {
     /// Pixels of the environment map; 0 and 0 without one.
     pub columns: u32,
     pub rows: u32,
@@ -159,8 +178,8 @@ pub struct Surroundings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Path {
     pub origin: [f32; 3],
-    /// What the kernel that follows the path remembers of it, see `bounce_photons` and `trace_camera`.
-    pub flags: u32,
+    /// What is remembered of the path, by accessors of its kind in `shaders/lib/transport/path.wesl`.
+    pub history: u32,
     pub direction: [f32; 3],
     /// Surfaces met so far.
     pub bounces: u32,
@@ -168,7 +187,7 @@ pub struct Path {
     pub beta: [f32; 3],
     /// Depth of the stack of media.
     pub media_count: u32,
-    /// Materials of the media around the path, outermost first.
+    /// Indices of the media around the path, outermost first.
     pub media: [u32; MEDIA_DEPTH],
 }
 
@@ -202,15 +221,15 @@ pub struct VisiblePoint {
     /// Geometric normal, unit, on the viewer's side.
     pub ng: [f32; 3],
     /// Media around the point as in [`Light::media`], 16 bits each: the two outermost, and below the others. 0 and 0 for none, and
-    /// where one of them is not among the first 65,535 materials.
+    /// where one of them is not among the first 65,535.
     pub media_outer: u32,
     /// Interpolated normal, unit, on the viewer's side of the geometric one.
     pub ns: [f32; 3],
     pub media_inner: u32,
 }
 
-/// What happens to a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^19 paths of at most 4095 bounces, so that
-/// what is counted once a bounce stays below 2^31; the host adds batches up in 64 bits.
+/// What happens to a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^18 paths of at most 4095 bounces, so that
+/// what is counted once a bounce stays below 2^30; the host adds batches up in 64 bits.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Counters {
@@ -304,13 +323,30 @@ pub const AIM: u32 = 16;
 /// before belongs to the global map.
 pub const CAUSTICS_APART: u32 = 32;
 
-/// Photon paths have their group of lights in the bits of [`Path::flags`] from this one on.
-pub const GROUP_SHIFT: u32 = 2;
 /// Targets that caustic paths are aimed at, at most.
 pub const MAX_TARGETS: u32 = 32;
 
-/// Set in the key of a staged photon that belongs to the caustic map.
-pub const CAUSTIC_BIT: u32 = 0x8000_0000;
+/// Kinds of photon maps, and how many there are.
+pub const GLOBAL_MAP: u32 = 0;
+pub const CAUSTIC_MAP: u32 = 1;
+pub const MAP_KINDS: u32 = 2;
+
+/// Key of a staged photon: its path in the batch, its place among the path's photons of its map, and the kind of the map,
+/// for which two bits are left.
+pub const PATH_MASK: u32 = 0x3_ffff;
+pub const PLACE_SHIFT: u32 = 18;
+pub const PLACE_MASK: u32 = 0xfff;
+pub const KIND_SHIFT: u32 = 30;
+
+/// The photon maps of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum MapKind {
+    /// Light that a diffuse surface scattered, or that comes straight from a light.
+    Global = GLOBAL_MAP,
+    /// Light that came through mirrors or glass.
+    Caustic = CAUSTIC_MAP,
+}
 
 /// What `store_photons` needs to know; see there.
 #[repr(C)]
@@ -319,8 +355,8 @@ pub struct Store {
     pub staged: u32,
     pub first_photon: u32,
     pub photons: u32,
-    /// [`CAUSTIC_BIT`] for the caustic map, else 0.
-    pub map_bit: u32,
+    /// The map, a [`MapKind`].
+    pub kind: u32,
 }
 
 /// Where the numbers for sampling come from; see `shaders/lib/core/sampler.wesl`.
@@ -394,7 +430,7 @@ pub struct TilePixel {
     pub non_finite: u32,
 }
 
-/// Which light `light_directly` takes; one without extent.
+/// Which punctual light `light_directly` takes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DirectLight {

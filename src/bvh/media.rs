@@ -11,13 +11,13 @@ use glam::{DVec2, DVec3};
 use super::{Bvh, BvhChild, FILLER};
 use crate::{
     layout::{MEDIA_DEPTH, Primitive, SPHERE_BIT},
-    scene::{Bounds, Scene, Surface},
+    scene::{Bounds, MediaTable, Scene},
 };
 
 /// By how much of their coordinates boxes are widened: corners in them are rounded.
 const BOX_SLACK: f64 = 1e-6;
 
-/// A stack of media as the device takes it: materials, each plus one, outermost first; 0 for none.
+/// A stack of media as the device takes it: indices of media, each plus one, outermost first; 0 for none.
 pub type Media = [u32; MEDIA_DEPTH];
 
 /// Finds the media around points of a scene.
@@ -25,9 +25,8 @@ pub type Media = [u32; MEDIA_DEPTH];
 pub struct MediaProbe<'a> {
     scene: &'a Scene,
     bvh: &'a Bvh,
-    /// Whether a material is solid glass.
-    is_glass: Vec<bool>,
-    /// Box around all solid glass, metres.
+    media: MediaTable,
+    /// Box around all solids that have a medium, metres.
     bounds: Bounds,
 }
 
@@ -38,22 +37,22 @@ struct Crossing {
     height: f64,
     /// The outside lies further along the axis.
     outside_ahead: bool,
-    material: u32,
+    medium: u32,
 }
 
 impl<'a> MediaProbe<'a> {
     /// For points of `scene`, whose tree is `bvh`.
     #[must_use]
     pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
-        let is_glass: Vec<bool> = scene.materials.iter().map(|m| matches!(m.surface, Surface::Glass { .. })).collect();
-        let is_such = |material: u32| is_glass[material as usize];
+        let media = MediaTable::new(&scene.materials);
+        let is_such = |material: u32| media.of(material).is_some();
         let triangles = scene.triangles.iter().filter(|t| is_such(t.material)).map(Bounds::from);
         let spheres = scene.spheres.iter().filter(|s| is_such(s.material)).map(Bounds::from);
         let bounds = triangles.chain(spheres).fold(Bounds::EMPTY, Bounds::union);
-        Self { scene, bvh, is_glass, bounds }
+        Self { scene, bvh, media, bounds }
     }
 
-    /// Materials of the media around a point, metres, outermost first.
+    /// Indices of the media around a point, metres, outermost first.
     #[must_use]
     pub fn at(&self, point: DVec3) -> Vec<u32> {
         let (min, max) = (self.bounds.min.as_dvec3(), self.bounds.max.as_dvec3());
@@ -63,7 +62,7 @@ impl<'a> MediaProbe<'a> {
         let found: Vec<Vec<u32>> = (0..3)
             .flat_map(|axis| {
                 let mut crossings = self.crossings(point, axis);
-                crossings.sort_by(|a, b| b.height.abs().total_cmp(&a.height.abs()).then(a.material.cmp(&b.material)));
+                crossings.sort_by(|a, b| b.height.abs().total_cmp(&a.height.abs()).then(a.medium.cmp(&b.medium)));
                 [stack_along(&crossings, true), stack_along(&crossings, false)]
             })
             .collect();
@@ -72,7 +71,7 @@ impl<'a> MediaProbe<'a> {
         found.iter().rev().max_by_key(|stack| votes(stack)).cloned().unwrap_or_default()
     }
 
-    /// Where the line through `point` along an axis crosses solids of glass.
+    /// Where the line through `point` along an axis crosses solids that have a medium.
     fn crossings(&self, point: DVec3, axis: usize) -> Vec<Crossing> {
         let mut found = Vec::new();
         let mut waiting = vec![0];
@@ -93,23 +92,23 @@ impl<'a> MediaProbe<'a> {
     }
 
     fn cross(&self, primitive: &Primitive, point: DVec3, axis: usize, found: &mut Vec<Crossing>) {
-        let material = primitive.material & !SPHERE_BIT;
-        if primitive.id == FILLER || !self.is_glass[material as usize] {
+        if primitive.id == FILLER {
             return;
         }
+        let Some(medium) = self.media.of(primitive.material & !SPHERE_BIT) else { return };
         let id = primitive.id as usize;
         if let Some(triangle) = self.scene.triangles.get(id) {
             let corners = triangle.positions.map(|corner| split(corner.as_dvec3() - point, axis));
             let crossed = cross_triangle(corners);
-            found.extend(crossed.map(|(height, outside_ahead)| Crossing { height, outside_ahead, material }));
+            found.extend(crossed.map(|(height, outside_ahead)| Crossing { height, outside_ahead, medium }));
         } else {
             let sphere = &self.scene.spheres[id - self.scene.triangles.len()];
             let (aside, middle) = split(sphere.center.as_dvec3() - point, axis);
             let half_squared = f64::from(sphere.radius).powi(2) - aside.length_squared();
             if half_squared > 0.0 {
                 let half = half_squared.sqrt();
-                found.push(Crossing { height: middle - half, outside_ahead: false, material });
-                found.push(Crossing { height: middle + half, outside_ahead: true, material });
+                found.push(Crossing { height: middle - half, outside_ahead: false, medium });
+                found.push(Crossing { height: middle + half, outside_ahead: true, medium });
             }
         }
     }
@@ -119,7 +118,7 @@ impl<'a> MediaProbe<'a> {
 #[must_use]
 pub fn packed(stack: &[u32]) -> (Media, bool) {
     let mut media = Media::default();
-    media.iter_mut().zip(stack).for_each(|(slot, material)| *slot = material + 1);
+    media.iter_mut().zip(stack).for_each(|(slot, medium)| *slot = medium + 1);
     (media, stack.len() <= MEDIA_DEPTH)
 }
 
@@ -139,8 +138,8 @@ fn stack_along(crossings: &[Crossing], from_ahead: bool) -> Vec<u32> {
     let mut stack = Vec::new();
     for crossing in crossings.iter().filter(|c| if from_ahead { c.height > 0.0 } else { c.height < 0.0 }) {
         if crossing.outside_ahead == from_ahead {
-            stack.push(crossing.material);
-        } else if let Some(innermost) = stack.iter().rposition(|medium| *medium == crossing.material) {
+            stack.push(crossing.medium);
+        } else if let Some(innermost) = stack.iter().rposition(|medium| *medium == crossing.medium) {
             stack.remove(innermost);
         }
     }
@@ -189,7 +188,7 @@ mod tests {
     use glam::{Vec3, dvec3, vec3};
 
     use super::*;
-    use crate::scene::{Material, Sphere, Triangle};
+    use crate::scene::{Material, Sphere, Surface, Triangle};
 
     fn scene(surfaces: usize) -> Scene {
         let surface = Surface::Glass { ior: 1.5, tint: Vec3::ONE };

@@ -4,11 +4,8 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     bvh::{MediaProbe, packed},
-    layout::{self, Light},
+    layout::{self, Light, OFFSET_SCALE},
 };
-
-/// Off a surface, as a fraction of its largest coordinate: `OFFSET_SCALE` of `shaders/lib/transport/surface.wesl`.
-const OFFSET_SCALE: f64 = 1.907_348_6e-6;
 
 /// Notes the media around a light; false if there are more than a path keeps, of which the outermost count. One place of a surface speaks for all of it, just off each side: the middle of a triangle,
 /// a point of a sphere.
@@ -27,7 +24,7 @@ pub fn set_media(light: &mut Light, probe: &MediaProbe) -> bool {
         // What comes from infinitely far away starts outside of all.
         _ => return true,
     };
-    let at = |side: f64| packed(&probe.at(place + side * reach * OFFSET_SCALE * normal));
+    let at = |side: f64| packed(&probe.at(place + side * reach * f64::from(OFFSET_SCALE) * normal));
     let ((front, front_fits), (back, back_fits)) = (at(1.0), at(-1.0));
     (light.media, light.back_media) = (front, back);
     front_fits && back_fits

@@ -1,7 +1,7 @@
 //! All that shines in a scene, as one list for the device, and the tables by which passes choose from it.
 //!
-//! Lights without extent come first, then emissive triangles and spheres, material by material, then the environment. What
-//! a user calls one light is a group: a light without extent, all that shines by one material, the environment.
+//! Punctual lights come first, then emissive triangles and spheres, material by material, then the environment. What
+//! a user calls one light is a group: a punctual light, all that shines by one material, the environment.
 
 use std::{
     collections::BTreeMap,
@@ -38,7 +38,7 @@ pub struct LightTable {
     /// Sorted by group.
     pub lights: Vec<layout::Light>,
     pub groups: Vec<LightGroup>,
-    /// How many of the lights have no extent: the first ones.
+    /// How many of the lights are punctual: the first ones.
     pub punctual: usize,
     /// Power of each light, W, mean of the channels.
     powers: Vec<f64>,

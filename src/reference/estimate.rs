@@ -5,16 +5,18 @@ use glam::Vec3;
 use super::Found;
 use crate::{
     density::Density,
-    layout::{PhotonFlux, PhotonPlace, VisiblePoint, from_octahedral},
+    layout::{MAX_NORMAL_WEIGHT, PhotonFlux, PhotonPlace, VisiblePoint, from_octahedral},
 };
-
-/// Bound of cos(ns, wi) / cos(ng, wi): what the interpolated normal may add to a grazing photon.
-pub const MAX_NORMAL_WEIGHT: f32 = 8.0;
 
 /// The photon came from the viewer's side of the surface.
 #[must_use]
 pub fn usable(photon: &PhotonPlace, point: &VisiblePoint) -> bool {
     from_octahedral(photon.wi).dot(Vec3::from(point.ng)) > 0.0
+}
+
+/// Weight of light from `wi` in the diffuse lobe of `point`: twin of `diffuse_flux_weight` in `shaders/lib/transport/lambert.wesl`.
+fn normal_weight(point: &VisiblePoint, wi: Vec3) -> f32 {
+    (wi.dot(point.ns.into()) / wi.dot(point.ng.into())).clamp(0.0, MAX_NORMAL_WEIGHT)
 }
 
 /// Radiance that leaves `point` towards the viewer: L = beta f_r / (mean π r²) Σ K(d/r) w_n Φ / paths, where
@@ -36,10 +38,9 @@ pub fn estimate(
     for &i in &found.photons {
         let (place, flux) = (&places[i as usize], &fluxes[i as usize].flux);
         let wi = from_octahedral(place.wi);
-        let ratio = wi.dot(point.ns.into()) / wi.dot(point.ng.into());
         let d = (Vec3::from(point.position).as_dvec3() - Vec3::from(place.position).as_dvec3()).length();
-        let normal_weight = if side_test { ratio.clamp(0.0, MAX_NORMAL_WEIGHT) } else { 1.0 };
-        let weight = density.weight(d / r2.sqrt()) * f64::from(normal_weight);
+        let from_side = if side_test { normal_weight(point, wi) } else { 1.0 };
+        let weight = density.weight(d / r2.sqrt()) * f64::from(from_side);
         for c in 0..3 {
             sum[c] += weight * f64::from(flux[c]);
         }

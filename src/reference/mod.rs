@@ -6,6 +6,6 @@ mod kd_map;
 mod kd_tree;
 
 pub use brute_force::{Found, brute_force};
-pub use estimate::{MAX_NORMAL_WEIGHT, estimate, usable};
+pub use estimate::{estimate, usable};
 pub use kd_map::{Estimate, KdMap, TIE, are_tied, fingerprint, mix};
 pub use kd_tree::KdTree;

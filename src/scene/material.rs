@@ -23,19 +23,54 @@ impl Surface {
     pub fn is_delta(&self) -> bool {
         !matches!(self, Surface::Diffuse { .. })
     }
+
+    /// Albedo of the diffuse lobe, or tint of the specular one that has a colour.
+    #[must_use]
+    pub fn color(&self) -> Vec3 {
+        match *self {
+            Surface::Diffuse { albedo } => albedo,
+            Surface::Mirror { tint } | Surface::Glass { tint, .. } | Surface::Pane { tint, .. } => tint,
+        }
+    }
+
+    /// Index of refraction of what lets light through.
+    #[must_use]
+    pub fn ior(&self) -> Option<f32> {
+        match *self {
+            Surface::Glass { ior, .. } | Surface::Pane { ior, .. } => Some(ior),
+            Surface::Diffuse { .. } | Surface::Mirror { .. } => None,
+        }
+    }
+
+    /// What fills the solid that it bounds.
+    #[must_use]
+    pub fn medium(&self) -> Option<Medium> {
+        match *self {
+            Surface::Glass { ior, .. } => Some(Medium { ior }),
+            Surface::Diffuse { .. } | Surface::Mirror { .. } | Surface::Pane { .. } => None,
+        }
+    }
 }
 
 impl fmt::Display for Surface {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (what, ior, color) = match *self {
-            Surface::Diffuse { albedo } => ("diffuse", None, albedo),
-            Surface::Mirror { tint } => ("mirror", None, tint),
-            Surface::Glass { ior, tint } => ("solid glass", Some(ior), tint),
-            Surface::Pane { ior, tint } => ("thin pane", Some(ior), tint),
+        let what = match self {
+            Surface::Diffuse { .. } => "diffuse",
+            Surface::Mirror { .. } => "mirror",
+            Surface::Glass { .. } => "solid glass",
+            Surface::Pane { .. } => "thin pane",
         };
+        let color = self.color();
         write!(f, "{what} ({} {} {})", color.x, color.y, color.z)?;
-        ior.map_or(Ok(()), |ior| write!(f, ", ior {ior}"))
+        self.ior().map_or(Ok(()), |ior| write!(f, ", ior {ior}"))
     }
+}
+
+/// What fills a solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium {
+    /// Index of refraction.
+    pub ior: f32,
 }
 
 /// A named surface.
@@ -48,4 +83,56 @@ pub struct Material {
     pub emission: Vec3,
     /// Its back sends out as much.
     pub double_sided: bool,
+}
+
+/// The media of a scene. Each material that bounds a solid has a medium of its own, so that a path knows which solid it leaves.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MediaTable {
+    pub media: Vec<Medium>,
+    /// Index of the medium of each material.
+    of_materials: Vec<Option<u32>>,
+}
+
+impl MediaTable {
+    /// The media that `materials` bound, in their order.
+    #[must_use]
+    pub fn new(materials: &[Material]) -> Self {
+        let mut table = Self::default();
+        for material in materials {
+            let medium = material.surface.medium();
+            table.of_materials.push(medium.map(|_| table.media.len() as u32));
+            table.media.extend(medium);
+        }
+        table
+    }
+
+    /// Index of the medium that a material bounds.
+    #[must_use]
+    pub fn of(&self, material: u32) -> Option<u32> {
+        self.of_materials[material as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_solids_have_media_and_each_its_own() {
+        let surfaces = [
+            Surface::Pane { ior: 1.3, tint: Vec3::ONE },
+            Surface::Glass { ior: 1.5, tint: Vec3::ONE },
+            Surface::Diffuse { albedo: Vec3::ONE },
+            Surface::Glass { ior: 1.5, tint: Vec3::ZERO },
+        ];
+        let materials = surfaces.map(|surface| Material {
+            name: String::new(),
+            surface,
+            emission: Vec3::ZERO,
+            double_sided: false,
+        });
+        let table = MediaTable::new(&materials);
+        assert_eq!(table.media, [Medium { ior: 1.5 }; 2]);
+        assert_eq!([0, 1, 2, 3].map(|material| table.of(material)), [None, Some(0), None, Some(1)]);
+    }
 }

@@ -27,7 +27,7 @@ pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};
 pub use environment::Environment;
 pub use light::{LEAST_FALLOFF, LUMENS_PER_WATT, Light, LightKind};
 pub use load_options::LoadOptions;
-pub use material::{Material, Surface};
+pub use material::{Material, MediaTable, Medium, Surface};
 pub use shape::{Bounds, Sphere, Triangle};
 
 /// A scene ready to be traced.

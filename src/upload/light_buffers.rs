@@ -10,7 +10,7 @@ use crate::{
     },
     error::Result,
     gpu::{Buffer, Gpu},
-    layout::Surroundings,
+    layout::{EnvironmentInfo, SceneSphere},
     scene::Scene,
     settings::LightSettings,
 };
@@ -38,7 +38,8 @@ pub struct LightBuffers {
     pub warnings: Vec<String>,
     lights: Buffer,
     targets: Buffer,
-    surroundings: Buffer,
+    scene_sphere: Buffer,
+    environment_info: Buffer,
     environment: Buffer,
     environment_cells: Buffer,
     environment_rows: Buffer,
@@ -62,9 +63,8 @@ impl LightBuffers {
         let spheres: Vec<[f32; 4]> =
             [&around].into_iter().chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
         let (sine, cosine) = map.as_ref().map_or(0.0, |map| map.rotation).sin_cos();
-        let surroundings = Surroundings {
-            center: around.center.to_array(),
-            radius: around.radius,
+        let scene_sphere = SceneSphere { center: around.center.to_array(), radius: around.radius };
+        let environment_info = EnvironmentInfo {
             columns: map.as_ref().map_or(0, |map| map.columns),
             rows: map.as_ref().map_or(0, |map| map.rows),
             rotation_cos: cosine,
@@ -82,7 +82,8 @@ impl LightBuffers {
             warnings: reduced(scene, map.as_ref()).into_iter().chain(too_deep("lights", buried)).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
             targets: gpu.storage_with("targets", &spheres)?,
-            surroundings: gpu.uniform("surroundings", &surroundings),
+            scene_sphere: gpu.uniform("scene sphere", &scene_sphere),
+            environment_info: gpu.uniform("environment info", &environment_info),
             environment: gpu.storage_with("environment", pixels)?,
             environment_cells: gpu.storage_with("environment cells", cells)?,
             environment_rows: gpu.storage_with("environment rows", rows)?,
@@ -92,11 +93,12 @@ impl LightBuffers {
 
     /// The variables that all passes share; a pass binds its `choices` besides.
     #[must_use]
-    pub fn bindings(&self) -> [(&'static str, &Buffer); 6] {
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 7] {
         [
             ("lights", &self.lights),
             ("targets", &self.targets),
-            ("surroundings", &self.surroundings),
+            ("scene_sphere", &self.scene_sphere),
+            ("environment_info", &self.environment_info),
             ("environment", &self.environment),
             ("environment_cells", &self.environment_cells),
             ("environment_rows", &self.environment_rows),

@@ -14,7 +14,7 @@ use crate::{
         shaders::{Shader, shader},
     },
     layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
-    scene::{Material, Scene, Surface},
+    scene::{Material, MediaTable, Scene, Surface},
     settings::{LightUnit, Sampler, Settings},
 };
 
@@ -25,6 +25,7 @@ pub struct SceneBuffers {
     primitives: Windows,
     normals: Buffer,
     materials: Buffer,
+    media: Buffer,
     has_spheres: bool,
     /// Children that a traversal can postpone.
     stack: usize,
@@ -49,14 +50,18 @@ impl SceneBuffers {
     /// # Errors
     /// [`crate::Error::Limit`] if the primitives exceed two bindings, or the nodes or normals one; as [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &Settings) -> Result<Self> {
-        let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.lights.unit)).collect();
+        let media = MediaTable::new(&scene.materials);
+        let row = |(m, i)| material(m, media.of(i), settings.lights.unit);
+        let materials: Vec<_> = scene.materials.iter().zip(0..).map(row).collect();
+        let media: Vec<_> = media.media.iter().map(|medium| layout::Medium { ior: medium.ior }).collect();
         let lights = LightBuffers::new(gpu, scene, bvh, &settings.lights)?;
         Ok(Self {
             nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
             primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &lights.table))?,
             normals: gpu.storage_with("normals", &bvh.normals)?,
             materials: gpu.storage_with("materials", &materials)?,
-            has_dielectrics: materials.iter().any(|m| m.kind == layout::GLASS || m.kind == layout::PANE),
+            media: gpu.storage_with("media", &media)?,
+            has_dielectrics: scene.materials.iter().any(|m| m.surface.ior().is_some()),
             has_spheres: !scene.spheres.is_empty(),
             // In steps, so that few variants of a kernel are compiled.
             stack: bvh.most_postponed().max(1).next_multiple_of(16),
@@ -109,6 +114,7 @@ impl SceneBuffers {
             ("primitives_high", &self.primitives.high),
             ("normals", &self.normals),
             ("materials", &self.materials),
+            ("media_table", &self.media),
         ];
         all.extend(self.lights.bindings());
         all.extend_from_slice(others);
@@ -143,14 +149,21 @@ fn marked<'a>(primitives: &'a [Primitive], scene: &Scene, lights: &LightTable) -
     primitives.iter().map(mark).collect()
 }
 
-fn material(material: &Material, unit: LightUnit) -> layout::Material {
-    let (kind, color, ior) = match material.surface {
-        Surface::Diffuse { albedo } => (layout::DIFFUSE, albedo, 1.0),
-        Surface::Mirror { tint } => (layout::MIRROR, tint, 1.0),
-        Surface::Glass { ior, tint } => (layout::GLASS, tint, ior),
-        Surface::Pane { ior, tint } => (layout::PANE, tint, ior),
-    };
-    let emission = emission_in(material.emission, unit).to_array();
-    let double_sided = u32::from(material.double_sided);
-    layout::Material { kind, color: color.to_array(), emission, ior, double_sided, ..Default::default() }
+/// Row of the material table; `medium` is the one that the material bounds.
+fn material(material: &Material, medium: Option<u32>, unit: LightUnit) -> layout::Material {
+    let surface = &material.surface;
+    layout::Material {
+        color: surface.color().to_array(),
+        kind: match surface {
+            Surface::Diffuse { .. } => layout::DIFFUSE,
+            Surface::Mirror { .. } => layout::MIRROR,
+            Surface::Glass { .. } => layout::GLASS,
+            Surface::Pane { .. } => layout::PANE,
+        },
+        emission: emission_in(material.emission, unit).to_array(),
+        ior: surface.ior().unwrap_or(1.0),
+        double_sided: u32::from(material.double_sided),
+        medium: medium.unwrap_or(0),
+        ..Default::default()
+    }
 }

@@ -42,16 +42,18 @@ fn twins() -> Vec<Twin> {
         BvhNode { grid, low, high }
         Primitive { v0, material, e1, id, e2, emitter }
         Normals { n0, n1, n2, flat_shaded }
-        Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }
+        Material { color, kind, emission, ior, double_sided, medium, pad0, pad1 }
+        Medium { ior }
         Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
         LightChoice { cdf, probability }
-        Surroundings { center, radius, columns, rows, rotation_cos, rotation_sin }
-        Path { origin, flags, direction, bounces, beta, media_count, media }
+        SceneSphere { center, radius }
+        EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
+        Path { origin, history, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
         VisiblePoint { position, valid, weight, offset, ng, media_outer, ns, media_inner }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
-        Store { staged, first_photon, photons, map_bit }
+        Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media }
         FinalStep { ray, rays, points, pad }
         FirstHit { normal, depth, albedo, alpha }
@@ -74,14 +76,16 @@ fn twins() -> Vec<Twin> {
 }
 
 macro_rules! constants {
-    ($($name:ident),+ $(,)?) => { [$((stringify!($name), layout::$name as u64)),+] };
+    ($($name:ident),+ $(,)?) => { [$((stringify!($name), layout::$name as f64)),+] };
 }
 
-fn constants() -> Vec<(&'static str, u64)> {
+fn constants() -> Vec<(&'static str, f64)> {
     constants![
         WORKGROUP_SIZE,
         BVH_INDEX_BITS,
         BVH_STACK,
+        MAX_NORMAL_WEIGHT,
+        OFFSET_SCALE,
         MEDIA_DEPTH,
         MARGIN_CELL,
         MARGIN_SAMPLES,
@@ -105,9 +109,14 @@ fn constants() -> Vec<(&'static str, u64)> {
         FOLLOW_DIFFUSE,
         AIM,
         CAUSTICS_APART,
-        GROUP_SHIFT,
         MAX_TARGETS,
-        CAUSTIC_BIT,
+        GLOBAL_MAP,
+        CAUSTIC_MAP,
+        MAP_KINDS,
+        PATH_MASK,
+        PLACE_SHIFT,
+        PLACE_MASK,
+        KIND_SHIFT,
         SAMPLER_RANDOM,
         SAMPLER_SOBOL,
         CELL_PHOTONS,
@@ -220,12 +229,13 @@ fn rust_type(module: &Module, handle: Handle<Type>) -> String {
     }
 }
 
-/// Constants and overrides of the module with their whole-number values; `None` where the value is none.
-fn named_values(module: &Module) -> Vec<(String, Option<u64>)> {
+/// Constants and overrides of the module with their values; `None` where the value is not a literal number.
+fn named_values(module: &Module) -> Vec<(String, Option<f64>)> {
     let number = |init: Handle<Expression>| match module.global_expressions[init] {
-        Expression::Literal(Literal::U32(n)) => Some(u64::from(n)),
-        Expression::Literal(Literal::I32(n)) => u64::try_from(n).ok(),
-        Expression::Literal(Literal::AbstractInt(n)) => u64::try_from(n).ok(),
+        Expression::Literal(Literal::U32(n)) => Some(f64::from(n)),
+        Expression::Literal(Literal::I32(n)) => Some(f64::from(n)),
+        Expression::Literal(Literal::F32(x)) => Some(f64::from(x)),
+        Expression::Literal(Literal::AbstractInt(n)) => Some(n as f64),
         _ => None,
     };
     let constants = module.constants.iter().map(|(_, c)| (c.name.clone(), number(c.init)));
@@ -282,12 +292,12 @@ const GOOD: &str = "
     const SPHERE_BIT = 1u << 31u;
     struct Photon { position: vec3f, wi: u32, flux: vec3f, normal: u32 }
     struct Path {
-        origin: vec3f, flags: u32, direction: vec3f, bounces: u32, beta: vec3f, media_count: u32, media: array<u32, 4>,
+        origin: vec3f, history: u32, direction: vec3f, bounces: u32, beta: vec3f, media_count: u32, media: array<u32, 4>,
     }
     @group(1) @binding(0) var<storage, read> photons: array<Photon>;
     @group(2) @binding(0) var<storage, read_write> paths: array<Path>;
     @compute @workgroup_size(WORKGROUP_SIZE)
-    fn probe() { paths[0].flags = photons[0].normal | SPHERE_BIT; }
+    fn probe() { paths[0].history = photons[0].normal | SPHERE_BIT; }
 ";
 
 #[test]
@@ -307,12 +317,11 @@ fn each_kind_of_disagreement_is_reported() {
         ("SPHERE_BIT = 1u << 31u", "SPHERE_BIT = 1u << 30u", "SPHERE_BIT is"),
         ("= 64u", "= 32u", "WORKGROUP_SIZE is"),
         ("@workgroup_size(WORKGROUP_SIZE)", "@workgroup_size(8, 8)", "workgroups of"),
-        ("media: array<u32, 4>", "media: array<Medium, 4>", "Medium lies in a buffer"),
+        ("media: array<u32, 4>", "media: array<Stranger, 4>", "Stranger lies in a buffer"),
         ("struct Photon", "@group(2) @binding(1) var<storage> s: array<SearchState>; struct Photon", "SearchState"),
     ] {
         assert!(GOOD.contains(from));
-        let bad =
-            format!("struct Medium {{ material: u32 }} struct SearchState {{ a: u32 }}\n{}", GOOD.replace(from, to));
+        let bad = format!("struct Stranger {{ a: u32 }} struct SearchState {{ a: u32 }}\n{}", GOOD.replace(from, to));
         let found = disagreements(&bad);
         assert!(found.iter().any(|line| line.contains(said)), "{to}: {found:?}");
     }

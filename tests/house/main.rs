@@ -4,3 +4,4 @@ mod layers;
 mod layouts;
 mod readme;
 mod scenes;
+mod shader_names;

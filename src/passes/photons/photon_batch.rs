@@ -4,7 +4,7 @@ use super::raw_map::RawMap;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{self, Counters, Path, Photon, PhotonBatch, Store},
+    layout::{Counters, MAP_KINDS, MapKind, PLACE_MASK, Path, Photon, PhotonBatch, Store},
     settings::MAX_BOUNCES,
     upload::SceneBuffers,
 };
@@ -13,6 +13,8 @@ use crate::{
 const STAGED_PER_PATH: u64 = 2;
 /// Bounces handed to the device at once.
 const BOUNCES_PER_SUBMISSION: u32 = 32;
+
+const _: () = assert!(MAX_BOUNCES <= PLACE_MASK, "a key has room for the photons of a path");
 
 /// Kernels of the photon pass.
 #[derive(Debug)]
@@ -41,7 +43,7 @@ pub(crate) struct BatchBuffers {
 /// What one batch did.
 pub(crate) struct BatchResult {
     pub counters: Counters,
-    /// Photons per path: for the global map in the low half, for the caustic map in the high half.
+    /// Photons of each path, for each [`MapKind`].
     counts: Vec<u32>,
 }
 
@@ -96,7 +98,10 @@ impl PhotonKernels {
             gpu.submit(encoder);
             let counters: Counters = gpu.read(&buffers.counters, 0, 1)?[0];
             if counters.next == 0 || bounces >= batch.max_bounces {
-                return Ok(BatchResult { counters, counts: gpu.read(&buffers.counts, 0, u64::from(batch.paths))? });
+                return Ok(BatchResult {
+                    counters,
+                    counts: gpu.read(&buffers.counts, 0, u64::from(batch.paths * MAP_KINDS))?,
+                });
             }
             encoder = gpu.encoder();
         }
@@ -112,16 +117,15 @@ impl PhotonKernels {
         result: &BatchResult,
         first_path: u64,
     ) -> Result<()> {
-        let [global, caustic] = maps;
-        let low = global.map(|map| (map.place(result.counts.iter().map(|c| c & 0xffff), first_path), &*map, 0));
-        let high = caustic
-            .map(|map| (map.place(result.counts.iter().map(|c| c >> 16), first_path), &*map, layout::CAUSTIC_BIT));
-        for (places, map, map_bit) in [low, high].into_iter().flatten() {
+        for (map, kind) in maps.into_iter().zip([MapKind::Global, MapKind::Caustic]) {
+            let Some(map) = map else { continue };
+            let counts = result.counts.iter().skip(kind as usize).step_by(MAP_KINDS as usize);
+            let (places, map) = (map.place(counts.copied(), first_path), &*map);
             gpu.write(&buffers.places, 0, &places);
             let mut encoder = gpu.encoder();
             for (window, first_photon, photons) in map.photons.parts(map.stored as u32) {
                 let staged = result.counters.staged;
-                let store = Store { staged, first_photon, photons, map_bit };
+                let store = Store { staged, first_photon, photons, kind: kind as u32 };
                 let uniform = gpu.uniform("store", &store);
                 let bindings = self.store.bind(
                     gpu,
@@ -154,7 +158,7 @@ impl BatchBuffers {
             dispatch_arguments: gpu.storage::<[u32; 3]>("photon dispatch arguments", 1)?,
             staged: gpu.storage::<Photon>("staged photons", staging_capacity)?,
             staged_keys: gpu.storage::<u32>("keys of staged photons", staging_capacity)?,
-            counts: gpu.storage::<u32>("photon counts", paths)?,
+            counts: gpu.storage::<u32>("photon counts", paths * u64::from(MAP_KINDS))?,
             places: gpu.storage::<u32>("photon places", paths)?,
             light_photons: gpu.storage::<u32>("photons of lights", groups as u64)?,
             staging_capacity,

@@ -17,9 +17,9 @@ use crate::{
     upload::{SceneBuffers, light_buffers::ChoiceBuffer},
 };
 
-/// Paths of one batch at least and at most: the device must be busy, and a staged photon knows its path by 19 bits.
+/// Paths of one batch at least and at most: the device must be busy, and a staged photon knows its path by its key.
 const MIN_BATCH: u64 = 1 << 16;
-const MAX_BATCH: u64 = 1 << 19;
+const MAX_BATCH: u64 = layout::PATH_MASK as u64 + 1;
 /// Paths over which the growth of a map is watched, at least; a map's capacity if that is more.
 const GROWTH_WINDOW: u64 = 1 << 17;
 /// Fixed-point unit of lost flux, as a fraction of a path's mean flux.
