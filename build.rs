@@ -1,6 +1,7 @@
-//! Composes the WGSL kernels from `shaders/*.wesl` (WESL imports), validates each with naga, and writes the shader
-//! table that `src/gpu/shaders.rs` includes: text, workgroup size and bindings by name. The probes in `shaders/probes`,
-//! kernels of tests and benchmarks alone, become a second table, which the library does not include.
+//! Composes the WGSL kernels from `shaders/*.wesl` (WESL imports), validates each with naga, and
+//! writes the shader table that `src/gpu/shaders.rs` includes: WGSL, overrides and bindings by
+//! name. The probes in `shaders/probes`, kernels of tests and benchmarks only, become a second
+//! table, which the library does not include.
 
 use std::{env, fmt::Write, fs, path::Path};
 
@@ -31,7 +32,7 @@ fn write_table(folder: &str, file: &str) {
     fs::write(Path::new(&out).join(file), table).expect("OUT_DIR can be written");
 }
 
-/// The kernel with everything it imports, names as written.
+/// Composes a kernel with all its imports; names are not mangled.
 fn compose(folder: &str, stem: &str) -> String {
     let mut compiler = wesl::Wesl::new("shaders");
     compiler.set_mangler(wesl::ManglerKind::None).use_sourcemap(true);
@@ -43,7 +44,7 @@ fn compose(folder: &str, stem: &str) -> String {
     }
 }
 
-/// One line of the shader table; stops the build where naga finds the kernel invalid.
+/// Formats one entry of the shader table. Stops the build if naga finds the kernel invalid.
 fn shader_entry(stem: &str, wgsl: &str) -> String {
     let module = naga::front::wgsl::parse_str(wgsl)
         .unwrap_or_else(|e| fail_at(stem, wgsl, e.location(wgsl), &e.emit_to_string(wgsl)));
@@ -62,6 +63,7 @@ fn shader_entry(stem: &str, wgsl: &str) -> String {
         }
         let kind = match var.space {
             naga::AddressSpace::Uniform => "Uniform",
+            naga::AddressSpace::Handle => "Table",
             naga::AddressSpace::Storage { access } if access.contains(naga::StorageAccess::STORE) => "ReadWrite",
             _ => "ReadOnly",
         };
@@ -73,20 +75,23 @@ fn shader_entry(stem: &str, wgsl: &str) -> String {
         )
         .expect("a String can be written");
     }
+    let workgroup_size: u32 = entry.workgroup_size.iter().product();
     let overrides: Vec<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
     format!(
-        "    Shader {{ stem: {stem:?}, wgsl: {wgsl:?}, overrides: &{overrides:?}, bindings: &[\n{bindings}    ] }},\n"
+        "    Shader {{ stem: {stem:?}, wgsl: {wgsl:?}, overrides: &{overrides:?}, bindings: &[\n{bindings}    ], \
+         workgroup_size: {workgroup_size} }},\n"
     )
 }
 
-/// Stops the build with naga's message and the file and line that it stems from.
+/// Stops the build with the message of naga and the source file and line of its location.
 fn fail_at(stem: &str, wgsl: &str, location: Option<naga::SourceLocation>, message: &str) -> ! {
     let place = location.and_then(|l| source_line(wgsl, l.offset as usize)).unwrap_or_default();
     fail(&format!("{place}in kernel shaders/{stem}.wesl: {message}"))
 }
 
-/// Finds `file:line` of a place in the composed text. WESL prints declarations anew but keeps their words, so the
-/// n-th word of a declaration in the composed text is the n-th word of the declaration of that name in its file.
+/// Finds `file:line` in the sources of a location in the composed WGSL. WESL reformats declarations
+/// but keeps their words, so the n-th word of a declaration in the composed text is the n-th word
+/// of the declaration of that name in its file.
 fn source_line(wgsl: &str, offset: usize) -> Option<String> {
     let words = |text: &str| -> Vec<(usize, String)> {
         let bare: String = blank_comments(text);
@@ -127,7 +132,7 @@ fn source_line(wgsl: &str, offset: usize) -> Option<String> {
     None
 }
 
-/// The text with line comments turned into spaces, so that offsets stay.
+/// Replaces line comments by spaces, which preserves offsets.
 fn blank_comments(text: &str) -> String {
     text.split_inclusive('\n')
         .map(|line| match line.find("//") {

@@ -1,17 +1,19 @@
-//! Seconds that the driver takes to compile each kernel, without its disk cache.
+//! Benchmark: compile time of each kernel in the driver, without its disk cache.
 //!
-//! `cargo bench --bench compile`. Each kernel runs one workgroup over zeroed buffers, twice; the first run compiles.
+//! `cargo bench --bench compile`. Each kernel runs one workgroup over zeroed buffers, twice; the
+//! first run includes compilation.
 
 use std::{process::Command, time::Instant};
 
 use caustica::gpu::{
-    Buffer, Gpu, Kernel,
+    Buffer, Gpu, Kernel, Table,
     shaders::{BindingKind, SHADERS},
 };
 
-/// Set in the process that measures: Mesa reads its environment when it is loaded.
+/// Environment variable of the measuring process. Mesa reads it when it is loaded, so that the
+/// benchmark starts itself again with it.
 const MEASURING: (&str, &str) = ("MESA_SHADER_CACHE_DISABLE", "true");
-/// Bytes of each zeroed buffer.
+/// Size of each zeroed buffer, bytes.
 const BYTES: u64 = 1 << 16;
 
 fn main() {
@@ -27,16 +29,19 @@ fn main() {
         let buffers: Vec<(&str, Buffer)> = shader
             .bindings
             .iter()
+            .filter(|b| b.kind != BindingKind::Table)
             .map(|b| match b.kind {
                 BindingKind::Uniform => (b.name, gpu.uniform("zeros", &[0_u32; 256])),
                 _ => (b.name, gpu.storage::<u8>("zeros", BYTES).expect("a small buffer fits")),
             })
             .collect();
         let named: Vec<_> = buffers.iter().map(|(name, buffer)| (*name, buffer)).collect();
+        let zeros = Table::new(&gpu, "zeros", &[[0_u32; 4]; 64]).expect("a small table fits");
+        let tables: Vec<_> = shader.bindings.iter().map(|b| (b.name, &zeros)).collect();
         gpu.wait().expect("the device works");
         let start = Instant::now();
-        let kernel = Kernel::new(&gpu, shader.stem, &[]);
-        // One that does not ask for its number is a single invocation.
+        let kernel = Kernel::new(&gpu, shader.stem, &[]).with_tables(&tables);
+        // A kernel without an invocation index runs as a single invocation.
         let invocations = if named.iter().any(|(name, _)| *name == "first_invocation") { 64 } else { 1 };
         let run = || {
             let mut encoder = gpu.encoder();

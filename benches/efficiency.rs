@@ -1,14 +1,15 @@
-//! Efficiency of whole renders: 1 / (relMSE · seconds of the process), against the references at 256 x 256.
+//! Benchmark: efficiency of whole renders, 1 / (relMSE · process seconds), against the references
+//! at 256 x 256.
 //!
-//! `cargo bench --bench efficiency`. Runs the program as a user would, driver cache warm, five times a setting; the
-//! table gives the median time.
+//! `cargo bench --bench efficiency`. Runs the program as a user would, with a warm driver cache,
+//! five times per setting. The table gives the median time.
 
 use std::{path::Path, process::Command, time::Instant};
 
 use caustica::image::{difference::rel_mse, read_exr};
 
 const RUNS: usize = 5;
-/// What is asked for, beside the size.
+/// Options of each measurement, besides the size.
 const SETTINGS: [&str; 4] = [
     "--photons 200k --spp 4",
     "--photons 200k --spp 4 --share 0",
@@ -48,7 +49,7 @@ fn measure(scene: &str, setting: &str) {
     let median = seconds[RUNS / 2];
     let picture = read_exr(&out).expect("the program wrote a picture");
     let reference = read_exr(&folder.join(format!("{scene}.exr"))).expect("the reference reads");
-    let error = rel_mse(&picture.radiance, &reference.radiance, None);
+    let error = rel_mse(&picture.radiance(), &reference.radiance(), None);
     let efficiency = 1.0 / (error * median);
     println!("{scene:>5} {error:>10.5} {median:>9.3} {efficiency:>11.1}  {setting}");
     if let Err(e) = std::fs::remove_file(&out) {

@@ -1,5 +1,7 @@
-//! Errors of the estimate where surfaces end, meet or curve, against closed forms: `cargo bench --bench estimators`. What its options
-//! cost is in `cargo bench --bench options`.
+//! Benchmark: bias of the radiance estimate where surfaces end, meet or curve, against closed
+//! forms.
+//!
+//! `cargo bench --bench estimators`. For the cost of its options see `cargo bench --bench options`.
 
 use caustica::gpu::Gpu;
 use support::surfaces;

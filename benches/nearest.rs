@@ -1,7 +1,11 @@
-//! Exact k nearest photons: this renderer's grid on the device against kiddo's immutable tree with rayon on the same
-//! machine. `cargo bench --bench nearest [-- PHOTONS ...]`, 100000 and 1000000 unless given. Photons: 70 % on the walls of a box, 30 % in a caustic a thousand times
-//! denser; queries: points seen on the same surfaces, in Morton order for both. Neither side's building is counted;
-//! ours includes the sum over the photons found. Medians of rounds, in each of which both sides run.
+//! Benchmark: exact search for the k nearest photons, the grid on the device against the immutable
+//! tree of kiddo with rayon on the same machine.
+//!
+//! `cargo bench --bench nearest [-- PHOTONS ...]`, 100000 and 1000000 by default. Photons: 70 % on
+//! the walls of a box, 30 % in a caustic of a thousand times the density. Queries: points on the
+//! same surfaces, in Morton order for both. Construction is excluded on both sides; the time of the
+//! grid includes the sum over the photons found. Reports medians of rounds, in each of which both
+//! sides run.
 
 use std::{num::NonZero, time::Instant};
 
@@ -10,7 +14,7 @@ use caustica::{
     layout::{Gathered, VisiblePoint},
     passes::{
         estimate::gather::{Gather, GatherOptions, GatherSettings, gathered_buffer},
-        maps::photon_map::{MapKernels, PhotonMap, PhotonStore},
+        maps::{MapKernels, PhotonMap, PhotonStore},
     },
     progress::Silent,
     settings::Settings,
@@ -22,7 +26,8 @@ use support::photons::{Random, caustic_box, in_caustic, on_walls};
 
 const QUERIES: usize = 262_144;
 const ROUNDS: usize = 5;
-/// Share of the photons in the caustic, and its width for a thousand times the density of the six walls.
+/// Fraction of the photons in the caustic, and its width for a thousand times the density of the
+/// six walls.
 const SHARE: f32 = 0.3;
 const WIDTH: f32 = 0.0507;
 
@@ -50,7 +55,7 @@ fn main() {
         let (map, seconds) = build();
         println!("{count:>9} sorted and gridded in {:.1} ms", seconds * 1e3);
         for k in [10, 50, 500] {
-            // By turns, for the machine's speed changes while this runs.
+            // Alternates both sides: the speed of the machine changes during the run.
             let mut rounds = Vec::new();
             let mut differing = 0;
             grid_rate(&gpu, &mut gather, &map, &device_points, k);
@@ -66,7 +71,7 @@ fn main() {
     }
 }
 
-/// Points on the photons' surfaces, half of them in and around the caustic's wall, in Morton order.
+/// Points on the surfaces of the photons, 30 % of them in the caustic, in Morton order.
 fn queries() -> Vec<VisiblePoint> {
     let mut random = Random(2);
     let mut positions: Vec<Vec3> =
@@ -78,7 +83,7 @@ fn queries() -> Vec<VisiblePoint> {
     positions.into_iter().map(point).collect()
 }
 
-/// Queries per second, and squared radii.
+/// Runs the grid: queries per second, and squared radii.
 fn grid_rate(
     gpu: &Gpu,
     gather: &mut Gather,
@@ -102,7 +107,7 @@ fn grid_rate(
     (f64::from(count) / seconds, found.iter().map(|g| g.radius_squared).collect())
 }
 
-/// Queries per second, and squared distances of the (k+1)-th.
+/// Runs kiddo: queries per second, and squared distances of the (k+1)-th photon.
 fn kiddo_rate(tree: &ImmutableKdTree<f32, 3>, points: &[VisiblePoint], k: u32) -> (f64, Vec<f32>) {
     let n = NonZero::new(k as usize + 1).expect("k + 1 > 0");
     let start = Instant::now();

@@ -1,13 +1,15 @@
-//! What each option costs and what it gains: seconds of whole processes, and relMSE where the reference shows the same picture.
+//! Benchmark: cost and benefit of each option, as process seconds and as relMSE where the reference
+//! shows the same picture.
 //!
-//! `cargo bench --bench options [-- ROUNDS]`. Renders S1 at 256 x 256 with one option changed at a time, all in turn, three times round
-//! unless given, driver cache warm; the table gives the median time, and of the pictures the mean relMSE over a seed a round.
+//! `cargo bench --bench options [-- ROUNDS]`, 3 rounds by default. Renders S1 at 256 x 256 with one
+//! option changed at a time. Each round renders all of them, with its own seed and a warm driver
+//! cache. The table gives the median time and the mean relMSE over the rounds.
 
 use std::{path::Path, process::Command, time::Instant};
 
 use caustica::image::{difference::rel_mse, read_exr};
 
-/// Options that are changed, and whether the picture is that of the reference.
+/// Changed options, and whether the reference shows the same picture.
 const CHANGES: [(&str, bool); 17] = [
     ("", true),
     ("--share 0", true),
@@ -30,7 +32,7 @@ const CHANGES: [(&str, bool); 17] = [
 
 fn main() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
-    let reference = read_exr(&folder.join("S1.exr")).expect("the reference reads").radiance;
+    let reference = read_exr(&folder.join("S1.exr")).expect("the reference reads");
     let out = std::env::temp_dir().join(format!("caustica-options-{}.exr", std::process::id()));
     let rounds: u32 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(3);
     let run = |options: &str, size: &str, seed: u32| {
@@ -47,7 +49,7 @@ fn main() {
     };
     let mut seconds = CHANGES.map(|_| Vec::new());
     let mut errors = [0.0; CHANGES.len()];
-    // Before the first round each once, for the driver's cache.
+    // Renders each once before the first round, to warm the driver cache.
     for (options, _) in CHANGES {
         run(options, "16x16", 0);
     }
@@ -55,8 +57,8 @@ fn main() {
         for (i, (options, compares)) in CHANGES.iter().enumerate() {
             seconds[i].push(run(options, "256x256", seed));
             if *compares {
-                let picture = read_exr(&out).expect("the program wrote a picture").radiance;
-                errors[i] += rel_mse(&picture, &reference, None) / f64::from(rounds);
+                let picture = read_exr(&out).expect("the program wrote a picture");
+                errors[i] += rel_mse(picture.radiance(), reference.radiance(), None) / f64::from(rounds);
             }
         }
     }

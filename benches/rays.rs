@@ -1,7 +1,9 @@
-//! Incoherent rays: the traversal of all kernels, in one that does nothing else, against obvhs' BVH2 with rayon on the same cores.
+//! Benchmark: incoherent rays. Traversal in a kernel that does nothing else, against the BVH2 of
+//! obvhs with rayon on the same cores.
 //!
-//! `cargo bench --bench rays`. Both sides read rays from memory and write each ray's nearest hit. Rays start at random points
-//! in a room and go in random directions; the geometry is a closed box that holds a wavy height field.
+//! `cargo bench --bench rays`. Both sides read rays from memory and write the nearest hit of each.
+//! Rays start at random points in a room, in random directions. The geometry is a closed box that
+//! contains a wavy height field.
 
 use std::time::Instant;
 
@@ -12,7 +14,7 @@ use caustica::{
         shaders::{Binding, BindingKind, Shader},
     },
     scene::{Material, Scene, Surface, Triangle},
-    settings::Settings,
+    settings::LightSettings,
     upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
@@ -42,9 +44,9 @@ fn compare(gpu: &Gpu, scene: &Scene) {
     println!("{:>10} {a:>14.0} {b:>14.0} {:>8.2}", scene.triangles.len(), a / b);
 }
 
-/// Best of some runs over all rays, after one to warm up.
+/// Best time over several runs over all rays, after a warm-up run.
 fn kernel_seconds(gpu: &Gpu, scene: &Scene, rays: &[Ray]) -> f64 {
-    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &Settings::default()).expect("the scene fits");
+    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &LightSettings::default()).expect("the scene fits");
     let shader = PROBES.iter().find(|shader| shader.stem == "trace_rays").expect("the probe");
     let kernel = buffers.kernel_of(gpu, shader, &[]);
     let count = rays.len() as u64;
@@ -95,7 +97,7 @@ fn best_of(mut work: impl FnMut()) -> f64 {
     (0..RUNS).map(|_| time(&mut work)).fold(f64::INFINITY, f64::min)
 }
 
-/// Well-spread points and directions without order: additive recurrence over hashed indices.
+/// Random origins and directions from hashed ray indices.
 fn rays() -> Vec<Ray> {
     let unit = |i: u32, salt: u32| {
         let mut h = i.wrapping_mul(0x9e37_79b9) ^ salt.wrapping_mul(0x85eb_ca6b);
@@ -112,7 +114,7 @@ fn rays() -> Vec<Ray> {
     (0..RAYS as u32).map(ray).collect()
 }
 
-/// A closed room with a height field of `side` x `side` quads as its floor.
+/// Closed room whose floor is a height field of `side` x `side` quads.
 fn room(side: i32) -> Scene {
     let surface = Surface::Diffuse { albedo: Vec3::splat(0.5) };
     let mut scene = Scene {

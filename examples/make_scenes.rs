@@ -1,4 +1,5 @@
-//! Writes the repository's scenes: `cargo run --release --example make_scenes [FOLDER]`, by default into `scenes`.
+//! Writes the scenes of the repository: `cargo run --release --example make_scenes [FOLDER]`, by
+//! default into `scenes`.
 
 use std::path::PathBuf;
 

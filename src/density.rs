@@ -1,49 +1,53 @@
 //! Kernels of the radiance estimate: weights of photons over the disc of radius r around a point.
 //!
-//! The device knows r, the distance of the (k+1)-th photon, only when the photons are summed; so it sums Φ tᵐ, t = 1 − (d/s)ᵖ for a
-//! length s a little below r, and gets Σ K(d/r) Φ from these moments. For that a kernel is a polynomial in qᵖ, q = d/r, or in
+//! The device knows r, the distance of the (k+1)-th photon, only after the photons are summed. It
+//! therefore sums the moments Φ tᵐ, t = 1 − (d/s)ᵖ, for a length s slightly below r, and
+//! computes Σ K(d/r) Φ from them. This requires a kernel that is a polynomial in qᵖ, q = d/r, or in
 //! 1 − qᵖ.
 
 use serde::{Deserialize, Serialize};
 
-/// Shape of the kernel. The estimate divides by its mean over the disc, so each integrates to 1.
+/// Shape of the kernel. The estimate divides by its mean over the disc, so each kernel integrates
+/// to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DensityKernel {
     /// 1 − q/C (Jensen 2001, "Realistic Image Synthesis Using Photon Mapping", section 7.2.2).
     #[default]
     Cone,
-    /// 1: the plain density.
+    /// 1: the plain density estimate.
     Constant,
-    /// 1 − q² (Epanechnikov 1969; least mean squared error of all kernels that are nowhere negative).
+    /// 1 − q² (Epanechnikov 1969; least mean squared error of all non-negative kernels).
     Epanechnikov,
-    /// 1 − (1 − exp(−β q²/2)) / (1 − exp(−β)), β = 1.953 (Jensen 2001, section 7.2.2; his factor α goes into the mean).
+    /// 1 − (1 − exp(−β q²/2)) / (1 − exp(−β)), β = 1.953 (Jensen 2001, section 7.2.2; his factor α
+    /// is part of the mean).
     Gaussian,
-    /// (1 − q²)² (Silverman 1986, "Density Estimation", equation 4.5, in two dimensions 3/π (1 − q²)²).
+    /// (1 − q²)² (Silverman 1986, "Density Estimation", equation 4.5, in two dimensions 3/π
+    /// (1 − q²)²).
     Silverman,
 }
 
-/// Jensen's β.
+/// β of Jensen's Gaussian.
 const BETA: f64 = 1.953;
-/// Coefficients of a polynomial at most: what the device sums.
-pub const MOST_MOMENTS: usize = 5;
+/// Maximum number of coefficients of a polynomial, that is, of moments that the device sums.
+pub const MAX_MOMENTS: usize = 5;
 
-/// A kernel with its constant.
+/// A kernel with its parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Density {
     pub kernel: DensityKernel,
-    /// C of the cone, ≥ 1; the others have none.
+    /// C of the cone, ≥ 1; unused by the other kernels.
     pub cone_constant: f32,
 }
 
-/// Σ over m of `coefficients[m]` q^(`power` m); zeros beyond `moments`.
+/// Polynomial Σ over m of `coefficients[m]` q^(`power` m). Coefficients from `moments` on are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Polynomial {
     /// 1 or 2.
     pub power: u32,
-    /// Coefficients in use, 1 to [`MOST_MOMENTS`].
+    /// Number of coefficients in use, 1 to [`MAX_MOMENTS`].
     pub moments: u32,
-    pub coefficients: [f64; MOST_MOMENTS],
+    pub coefficients: [f64; MAX_MOMENTS],
 }
 
 impl DensityKernel {
@@ -58,7 +62,7 @@ impl DensityKernel {
 }
 
 impl Density {
-    /// K(q) of a photon at distance q r, 0 ≤ q ≤ 1, by the formula itself.
+    /// K(q) of a photon at distance q r, 0 ≤ q ≤ 1, by its formula.
     #[must_use]
     pub fn weight(self, q: f64) -> f64 {
         match self.kernel {
@@ -85,11 +89,11 @@ impl Density {
         }
     }
 
-    /// The polynomial that the device sums: exact but for the Gaussian, which it meets to 2e-5.
+    /// Polynomial that the device sums: exact but for the Gaussian, which it approximates to 2e-5.
     #[must_use]
     pub fn polynomial(self) -> Polynomial {
         let of = |power, given: &[f64]| {
-            let mut coefficients = [0.0; MOST_MOMENTS];
+            let mut coefficients = [0.0; MAX_MOMENTS];
             coefficients[..given.len()].copy_from_slice(given);
             Polynomial { power, moments: given.len() as u32, coefficients }
         };
@@ -104,7 +108,7 @@ impl Density {
 }
 
 impl Polynomial {
-    /// Its value at q.
+    /// Value at q.
     #[must_use]
     pub fn at(&self, q: f64) -> f64 {
         let t = q.powi(self.power as i32);
@@ -113,23 +117,24 @@ impl Polynomial {
 
     /// Coefficients of the same polynomial in 1 − qᵖ.
     #[must_use]
-    pub fn from_rim(&self) -> [f64; MOST_MOMENTS] {
+    pub fn from_rim(&self) -> [f64; MAX_MOMENTS] {
         // Horner's scheme at 1 − s.
-        self.coefficients.iter().rev().fold([0.0; MOST_MOMENTS], |sum, c| {
+        self.coefficients.iter().rev().fold([0.0; MAX_MOMENTS], |sum, c| {
             let mut next = sum;
-            (1..MOST_MOMENTS).for_each(|m| next[m] -= sum[m - 1]);
+            (1..MAX_MOMENTS).for_each(|m| next[m] -= sum[m - 1]);
             next[0] += c;
             next
         })
     }
 
-    /// Its mean over the disc: what the device divides by.
+    /// Mean over the disc: divisor of the estimate on the device.
     #[must_use]
     pub fn mean(&self) -> f64 {
         (0..).zip(self.coefficients).map(|(m, c)| 2.0 * c / f64::from(self.power * m + 2)).sum()
     }
 
-    /// Radius within which a fraction of the kernel's integral lies, for 0 ≤ fraction ≤ 1.
+    /// Relative radius q within which the given fraction of the integral of the kernel lies, for
+    /// 0 ≤ fraction ≤ 1.
     #[must_use]
     pub fn quantile(&self, fraction: f64) -> f64 {
         let integral = |q: f64| -> f64 {
@@ -145,14 +150,15 @@ impl Polynomial {
     }
 }
 
-/// Jensen's Gaussian without α, over q².
+/// Jensen's Gaussian without α, as a function of q².
 fn gaussian(q2: f64) -> f64 {
     1.0 - (1.0 - (-BETA * q2 / 2.0).exp()) / (1.0 - (-BETA).exp())
 }
 
-/// Coefficients of the polynomial that meets `f` at the Chebyshev nodes of [0, 1], by Newton's divided differences.
-fn interpolated(f: impl Fn(f64) -> f64) -> [f64; MOST_MOMENTS] {
-    const N: usize = MOST_MOMENTS;
+/// Coefficients of the polynomial that interpolates `f` at the Chebyshev nodes of [0, 1], by
+/// Newton's divided differences.
+fn interpolated(f: impl Fn(f64) -> f64) -> [f64; MAX_MOMENTS] {
+    const N: usize = MAX_MOMENTS;
     let node = |i: usize| 0.5 + 0.5 * ((2 * i + 1) as f64 * std::f64::consts::PI / (2 * N) as f64).cos();
     let nodes: [f64; N] = std::array::from_fn(node);
     let mut differences = nodes.map(f);
@@ -161,7 +167,7 @@ fn interpolated(f: impl Fn(f64) -> f64) -> [f64; MOST_MOMENTS] {
             differences[i] = (differences[i] - differences[i - 1]) / (nodes[i] - nodes[i - order]);
         }
     }
-    // Horner's scheme over (t - node), multiplied out.
+    // Expands Horner's scheme in (t - node).
     let mut coefficients = [0.0; N];
     for i in (0..N).rev() {
         for m in (1..N).rev() {

@@ -1,6 +1,8 @@
-//! Pages that need no other file: a template's `{{name}}` filled in, and the head that all pages share.
+//! Self-contained HTML pages: substitution of `{{name}}` in a template, and the head that all pages
+//! have in common.
 
-/// What all pages begin with, up to their title; for the place `{{head}}` of a template. Nothing may be asked of the network.
+/// Start of all pages up to the title, inserted for `{{head}}`. The content security policy forbids
+/// every network request.
 const HEAD: &str = concat!(
     "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n",
     "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n",
@@ -10,7 +12,7 @@ const HEAD: &str = concat!(
     "</style>\n",
 );
 
-/// The template with each `{{name}}` replaced, once: what is filled in stays as it is.
+/// Substitutes each `{{name}}` of the template. Inserted values are not substituted again.
 ///
 /// # Panics
 /// If the template has a name that `values` lacks.
@@ -27,7 +29,7 @@ pub fn filled(template: &str, values: &[(&str, &str)]) -> String {
     page
 }
 
-/// Text that cannot be taken for markup.
+/// Escapes text so that it is not parsed as markup.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")

@@ -10,6 +10,8 @@ use bytemuck::{Pod, Zeroable};
 pub const WORKGROUP_SIZE: u32 = 64;
 /// Bits of the index of a node or a primitive where more stands above it.
 pub const BVH_INDEX_BITS: u32 = 28;
+/// Workgroups per dimension that every adapter can dispatch.
+pub const MAX_WORKGROUPS: u32 = 65_535;
 /// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.
 pub const BVH_STACK: usize = 48;
 /// Bound of the weight by which an interpolated normal changes flux that grazes the geometric surface.
@@ -66,6 +68,9 @@ pub struct Normals {
     /// 1 if the corners' normals all equal the geometric one: the surface is flat and the rest need not be read.
     pub flat_shaded: u32,
 }
+
+/// Texels in a row of a table (`gpu::Table`): the least width of a texture that every device has.
+pub const TABLE_COLUMNS: u32 = 2048;
 
 /// Kinds of [`Material`].
 pub const DIFFUSE: u32 = 0;
@@ -252,6 +257,8 @@ pub struct Counters {
     pub non_finite: u32,
     /// High word of `lost`.
     pub lost_high: u32,
+    /// Shadow rays of one pass of direct light over a tile's points.
+    pub shadow_rays: u32,
 }
 
 impl Counters {
@@ -326,27 +333,18 @@ pub const CAUSTICS_APART: u32 = 32;
 /// Targets that caustic paths are aimed at, at most.
 pub const MAX_TARGETS: u32 = 32;
 
-/// Kinds of photon maps, and how many there are.
+/// Kinds of photon maps, as the shaders know [`MapKind`](crate::map_kind::MapKind), and how many there
+/// are.
 pub const GLOBAL_MAP: u32 = 0;
 pub const CAUSTIC_MAP: u32 = 1;
 pub const MAP_KINDS: u32 = 2;
 
-/// Key of a staged photon: its path in the batch, its place among the path's photons of its map, and the kind of the map,
-/// for which two bits are left.
+/// Key of a staged photon: the low bits are the path within its batch; from the shift on the photon's
+/// number on its path, as many bits as the mask has; then the kind of the map.
 pub const PATH_MASK: u32 = 0x3_ffff;
 pub const PLACE_SHIFT: u32 = 18;
 pub const PLACE_MASK: u32 = 0xfff;
 pub const KIND_SHIFT: u32 = 30;
-
-/// The photon maps of a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum MapKind {
-    /// Light that a diffuse surface scattered, or that comes straight from a light.
-    Global = GLOBAL_MAP,
-    /// Light that came through mirrors or glass.
-    Caustic = CAUSTIC_MAP,
-}
 
 /// What `store_photons` needs to know; see there.
 #[repr(C)]
@@ -355,7 +353,7 @@ pub struct Store {
     pub staged: u32,
     pub first_photon: u32,
     pub photons: u32,
-    /// The map, a [`MapKind`].
+    /// The map, [`GLOBAL_MAP`] or [`CAUSTIC_MAP`].
     pub kind: u32,
 }
 
@@ -417,18 +415,12 @@ pub struct FirstHit {
     pub alpha: f32,
 }
 
-/// Sums over a tile's samples of one pixel.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct TilePixel {
-    pub radiance: [f32; 3],
-    pub alpha: f32,
-    pub normal: [f32; 3],
-    pub depth: f32,
-    pub albedo: [f32; 3],
-    /// Samples that are not in the sums, as these would not be finite with them.
-    pub non_finite: u32,
-}
+/// Rows of four numbers that a camera sample writes for the output layers: those of [`FirstHit`].
+pub const LAYER_ROWS: usize = 2;
+
+/// Sums over a tile's samples of one pixel, by rows: radiance with the number of samples that are not
+/// in its sum, as it would not be finite with them; then the rows of the samples.
+pub type PixelSums = [[f32; 4]; LAYER_ROWS + 1];
 
 /// Which punctual light `light_directly` takes.
 #[repr(C)]
@@ -467,6 +459,18 @@ pub struct FinalStep {
 /// Photons of a finest cell of the photon grid; cells of a coarser one.
 pub const CELL_PHOTONS: u32 = 16;
 pub const CELL_FAN: u32 = 8;
+/// Bits per axis in one word of a Hilbert key.
+pub const KEY_BITS: u32 = 10;
+/// Packets that are searched together: a block.
+pub const PACKET_BLOCK: u32 = 8;
+/// Queries of a block.
+pub const QUERY_BLOCK: u32 = 32;
+/// One block of so many is a pilot, which is searched before the others,
+pub const PILOT_STRIDE: u32 = 8;
+/// and one of so many before these.
+pub const FIRST_PILOT_STRIDE: u32 = 64;
+/// Rays that survey one disc at most.
+pub const MOST_RAYS: u32 = 150;
 
 /// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert curve, or
 /// [`CELL_FAN`] cells of the next finer level. Cells lie level by level, the coarsest, which is one cell, first.
@@ -662,9 +666,7 @@ pub struct GridStep {
 }
 
 /// Bytes of `SearchState` in the shaders, in which a query waits for its next dispatch.
-pub const SEARCH_STATE_BYTES: usize = 64;
-/// Bytes of `Disc` in the shaders: the surface around a query.
-pub const DISC_BYTES: usize = 48;
+pub const SEARCH_STATE_BYTES: usize = 112;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
 pub const GATHER_STATE_BYTES: usize = 1072;
 

@@ -44,6 +44,7 @@ pub mod gpu;
 mod html;
 pub mod image;
 pub mod layout;
+pub mod map_kind;
 mod memory;
 pub mod passes;
 pub mod pixel_filter;

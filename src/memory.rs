@@ -1,6 +1,6 @@
-//! Memory of the host.
+//! Host memory.
 
-/// Memory that is free, bytes, where the system tells: on Linux.
+/// Available memory, bytes; `None` where the system does not report it (not Linux).
 pub(crate) fn available() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;

@@ -1,34 +1,36 @@
-//! Pixel filters: how the light around a pixel's centre is weighed.
+//! Pixel filters: weights of camera samples around the centre of a pixel.
 //!
-//! Camera samples are distributed as the filter and weighed alike (filter importance sampling: Ernst et al. 2006, "Filter
-//! Importance Sampling"). All filters are products of one function of x and the same of y, none is negative anywhere.
+//! Camera samples are distributed as the filter and have equal weights (filter importance sampling:
+//! Ernst et al. 2006, "Filter Importance Sampling"). Each filter is the product of one function of
+//! x and the same function of y, and is nowhere negative.
 
 use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
-/// Weight of an offset from the pixel's centre, in pixels.
+/// Filter shape: weight of an offset from the centre of a pixel, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PixelFilter {
-    /// 1 within the pixel's square.
+    /// 1 within the square of the pixel.
     #[default]
     Box,
-    /// exp(-x² / 2σ²), σ = 0.5, cut at 1.5 pixels.
+    /// exp(-x² / 2σ²), σ = 0.5, truncated at 1.5 pixels.
     Gaussian,
-    /// The four-term window of Harris 1978, "On the Use of Windows for Harmonic Analysis with the Discrete Fourier
-    /// Transform", 3 pixels wide.
+    /// The four-term window of Harris 1978, "On the Use of Windows for Harmonic Analysis with the
+    /// Discrete Fourier Transform", 3 pixels wide.
     BlackmanHarris,
 }
 
 /// Standard deviation of the Gaussian filter, pixels.
 const SIGMA: f64 = 0.5;
-/// Steps of the table of a filter that is no box, and of the integral from which it is made.
-const STEPS: usize = 1 << 12;
-const PARTS: usize = 1 << 16;
+/// Steps of the offset table of a filter other than the box.
+const TABLE_STEPS: usize = 1 << 12;
+/// Steps of the integral from which the table is computed.
+const INTEGRAL_STEPS: usize = 1 << 16;
 
 impl PixelFilter {
-    /// Where the filter ends on each side of the centre, pixels.
+    /// Filter radius along each axis, pixels.
     #[must_use]
     pub fn radius(self) -> f64 {
         match self {
@@ -37,7 +39,7 @@ impl PixelFilter {
         }
     }
 
-    /// The filter along one axis, not normalised; `x` in pixels from the centre.
+    /// Value along one axis, not normalised; `x` in pixels from the centre.
     #[must_use]
     pub fn weight(self, x: f64) -> f64 {
         if x.abs() > self.radius() {
@@ -53,26 +55,27 @@ impl PixelFilter {
         }
     }
 
-    /// Offsets at which the filter's integral along one axis reaches 0, 1/n, 2/n … 1 of its whole: between them the inverse is
-    /// taken for linear. Two for the box, which is exact.
+    /// Inverse CDF along one axis: the offsets at which the integral of the filter reaches 0, 1/n,
+    /// 2/n … 1 of its total, interpolated linearly in between. Two entries for the box, which is
+    /// exact.
     #[must_use]
     pub fn offsets(self) -> Vec<f32> {
         let radius = self.radius();
         if self == PixelFilter::Box {
             return vec![-radius as f32, radius as f32];
         }
-        let width = 2.0 * radius / PARTS as f64;
+        let width = 2.0 * radius / INTEGRAL_STEPS as f64;
         let edge = |i: usize| -radius + i as f64 * width;
         let mut integral = vec![0.0];
-        for i in 0..PARTS {
+        for i in 0..INTEGRAL_STEPS {
             integral.push(integral[i] + width * self.weight(edge(i) + 0.5 * width));
         }
         let offset = |step: usize| {
-            let wanted = integral[PARTS] * step as f64 / STEPS as f64;
-            let part = integral.partition_point(|&sum| sum < wanted).clamp(1, PARTS) - 1;
+            let wanted = integral[INTEGRAL_STEPS] * step as f64 / TABLE_STEPS as f64;
+            let part = integral.partition_point(|&sum| sum < wanted).clamp(1, INTEGRAL_STEPS) - 1;
             (edge(part) + width * (wanted - integral[part]) / (integral[part + 1] - integral[part])) as f32
         };
-        (0..=STEPS).map(offset).collect()
+        (0..=TABLE_STEPS).map(offset).collect()
     }
 }
 
@@ -80,7 +83,7 @@ impl PixelFilter {
 mod tests {
     use super::*;
 
-    /// Mean and variance of the offsets that the table gives, by its own linear interpolation.
+    /// Mean and variance of the distribution that the table gives, by its linear interpolation.
     fn moments(offsets: &[f32]) -> (f64, f64) {
         let parts = offsets.windows(2).map(|w| (f64::from(w[0]), f64::from(w[1])));
         let n = (offsets.len() - 1) as f64;
@@ -89,7 +92,7 @@ mod tests {
         (mean, square - mean * mean)
     }
 
-    /// The same of the filter itself.
+    /// Variance of the filter itself.
     fn variance(filter: PixelFilter) -> f64 {
         let x = |i: usize| (i as f64 + 0.5) / 5000.0 - 2.0;
         let whole: f64 = (0..20_000).map(|i| filter.weight(x(i))).sum();

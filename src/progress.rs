@@ -1,38 +1,38 @@
-//! How long work tells how far it is, and learns that it should stop.
+//! Progress reports and cancellation of long work.
 
 use crate::error::{Error, Result};
 
-/// What is being done; shown to the user.
+/// Stage of the work, shown to the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     Load,
     Bvh,
-    /// Counted in photons stored, of all maps.
+    /// In units of photons stored, over all maps.
     Photons,
     Grid,
-    /// Counted in tiles of camera samples: camera rays, direct light and gather.
+    /// In units of tiles of camera samples: camera rays, direct light and gather.
     Camera,
-    /// Counted in tiles, as [`Stage::Camera`], each gathered twice.
+    /// In units of tiles as [`Stage::Camera`], each gathered twice.
     Compare,
 }
 
-/// Listener of a render. Its methods are called often and must return at once.
+/// Listener of a render. Its methods are called often and must return immediately.
 pub trait Progress: Sync {
-    /// `done` of `total` units of `stage`; `total` may grow or shrink between calls.
+    /// Reports `done` of `total` units of `stage`; `total` may grow or shrink between calls.
     fn report(&self, stage: Stage, done: u64, total: u64);
-    /// The work should end as soon as it can.
+    /// Whether the work should stop as soon as possible.
     fn stop_requested(&self) -> bool;
 
-    /// [`Error::Stopped`] if the work should end.
+    /// Returns an error if a stop was requested.
     ///
     /// # Errors
-    /// Only that.
+    /// [`Error::Stopped`].
     fn check(&self) -> Result<()> {
         if self.stop_requested() { Err(Error::Stopped) } else { Ok(()) }
     }
 }
 
-/// Says nothing and never stops.
+/// Listener that ignores all reports and never requests a stop.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

@@ -1,4 +1,5 @@
-//! The bytes of an OpenEXR or Radiance HDR file: read, or refused in one line.
+//! Fuzz target: the bytes of an OpenEXR or Radiance HDR file are read, or refused with a message of
+//! one line.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,5 +1,5 @@
-//! Words of a command line, one a line of the input: understood, or refused with exit code 2; then the settings that they
-//! make.
+//! Fuzz target: the words of a command line, one per line of the input, are parsed or refused with
+//! exit code 2; then the settings that they give are checked.
 #![no_main]
 #![allow(dead_code, reason = "the command's arguments, of which a target uses a part")]
 

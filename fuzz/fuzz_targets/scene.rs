@@ -1,5 +1,5 @@
-//! The bytes of a .gltf or .glb file: read, or refused in one line. Mutations keep the JSON whole, else hardly an input
-//! would get beyond its parser.
+//! Fuzz target: the bytes of a .gltf or .glb file are read, or refused with a message of one line.
+//! Mutations keep the JSON well formed; otherwise few inputs would pass its parser.
 #![no_main]
 
 use libfuzzer_sys::{fuzz_mutator, fuzz_target};

@@ -1,13 +1,14 @@
-//! Mutations of glTF files that keep the JSON well formed: of its values, and of the bytes in its buffers.
+//! Mutations of glTF files that keep the JSON well formed: of its values, and of the bytes in its
+//! buffers.
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 use libfuzzer_sys::fuzzer_mutate;
 use serde_json::{Map, Value, json};
 
-/// Changes the first `size` bytes of `data` in place; returns how many there are then.
+/// Mutates the first `size` bytes of `data` in place. Returns the new size.
 pub fn mutate(data: &mut [u8], size: usize, max_size: usize, seed: u32) -> usize {
     let mut dice = Dice(u64::from(seed) ^ 0x9e37_79b9_7f4a_7c15);
-    // The bytes as they lie: containers, encodings and syntax have their turn too.
+    // Mutates the raw bytes now and then, so that containers, encodings and syntax are covered too.
     if dice.one_in(12) {
         return fuzzer_mutate(data, size, max_size);
     }
@@ -34,7 +35,7 @@ pub fn mutate(data: &mut [u8], size: usize, max_size: usize, seed: u32) -> usize
     written.len()
 }
 
-/// JSON and, of a GLB, its binary chunk.
+/// Parses the JSON and, in a GLB, the binary chunk.
 fn parse(bytes: &[u8]) -> Option<(Value, Option<Vec<u8>>)> {
     if !bytes.starts_with(b"glTF") {
         return Some((serde_json::from_slice(bytes).ok()?, None));
@@ -68,7 +69,7 @@ fn mutate_bytes(bytes: &mut Vec<u8>) {
     bytes.truncate(size);
 }
 
-/// Changes the bytes that a buffer's data URI holds.
+/// Mutates the bytes in the data URI of a buffer.
 fn mutate_uri(root: &mut Value, dice: &mut Dice) {
     let Some(buffers) = root.get_mut("buffers").and_then(Value::as_array_mut).filter(|list| !list.is_empty()) else {
         return;
@@ -89,7 +90,7 @@ fn set_length(root: &mut Value, buffer: usize, length: usize) {
     }
 }
 
-/// Changes one value somewhere in the tree.
+/// Mutates one value of the tree.
 fn mutate_value(root: &mut Value, dice: &mut Dice) {
     let donor = descend(&mut root.clone(), dice).clone();
     let value = descend(root, dice);
@@ -145,7 +146,7 @@ fn mutate_map(map: &mut Map<String, Value>, donor: Value, dice: &mut Dice) {
     }
 }
 
-/// A value of the tree, deep ones and shallow ones alike.
+/// Chooses a value of the tree at any depth.
 fn descend<'a>(value: &'a mut Value, dice: &mut Dice) -> &'a mut Value {
     if dice.one_in(6) {
         return value;
@@ -166,7 +167,7 @@ fn descend<'a>(value: &'a mut Value, dice: &mut Dice) -> &'a mut Value {
     }
 }
 
-/// A number near another one, or one at an edge of what formats can hold.
+/// Chooses a number near `now`, or one at a limit of the formats.
 fn number(now: f64, dice: &mut Dice) -> Value {
     match dice.below(5) {
         0 => json!((now as i64).saturating_add(1)),
@@ -191,10 +192,10 @@ const NUMBERS: &[&str] = &[
 
 const WORDS: &[&str] = &include!("gltf_words.rs");
 
-/// Parts of files that the corpus may lack, with the key under which they make sense.
+/// Fragments of files that the corpus may lack, with their keys.
 const PIECES: &[(&str, &str)] = &include!("gltf_pieces.rs");
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
+/// Random number generator SplitMix64 (Steele, Lea, Flood 2014).
 struct Dice(u64);
 
 impl Dice {
@@ -206,7 +207,7 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// From 0 to `limit` - 1.
+    /// Uniform in 0 to `limit` - 1.
     fn below(&mut self, limit: usize) -> usize {
         (self.next() % limit.max(1) as u64) as usize
     }

@@ -1,43 +1,44 @@
-//! From a tree of any depth to one of [`MAX_HEIGHT`] levels at most, whose nodes know the boxes of both children.
+//! Conversion of a binary tree of any depth to one of at most [`MAX_HEIGHT`] levels, whose nodes
+//! store the boxes of both children.
 
 use obvhs::bvh2::Bvh2;
 
 use super::{BvhChild, MAX_LEAF};
 use crate::scene::Bounds;
 
-/// Interior nodes on the longest way down.
+/// Maximum height of the converted tree: interior nodes on the longest path from the root.
 pub(super) const MAX_HEIGHT: u32 = 32;
 
-/// A binary tree. The first of a child's primitives is a place in `order`.
+/// A binary tree. [`BvhChild::first`] of a leaf is an index into `order`.
 pub(super) struct Binary {
-    /// Parents before children; node 0 is the root.
+    /// Nodes, parents before children. Node 0 is the root.
     pub nodes: Vec<[BvhChild; 2]>,
-    /// The primitives' indices in the order of the leaves.
+    /// Primitive indices in leaf order.
     pub order: Vec<u32>,
 }
 
-/// Needs two primitives or more.
+/// Converts `tree`, which holds at least two primitives with the given bounds.
 pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds]) -> Binary {
     let made = Binary { nodes: Vec::new(), order: Vec::with_capacity(bounds.len()) };
     let mut converter = Converter { tree, bounds, subtrees: measure(tree), made };
     let root = converter.tree_node(0, 0);
     if root.count > 0 {
-        // All primitives fit in one leaf: the root still needs two children.
+        // All primitives fit in one leaf, but the root needs two children.
         let mut all = std::mem::take(&mut converter.made.order);
         converter.even_halves(&mut all, 0);
     }
     converter.made
 }
 
-/// Size of the part of the tree below a node.
+/// Size of a subtree.
 #[derive(Clone, Copy, Default)]
 struct Subtree {
     primitives: u32,
-    /// Interior nodes on the longest way down.
+    /// Interior nodes on the longest path from the root of the subtree.
     height: u32,
 }
 
-/// Sizes of all subtrees.
+/// Computes the size of the subtree below each node.
 fn measure(tree: &Bvh2) -> Vec<Subtree> {
     let mut subtrees = vec![Subtree::default(); tree.nodes.len()];
     let mut parents_first = vec![0_u32];
@@ -61,7 +62,7 @@ fn measure(tree: &Bvh2) -> Vec<Subtree> {
     subtrees
 }
 
-/// Height of an evenly split tree over that many primitives.
+/// Height of an evenly split tree over `primitives` primitives.
 fn even_height(primitives: u32) -> u32 {
     primitives.div_ceil(MAX_LEAF).next_power_of_two().trailing_zeros()
 }
@@ -74,8 +75,9 @@ struct Converter<'a> {
 }
 
 impl Converter<'_> {
-    /// Converts the subtree of a node of the tree, below `depth` interior nodes. A subtree that is too deep is kept
-    /// as far as an even split further down still ends in time.
+    /// Converts the subtree of a node that lies below `depth` interior nodes. A subtree that is too
+    /// deep keeps its upper nodes as long as an even split of the children still fits into
+    /// [`MAX_HEIGHT`].
     fn tree_node(&mut self, index: u32, depth: u32) -> BvhChild {
         let node = &self.tree.nodes[index as usize];
         if node.is_leaf() {
@@ -93,7 +95,7 @@ impl Converter<'_> {
         self.interior(|this| children.map(|child| this.tree_node(child, depth + 1)))
     }
 
-    /// Writes a node whose children `convert` makes.
+    /// Appends a node whose children `convert` creates.
     fn interior(&mut self, convert: impl FnOnce(&mut Self) -> [BvhChild; 2]) -> BvhChild {
         let index = self.made.nodes.len();
         self.made.nodes.push([BvhChild { bounds: Bounds::EMPTY, first: 0, count: 0 }; 2]);
@@ -110,7 +112,7 @@ impl Converter<'_> {
         BvhChild { bounds, first, count: primitives.len() as u32 }
     }
 
-    /// All primitives below a node of the tree.
+    /// Collects all primitives below a node of the source tree.
     fn primitives_below(&self, index: u32) -> Vec<u32> {
         let (mut open, mut below) = (vec![index], Vec::new());
         while let Some(index) = open.pop() {
@@ -125,7 +127,7 @@ impl Converter<'_> {
         below
     }
 
-    /// A leaf, or a node with half of the primitives on each side.
+    /// Creates a leaf, or a node that splits the primitives evenly.
     fn even_node(&mut self, primitives: &mut [u32], depth: u32) -> BvhChild {
         if primitives.len() <= MAX_LEAF as usize {
             return self.leaf(primitives);
@@ -133,13 +135,15 @@ impl Converter<'_> {
         self.even_halves(primitives, depth)
     }
 
-    /// A node with half of the primitives on each side of the middle of the longest axis.
+    /// Creates a node that splits the primitives at the median of the longest axis of their
+    /// centres.
     fn even_halves(&mut self, primitives: &mut [u32], depth: u32) -> BvhChild {
         let middle = |i: u32| self.bounds[i as usize].min + self.bounds[i as usize].max;
         let centers =
             primitives.iter().map(|i| middle(*i)).fold(Bounds::EMPTY, |b, p| b.union(Bounds { min: p, max: p }));
         let axis = (centers.max - centers.min).max_position();
-        // Whole leaves on the left, so that the halves are no higher than `even_height` says.
+        // Fills whole leaves on the left, so that neither half is higher than `even_height`
+        // predicts.
         let leaves = primitives.len().div_ceil(MAX_LEAF as usize);
         let half = if leaves > 1 { (leaves / 2 + leaves % 2) * MAX_LEAF as usize } else { primitives.len() / 2 };
         primitives.select_nth_unstable_by(half, |a, b| middle(*a)[axis].total_cmp(&middle(*b)[axis]).then(a.cmp(b)));
@@ -148,7 +152,7 @@ impl Converter<'_> {
     }
 }
 
-/// Interior nodes on the longest way down the whole tree.
+/// Height of the whole tree: interior nodes on the longest path from the root.
 #[cfg(test)]
 pub(super) fn height(tree: &Bvh2) -> usize {
     measure(tree)[0].height as usize

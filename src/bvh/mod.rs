@@ -1,23 +1,12 @@
-//! Bounding volume hierarchy in the layout that the shaders traverse: a binary tree whose levels are then joined to nodes
-//! of up to [`WIDTH`] children with their boxes in few bits, so that a ray loads little.
+//! Bounding volume hierarchy in the layout that the shaders traverse. A binary tree is built first;
+//! its levels are then collapsed into nodes of up to [`WIDTH`] children with quantized bounding
+//! boxes, so that a ray loads few bytes.
 //!
-//! Node 0 is the root and always there: a scene with fewer than two primitives, of which no binary tree can be made, is filled
-//! up with triangles without area, which no ray hits. Following farther children later, a traversal postpones at most
-//! [`BVH_STACK`] of them.
+//! Node 0 is the root and always exists: a scene with fewer than two primitives, which gives no
+//! binary tree, is padded with degenerate triangles that no ray hits. A traversal defers the
+//! farther children and keeps at most [`BVH_STACK`](crate::layout::BVH_STACK) of them on its stack.
 
-use glam::Vec3;
-use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::ploc::{PlocSearchDistance, SortPrecision};
-
-pub use media::{Media, MediaProbe, packed, too_deep};
-pub use node::BvhChild;
-
-use crate::layout::{BVH_STACK, BvhNode, Normals, Primitive, SPHERE_BIT, octahedral};
-use crate::scene::{Bounds, Scene, Sphere, Triangle};
-
+mod build;
 mod convert;
 mod media;
 mod node;
@@ -25,125 +14,6 @@ mod node;
 mod tests;
 mod widen;
 
-/// Children of a node at most.
-pub const WIDTH: usize = 4;
-
-/// Primitives of a leaf at most.
-pub const MAX_LEAF: u32 = 4;
-
-/// [`Primitive::id`] of a triangle that only fills up.
-pub const FILLER: u32 = u32::MAX;
-
-/// Nodes and primitives for the shaders.
-#[derive(Clone, Debug, Default)]
-pub struct Bvh {
-    /// Interior nodes, parents before children; node 0 is the root.
-    pub nodes: Vec<BvhNode>,
-    /// In the order of the leaves.
-    pub primitives: Vec<Primitive>,
-    /// One for each primitive.
-    pub normals: Vec<Normals>,
-}
-
-impl Bvh {
-    /// Builds the tree over all triangles and spheres: PLOC with reinsertion (Meister and Bittner 2018, 2021). The
-    /// same scene gives the same tree, on any number of threads.
-    ///
-    /// # Panics
-    /// With 2^28 triangles and spheres or more; files are refused long before.
-    #[must_use]
-    pub fn build(scene: &Scene) -> Self {
-        let mut primitives: Vec<Primitive> = Vec::with_capacity(scene.triangles.len() + scene.spheres.len());
-        primitives.extend(scene.triangles.iter().map(triangle_primitive));
-        primitives.extend(scene.spheres.iter().map(sphere_primitive));
-        for (id, primitive) in primitives.iter_mut().enumerate() {
-            primitive.id = id as u32;
-        }
-        primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
-        let bounds: Vec<Bounds> = primitives.iter().map(bounds).collect();
-        let binary = convert::convert(&build_binary(&bounds), &bounds);
-        let (nodes, order) = widen::widen(&binary);
-        let normals = |primitive: &Primitive| {
-            scene.triangles.get(primitive.id as usize).map_or(Normals::default(), corner_normals)
-        };
-        let primitives: Vec<Primitive> = order.iter().map(|i| primitives[*i as usize]).collect();
-        Self { normals: primitives.iter().map(normals).collect(), nodes, primitives }
-    }
-
-    /// Children that a traversal postpones at most.
-    #[must_use]
-    pub fn most_postponed(&self) -> usize {
-        // Those above each node.
-        let mut postponed = vec![0_usize; self.nodes.len()];
-        let mut most = 0;
-        for (i, node) in self.nodes.iter().enumerate() {
-            let here = postponed[i] + node.children().count() - 1;
-            node.children().filter(|child| child.count == 0).for_each(|child| postponed[child.first as usize] = here);
-            most = most.max(here);
-        }
-        debug_assert!(most <= BVH_STACK);
-        most
-    }
-}
-
-fn triangle_primitive(triangle: &Triangle) -> Primitive {
-    let [a, b, c] = triangle.positions;
-    Primitive {
-        v0: a.to_array(),
-        material: triangle.material,
-        e1: (b - a).to_array(),
-        e2: (c - a).to_array(),
-        ..Primitive::default()
-    }
-}
-
-fn sphere_primitive(sphere: &Sphere) -> Primitive {
-    Primitive {
-        v0: sphere.center.to_array(),
-        material: sphere.material | SPHERE_BIT,
-        e1: [sphere.radius, 0.0, 0.0],
-        ..Primitive::default()
-    }
-}
-
-/// Box around a primitive as the shaders see it.
-fn bounds(primitive: &Primitive) -> Bounds {
-    let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(Vec3::from_array);
-    if primitive.material & SPHERE_BIT != 0 {
-        return Bounds { min: v0 - e1.x, max: v0 + e1.x };
-    }
-    let (v1, v2) = (v0 + e1, v0 + e2);
-    Bounds { min: v0.min(v1).min(v2), max: v0.max(v1).max(v2) }
-}
-
-/// Largest difference of a corner's normal from the geometric one that the encoding cannot tell.
-const FLAT: f32 = 1e-4;
-
-fn corner_normals(triangle: &Triangle) -> Normals {
-    let flat = triangle.geometric_normal();
-    let [n0, n1, n2] = triangle.normals.map(octahedral);
-    let flat_shaded = u32::from(triangle.normals.iter().all(|normal| (*normal - flat).length() < FLAT));
-    Normals { n0, n1, n2, flat_shaded }
-}
-
-/// The tree before conversion. On one thread: the order of equal keys in the parallel sorts is nobody's promise.
-fn build_binary(bounds: &[Bounds]) -> Bvh2 {
-    let boxes: Vec<Aabb> = bounds.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
-    let parameters = BvhBuildParams {
-        pre_split: false,
-        ploc_search_distance: PlocSearchDistance::Medium,
-        search_depth_threshold: 3,
-        reinsertion_batch_ratio: 0.05,
-        post_collapse_reinsertion_batch_ratio_multiplier: 2.0,
-        sort_precision: SortPrecision::U64,
-        max_prims_per_leaf: MAX_LEAF,
-        // In tests of a primitive, for a level of the binary tree.
-        collapse_traversal_cost: 1.5,
-    };
-    let build = || build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
-    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
-        Ok(pool) => pool.install(build),
-        // Without a thread to spare, this thread's pool does it.
-        Err(_) => build(),
-    }
-}
+pub use build::{Bvh, FILLER};
+pub use media::{Media, MediaProbe, packed, too_deep};
+pub use node::{BvhChild, MAX_LEAF, WIDTH};

@@ -1,37 +1,44 @@
-//! Packing a node's children: corners of boxes in 8 bits each, in units of a power of two from the node's lower corner
-//! (Ylitie, Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", section 3.1).
+//! Packing of a node: child boxes with 8 bits per coordinate, in units of a power of two from the
+//! lower corner of the node (Ylitie, Karras and Laine 2017, "Efficient Incoherent Ray Traversal on
+//! GPUs Through Compressed Wide BVHs", section 3.1).
 
 use glam::Vec3;
 
-use super::{MAX_LEAF, WIDTH};
 use crate::layout::{BVH_INDEX_BITS, BvhNode};
 use crate::scene::Bounds;
 
-// The primitives of a leaf less one have two bits.
+/// Maximum number of children of a node.
+pub const WIDTH: usize = 4;
+
+/// Maximum number of primitives of a leaf.
+pub const MAX_LEAF: u32 = 4;
+
+// The primitive count of a leaf, less one, is stored in two bits.
 const _: () = assert!(MAX_LEAF <= 4);
 
-/// Largest number of units.
+/// Largest quantized coordinate.
 const MAX_UNITS: u32 = 255;
-/// Exponent bits of the largest finite number.
+/// Biased exponent of the largest finite f32.
 const MAX_EXPONENT: u32 = 254;
 
 /// A child of a [`BvhNode`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BvhChild {
-    /// Box around it, metres: no smaller than what it holds.
+    /// Bounding box, metres. Contains the box of the contents, since quantization rounds outwards.
     pub bounds: Bounds,
     /// Interior child: index of its node. Leaf: index of its first primitive.
     pub first: u32,
-    /// Primitives of a leaf; 0 for an interior node.
+    /// Number of primitives of a leaf; 0 for an interior child.
     pub count: u32,
 }
 
 impl BvhNode {
-    /// From the boxes of its children, those of interior nodes before those of leaves, at most [`WIDTH`] in all; how many
-    /// primitives each leaf has, 1 to [`MAX_LEAF`]; and where its nodes and its primitives begin.
+    /// Packs a node. `boxes` holds the boxes of its children, at most [`WIDTH`], interior children
+    /// before leaves; `leaves` the primitive count of each leaf, 1 to [`MAX_LEAF`]; `first_node`
+    /// and `first_primitive` the indices of its first child node and its first primitive.
     ///
     /// # Panics
-    /// If one of these is not below 2^28.
+    /// If `first_node` or `first_primitive` is 2^28 or more.
     #[must_use]
     pub fn new(boxes: &[Bounds], leaves: &[u32], first_node: u32, first_primitive: u32) -> Self {
         debug_assert!(boxes.len() <= WIDTH && leaves.len() <= boxes.len());
@@ -63,7 +70,7 @@ impl BvhNode {
         node
     }
 
-    /// Its children, in the order in which they were given.
+    /// Unpacks the children, in the order in which they were packed.
     pub fn children(&self) -> impl Iterator<Item = BvhChild> + use<> {
         let Self { grid: [x, y, z, shape], low, high } = *self;
         let corner = [x, y, z].map(f32::from_bits);
@@ -85,19 +92,20 @@ impl BvhNode {
     }
 }
 
-/// The smallest exponent with which [`MAX_UNITS`] reach from `low` to `high`.
+/// Smallest exponent with which [`MAX_UNITS`] units reach from `low` to `high`.
 fn exponent(low: f32, high: f32) -> u32 {
     let too_small = ((high - low) / MAX_UNITS as f32).to_bits() >> 23;
     let reaches = |exponent: &u32| plane(low, *exponent, MAX_UNITS) >= high;
     (too_small.min(MAX_EXPONENT)..=MAX_EXPONENT).find(reaches).unwrap_or(MAX_EXPONENT)
 }
 
-/// Length of a unit: a power of two, or 0 for an exponent of 0.
+/// Length of one unit: a power of two, or 0 for an exponent of 0.
 fn unit(exponent: u32) -> f32 {
     f32::from_bits(exponent << 23)
 }
 
-/// A place that many units from a node's corner; the shaders' arithmetic, bit for bit. The product is exact.
+/// Coordinate that lies `units` units from the corner of a node. Same arithmetic as the shaders,
+/// bit for bit; the product is exact.
 fn plane(corner: f32, exponent: u32, units: u32) -> f32 {
     corner + units as f32 * unit(exponent)
 }

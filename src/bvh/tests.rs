@@ -1,12 +1,13 @@
-//! The tree holds every primitive once, in boxes that contain it, and finds what brute force finds.
+//! Tests: the tree holds every primitive once, in boxes that contain it, and traversal finds the
+//! hits of brute force.
 
 use glam::Vec3;
 
-use super::{Bvh, BvhChild, MAX_LEAF, WIDTH, bounds};
+use super::{Bvh, BvhChild, MAX_LEAF, WIDTH, build::bounds, build::build_binary};
 use crate::layout::{BVH_STACK, BvhNode, Primitive, SPHERE_BIT};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
-/// Random numbers in 0..1 (PCG hash, Jarzynski and Olano 2020).
+/// Random numbers in [0, 1) (PCG hash, Jarzynski and Olano 2020).
 struct Random(u32);
 
 impl Random {
@@ -92,7 +93,7 @@ fn traverse(bvh: &Bvh, o: Vec3, d: Vec3) -> Option<(f32, u32)> {
     nearest
 }
 
-/// Rays of `count` whose nearest hit differs from brute force.
+/// Number of rays, of `count`, whose nearest hit differs from brute force.
 fn mismatches(bvh: &Bvh, count: usize) -> usize {
     let mut random = Random(7);
     let mut rays = (0..count).map(|_| (random.point() * 1.5, random.point().normalize()));
@@ -109,10 +110,10 @@ fn mismatches(bvh: &Bvh, count: usize) -> usize {
     wrong
 }
 
-/// What is wrong with the structure of a tree, if anything.
+/// Describes a structural fault of the tree, if there is one.
 fn fault(bvh: &Bvh) -> Option<String> {
     let mut seen = vec![0; bvh.primitives.len()];
-    // Boxes around the primitives below each node, children before parents.
+    // Computes the box of the primitives below each node, children before parents.
     let mut held = vec![Bounds::EMPTY; bvh.nodes.len()];
     for (i, node) in bvh.nodes.iter().enumerate().rev() {
         let count = node.children().count();
@@ -142,11 +143,11 @@ fn fault(bvh: &Bvh) -> Option<String> {
     if seen.iter().any(|n| *n != 1) || (ids.len() != bvh.primitives.len() && bvh.primitives.len() > 2) {
         return Some("a primitive is not in exactly one leaf".to_owned());
     }
-    (bvh.most_postponed() > BVH_STACK).then(|| format!("{} postponed", bvh.most_postponed()))
+    (bvh.max_stack_depth() > BVH_STACK).then(|| format!("stack depth {}", bvh.max_stack_depth()))
 }
 
 #[test]
-fn holds_all_and_finds_what_brute_force_finds() {
+fn holds_every_primitive_and_agrees_with_brute_force() {
     for (triangles, spheres, size) in
         [(0, 0, 1.0), (1, 0, 1.0), (0, 1, 1.0), (2, 0, 1.0), (3, 1, 1.0), (5, 0, 1.0), (40, 9, 0.5), (3000, 200, 0.1)]
     {
@@ -160,20 +161,21 @@ fn holds_all_and_finds_what_brute_force_finds() {
     }
 }
 
-/// By how many units of its axis the box of the first child exceeds the given one at most on a side, and the unit; `None` if the
-/// box does not hold it. The second child spans the node: from `low` on over `extent`.
+/// Largest excess of the first child's box over the given box on any side, in units of that axis,
+/// and the unit. `None` if the box does not contain the given one. The second child spans the node,
+/// from `low` over `extent`.
 fn looseness(node: &BvhNode, given: Bounds) -> Option<f32> {
     let child = node.children().next().expect("it has two");
     let holds = child.bounds.union(given) == child.bounds;
     let unit = f32::from_bits((node.grid[3] & 0xff) << 23);
     let beyond = (given.min.x - child.bounds.min.x).max(child.bounds.max.x - given.max.x);
-    // An ulp is as close as places lie together there.
+    // Coordinates there are no denser than one ulp.
     let ulp = f32::EPSILON * given.max.abs().max(given.min.abs()).x;
     holds.then_some((beyond - ulp).max(0.0) / unit.max(f32::MIN_POSITIVE))
 }
 
 #[test]
-fn boxes_in_few_bits_are_tight_and_hold_what_they_should() {
+fn quantized_boxes_are_tight_and_conservative() {
     let along_x = |low: f32, high: f32| Bounds { min: Vec3::new(low, 0.0, 0.0), max: Vec3::new(high, 1.0, 1.0) };
     let mut random = Random(3);
     for corner in [0.0, 1.0, -1.0, 1e6, -1e6, 1e18] {
@@ -185,26 +187,26 @@ fn boxes_in_few_bits_are_tight_and_hold_what_they_should() {
                 let node = BvhNode::new(&[given, all], &[1, 1], 0, 0);
                 let what = format!("{given:?} in {all:?}");
                 assert!(looseness(&node, given).is_some_and(|units| units <= 1.0), "{what}");
-                // No more units than eight bits count, and half of these are needed.
+                // Eight bits suffice for the units, and at least half of the range is used.
                 let reach = (all.max.x - corner) / f32::from_bits((node.grid[3] & 0xff) << 23).max(f32::MIN_POSITIVE);
                 let counts = (127.0..=255.0).contains(&reach) || extent < 1e-36 || extent < corner.abs() * 1e-4;
                 assert!(counts, "{reach} units in {what}");
             }
         }
     }
-    // Control: a lower bound one unit higher leaves something out.
+    // Control: a lower bound one unit higher excludes part of the given box.
     let (given, all) = (along_x(0.3, 0.6), along_x(0.0, 1.0));
     let node = BvhNode::new(&[given, all], &[1, 1], 0, 0);
     let higher = BvhNode { low: [node.low[0] + 1, node.low[1], node.low[2], node.low[3]], ..node };
     assert!(looseness(&node, given).is_some() && looseness(&higher, given).is_none());
 }
 
-/// Negative control: a box that has shrunk, and a primitive that is listed twice, are found.
+/// Control: a shrunken box and a duplicate primitive are found.
 #[test]
 fn a_shrunken_box_is_found() {
     let mut bvh = Bvh::build(&random_scene(3000, 200, 0.1, 1));
     let whole = bvh.clone();
-    // The first child's box, along all axes, ends where it begins.
+    // Collapses the box of the first child to its lower corner on all axes.
     for axis in 0..3 {
         bvh.nodes[0].high[axis] = (bvh.nodes[0].high[axis] & !0xff) | (bvh.nodes[0].low[axis] & 0xff);
     }
@@ -215,15 +217,16 @@ fn a_shrunken_box_is_found() {
     assert!(fault(&twice).is_some());
 }
 
-/// Triangles that grow by a factor from one corner: the area heuristic peels one off at each level.
+/// Triangles that grow by a factor from one corner: the area heuristic splits off one at each
+/// level.
 #[test]
-fn what_is_postponed_stays_within_the_stack() {
+fn deferred_children_fit_on_the_stack() {
     let mut scene = Scene::default();
     for i in 0..4000 {
         let s = 1.02_f32.powi(i - 2000);
         scene.triangles.push(triangle([Vec3::ZERO, Vec3::new(s, 0.0, s), Vec3::new(0.0, s, s)]));
     }
-    let deep = super::build_binary(&Bvh::build(&scene).primitives.iter().map(bounds).collect::<Vec<_>>());
+    let deep = build_binary(&Bvh::build(&scene).primitives.iter().map(bounds).collect::<Vec<_>>());
     assert!(
         super::convert::height(&deep) > super::convert::MAX_HEIGHT as usize,
         "the scene must need the limit: {}",
@@ -236,7 +239,7 @@ fn what_is_postponed_stays_within_the_stack() {
 
 #[test]
 fn same_tree_on_any_number_of_threads() {
-    // Doubled triangles give equal keys to whatever sorts.
+    // Duplicate triangles give the sorts equal keys.
     let mut scene = random_scene(30_000, 0, 0.01, 3);
     scene.triangles.extend_from_within(..);
     let on = |threads: usize| {
@@ -246,13 +249,13 @@ fn same_tree_on_any_number_of_threads() {
     let (one, four) = (on(1), on(4));
     assert_eq!(one.nodes, four.nodes);
     assert_eq!(one.primitives, four.primitives);
-    // Negative control: another scene gives another tree.
+    // Control: another scene gives another tree.
     scene.triangles[0].positions[0].x += 1.0;
     assert_ne!(one.nodes, Bvh::build(&scene).nodes);
 }
 
 #[test]
-fn flat_and_smooth_triangles_are_told_apart() {
+fn flat_and_smooth_triangles_are_distinguished() {
     let mut scene = random_scene(1, 1, 1.0, 5);
     assert_eq!(Bvh::build(&scene).normals.iter().map(|n| n.flat_shaded).sum::<u32>(), 1);
     scene.triangles[0].normals[1] = (scene.triangles[0].normals[1] + Vec3::splat(0.01)).normalize();

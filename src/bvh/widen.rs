@@ -1,13 +1,13 @@
-//! From a binary tree to nodes of up to [`WIDTH`] children.
+//! Collapse of a binary tree into nodes of up to [`WIDTH`] children.
 
 use super::{BvhChild, WIDTH, convert::Binary, convert::MAX_HEIGHT};
 use crate::layout::{BVH_STACK, BvhNode};
 use crate::scene::Bounds;
 
-// Two levels of the binary tree make one here, which postpones all children but one.
-const _: () = assert!(most_postponed(MAX_HEIGHT) <= BVH_STACK as u32 && WIDTH == 4);
+// Two levels of the binary tree make one wide node, which defers all children but one.
+const _: () = assert!(max_deferred(MAX_HEIGHT) <= BVH_STACK as u32 && WIDTH == 4);
 
-/// Nodes, parents before children, and the primitives' indices in the order of the leaves.
+/// Returns the nodes, parents before children, and the primitive indices in leaf order.
 pub(super) fn widen(binary: &Binary) -> (Vec<BvhNode>, Vec<u32>) {
     let mut widener = Widener {
         binary,
@@ -19,7 +19,7 @@ pub(super) fn widen(binary: &Binary) -> (Vec<BvhNode>, Vec<u32>) {
     (widener.nodes, widener.order)
 }
 
-/// Interior nodes on the longest way down from each.
+/// Height of the subtree of each node: interior nodes on the longest path down.
 fn heights(binary: &Binary) -> Vec<u32> {
     let mut heights = vec![1; binary.nodes.len()];
     for (i, children) in binary.nodes.iter().enumerate().rev() {
@@ -29,8 +29,9 @@ fn heights(binary: &Binary) -> Vec<u32> {
     heights
 }
 
-/// Children that are postponed at most in a binary tree of a height, if two of its levels are always joined.
-const fn most_postponed(height: u32) -> u32 {
+/// Maximum number of deferred children below a binary subtree of the given height, if two of its
+/// levels are always collapsed.
+const fn max_deferred(height: u32) -> u32 {
     (WIDTH as u32 - 1) * height.div_ceil(2)
 }
 
@@ -42,10 +43,11 @@ struct Widener<'a> {
 }
 
 impl Widener<'_> {
-    /// Writes a node of the binary tree, and all below it, to place `at`; `room` more children may be postponed.
+    /// Writes a node of the binary tree to slot `at`, and all nodes below it. `room` is the number
+    /// of children that may still be deferred.
     fn node(&mut self, at: usize, index: usize, room: u32) {
         let mut children = self.opened_by_area(index);
-        let fits = |child: &BvhChild| self.postponed_below(child) + children.len() as u32 - 1 <= room;
+        let fits = |child: &BvhChild| self.deferred_below(child) + children.len() as u32 - 1 <= room;
         if !children.iter().all(fits) {
             children = self.opened_by_level(index);
         }
@@ -66,11 +68,12 @@ impl Widener<'_> {
         }
     }
 
-    fn postponed_below(&self, child: &BvhChild) -> u32 {
-        if child.count > 0 { 0 } else { most_postponed(self.heights[child.first as usize]) }
+    fn deferred_below(&self, child: &BvhChild) -> u32 {
+        if child.count > 0 { 0 } else { max_deferred(self.heights[child.first as usize]) }
     }
 
-    /// Children of a node, the largest of them replaced by its own as long as there is place: most rays enter it.
+    /// Children of a node. Replaces the child of the largest area by its own children while there
+    /// is room: most rays enter it.
     fn opened_by_area(&self, index: usize) -> Vec<BvhChild> {
         let mut children = self.binary.nodes[index].to_vec();
         while children.len() < WIDTH {
@@ -83,7 +86,7 @@ impl Widener<'_> {
         children
     }
 
-    /// The children's children.
+    /// Grandchildren of a node; a leaf stays as it is.
     fn opened_by_level(&self, index: usize) -> Vec<BvhChild> {
         let open = |child: &BvhChild| {
             if child.count > 0 { vec![*child] } else { self.binary.nodes[child.first as usize].to_vec() }

@@ -5,7 +5,7 @@ use std::{collections::HashSet, io, path::Path, time::Instant};
 use caustica::{
     Error, Result,
     gpu::Gpu,
-    image::{Frame, Origin, write_exr, write_file, write_png},
+    image::{Frame, Provenance, write_exr, write_file, write_png},
     progress::{Progress, Stage},
     renderer,
     scene::Scene,
@@ -93,7 +93,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
 /// Why a kd-tree's picture differs from the default one.
 pub(super) const RAW_NOTE: &str = "the kd-tree is the report's: the estimate is raw, as with --raw-estimate";
 
-fn write_picture(path: &Path, frame: &Frame, origin: &Origin, args: &RenderArgs) -> Result<()> {
+fn write_picture(path: &Path, frame: &Frame, origin: &Provenance, args: &RenderArgs) -> Result<()> {
     match extension(path).as_str() {
         "png" => write_png(path, frame, args.options.shared.exposure, args.options.shared.tonemap.into()),
         _ => write_exr(path, frame, origin),

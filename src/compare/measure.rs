@@ -1,6 +1,5 @@
 //! What is counted over the queries of a comparison.
 
-use super::sides::GridAnswer;
 use crate::{
     layout::{Gathered, VisiblePoint},
     reference::{Estimate, KdMap, TIE, are_tied, mix},
@@ -9,6 +8,12 @@ use crate::{
 
 /// Photons of one tie that are looked into at most.
 const MOST_TIED: usize = 16;
+
+/// What the grid found at each point of a tile.
+pub(super) struct GridAnswer {
+    pub gathered: Vec<Gathered>,
+    pub radiance: Vec<[f32; 4]>,
+}
 
 /// Counts and differences over all queries so far. A query is one visible point and one map.
 #[derive(Clone, Debug, Default)]

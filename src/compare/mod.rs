@@ -19,13 +19,12 @@ pub use crate::reference::TIE;
 use crate::{
     error::{Error, Result},
     gpu::Gpu,
-    image::{Frame, Origin, Tonemap, write_exr, write_file, write_png},
-    layout::VisiblePoint,
+    image::{Frame, Provenance, Tonemap, write_exr, write_file, write_png},
     passes::Tile,
     progress::{Progress, Stage},
-    renderer::{CameraPass, Session},
+    renderer::{self, CameraPass, Gatherer, Session, finish_stats},
     scene::Scene,
-    settings::{Search, Settings},
+    settings::{EstimateSettings, Search, Settings},
     stats::Stats,
 };
 use measure::{Histogram, Measure};
@@ -88,42 +87,31 @@ pub fn compare(
     progress: &dyn Progress,
 ) -> Result<Comparison> {
     check(settings, options)?;
-    let session = Session::open(gpu, scene, settings, progress)?;
-    let maps = session.photon_maps(settings, progress)?;
-    let mut stats = maps.stats().clone();
-    let pass = CameraPass::new(&session, settings)?;
+    renderer::check(scene, settings)?;
+    let session = Session::open(gpu, scene, &settings.lights, progress)?;
+    let maps = session.photon_maps(&settings.photons, progress)?;
     let mut sides = Sides {
         grid: GridGather::new(gpu, maps.maps())?,
         kdtree: KdTreeGather::new(gpu, maps.maps(), settings)?,
         measure: Measure::default(),
+        sabotage: options.sabotage,
+        radiance: Default::default(),
     };
-    let (mut grid, mut kdtree) = (pass.film(), pass.film());
-    let mut sabotage = options.sabotage;
-    let tiles = pass.tracer.tiles();
-    for (done, tile) in tiles.iter().enumerate() {
-        progress.check()?;
-        progress.report(Stage::Compare, done as u64, tiles.len() as u64);
-        pass.trace(tile, &mut stats)?;
-        let points = pass.points(tile)?;
-        sabotage -= sides.kdtree.leave_out(sabotage, &points);
-        let [grid_radiance, kdtree_radiance] = sides.gather(&pass, tile, &points, progress)?;
-        pass.set_radiance(&grid_radiance);
-        pass.resolve(tile, &mut grid)?;
-        pass.set_radiance(&kdtree_radiance);
-        pass.resolve(tile, &mut kdtree)?;
-    }
-    progress.report(Stage::Compare, tiles.len() as u64, tiles.len() as u64);
-    let Sides { grid: grid_side, kdtree: kdtree_side, measure } = sides;
-    stats.seconds.gather = grid_side.seconds + kdtree_side.seconds;
-    session.close(&mut stats);
+    // Each point is gathered: no estimates are shared.
+    let estimate = EstimateSettings { share_reach: 0.0, ..settings.estimate.clone() };
+    let (films, mut stats) =
+        session.films(&maps, &estimate, &settings.picture, (&mut sides, Stage::Compare), progress)?;
+    let [grid, kdtree] = [0, 1].map(|side: usize| films[side].finish());
+    stats.seconds.gather = sides.grid.seconds + sides.kdtree.seconds;
+    finish_stats(gpu, &mut stats);
     Ok(Comparison {
-        report: Report::new(&measure, &grid_side, &kdtree_side, &stats),
-        grid: grid.finish(settings.picture.spp),
-        kdtree: kdtree.finish(settings.picture.spp),
+        report: Report::new(&sides.measure, &sides.grid, &sides.kdtree, &stats),
+        grid,
+        kdtree,
         stats,
         tolerance: options.tolerance,
-        different: measure.different,
-        histogram: measure.histogram,
+        different: sides.measure.different,
+        histogram: sides.measure.histogram,
     })
 }
 
@@ -132,25 +120,25 @@ struct Sides<'a> {
     grid: GridGather<'a>,
     kdtree: KdTreeGather<'a>,
     measure: Measure,
+    /// Photons that the kd-tree has yet to leave out.
+    sabotage: u32,
+    /// Radiance of the tile's points by the grid and by the kd-tree.
+    radiance: [Vec<[f32; 4]>; 2],
 }
 
-impl Sides<'_> {
-    /// Gathers the tile's points over all maps by both; the radiance of the points by the grid and by the kd-tree, on top of
-    /// what they have.
-    fn gather(
-        &mut self,
-        pass: &CameraPass,
-        tile: &Tile,
-        points: &[VisiblePoint],
-        progress: &dyn Progress,
-    ) -> Result<[Vec<[f32; 4]>; 2]> {
+impl Gatherer for Sides<'_> {
+    /// Gathers the tile's points over all maps by both.
+    fn gather(&mut self, pass: &CameraPass, tile: &Tile, _: &mut Stats, progress: &dyn Progress) -> Result<()> {
+        let points = pass.points(tile)?;
+        self.sabotage -= self.kdtree.leave_out(self.sabotage, &points);
         let mut by_grid = pass.radiance(tile)?;
         let mut by_kdtree = by_grid.clone();
         for map in 0..self.grid.maps.len() {
             let ours = self.grid.gather(map, pass, tile, progress)?;
-            let theirs = self.kdtree.gather(map, points, progress)?;
-            self.measure
-                .add(points, &ours, &theirs, |i, gathered| self.kdtree.explains(map, &points[i], &theirs[i], gathered));
+            let theirs = self.kdtree.gather(map, &points, progress)?;
+            self.measure.add(&points, &ours, &theirs, |i, gathered| {
+                self.kdtree.explains(map, &points[i], &theirs[i], gathered)
+            });
             for i in 0..points.len() {
                 for c in 0..3 {
                     by_grid[i][c] += ours.radiance[i][c];
@@ -158,7 +146,16 @@ impl Sides<'_> {
                 }
             }
         }
-        Ok([by_grid, by_kdtree])
+        self.radiance = [by_grid, by_kdtree];
+        Ok(())
+    }
+
+    fn pictures(&self) -> usize {
+        2
+    }
+
+    fn show(&mut self, picture: usize, pass: &CameraPass) {
+        pass.set_radiance(&self.radiance[picture]);
     }
 }
 
@@ -210,7 +207,7 @@ impl Comparison {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn write(&self, folder: &Path, origin: &Origin, exposure: f32, tonemap: Tonemap) -> Result<()> {
+    pub fn write(&self, folder: &Path, origin: &Provenance, exposure: f32, tonemap: Tonemap) -> Result<()> {
         let place = |name: &str| folder.join(name);
         write_exr(&place("grid.exr"), &self.grid, origin)?;
         write_exr(&place("kdtree.exr"), &self.kdtree, origin)?;

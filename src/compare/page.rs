@@ -8,7 +8,7 @@ use super::{Comparison, measure::Histogram, report::grouped};
 use crate::{
     error::{Error, Result},
     html::{escaped, filled},
-    image::{Frame, Origin, Tonemap, encode_png},
+    image::{Frame, Provenance, Tonemap, encode_png},
 };
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -18,7 +18,7 @@ const PIXELATED_BELOW: u32 = 300;
 /// The page; `difference` is the PNG of the difference.
 pub(super) fn page(
     comparison: &Comparison,
-    origin: &Origin,
+    origin: &Provenance,
     exposure: f32,
     tonemap: Tonemap,
     difference: &[u8],
@@ -58,7 +58,7 @@ pub(super) fn page(
     ))
 }
 
-fn subtitle(comparison: &Comparison, origin: &Origin) -> String {
+fn subtitle(comparison: &Comparison, origin: &Provenance) -> String {
     let (settings, photons) = (origin.settings, &comparison.stats.photons);
     let environment = origin.environment.map_or(String::new(), |environment| format!(" under {}", environment.name));
     format!(

@@ -19,8 +19,10 @@ const SCALE: u32 = 50;
 
 /// Radiance of the grid minus that of the kd-tree; all else is that of the grid's picture.
 pub(super) fn difference(grid: &Frame, kdtree: &Frame) -> Frame {
-    let minus = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| a[c] - b[c]);
-    Frame { radiance: grid.radiance.iter().zip(&kdtree.radiance).map(minus).collect(), ..grid.clone() }
+    let mut difference = grid.clone();
+    let pixels = difference.radiance_mut().iter_mut().zip(kdtree.radiance());
+    pixels.for_each(|(a, b)| (0..3).for_each(|c| a[c] -= b[c]));
+    difference
 }
 
 /// Relative difference of each pixel's worst channel, in false colours over a logarithmic scale; a PNG file.
@@ -29,7 +31,7 @@ pub(super) fn false_colors(grid: &Frame, kdtree: &Frame) -> Result<Vec<u8>> {
     let (width, height) = (grid.width * zoom, grid.height * zoom);
     let mut canvas = Canvas::new(width.max(WIDTH), height + SCALE, PAPER);
     let left = (canvas.width() - width) / 2;
-    for (i, (a, b)) in (0..).zip(grid.radiance.iter().zip(&kdtree.radiance)) {
+    for (i, (a, b)) in (0..).zip(grid.radiance().iter().zip(kdtree.radiance())) {
         let worst = (0..3).map(|c| relative(a[c].into(), b[c].into())).fold(0.0, f64::max);
         let corner = (left + i % grid.width * zoom, i / grid.width * zoom);
         canvas.fill(corner, (zoom, zoom), color(worst));
@@ -80,17 +82,12 @@ mod tests {
 
     #[test]
     fn the_picture_stands_above_its_scale() {
-        let frame = |values: [f32; 2]| Frame {
-            width: 2,
-            height: 1,
-            radiance: values.map(|v| [v; 3]).to_vec(),
-            ..Frame::default()
-        };
+        let frame = |values: [f32; 2]| Frame::new(2, 1, &values.map(|v| [v; 3]));
         let png = false_colors(&frame([1.0, 1.0]), &frame([1.0, 0.99])).unwrap();
         let picture = image::load_from_memory(&png).unwrap().into_rgb8();
         assert_eq!(picture.dimensions(), (WIDTH, WIDTH / 2 + SCALE));
         assert_eq!(picture.get_pixel(10, 10).0, [0; 3]);
         assert_eq!(picture.get_pixel(WIDTH - 10, 10).0, color(relative(1.0, 0.99_f32.into())));
-        assert_eq!(difference(&frame([1.0, 3.0]), &frame([1.0, 2.0])).radiance, [[0.0; 3], [1.0; 3]]);
+        assert_eq!(difference(&frame([1.0, 3.0]), &frame([1.0, 2.0])).radiance(), [[0.0; 3], [1.0; 3]]);
     }
 }

@@ -1,5 +1,6 @@
 //! The two sides of a comparison, each with its clock.
 
+use super::measure::{GridAnswer, explained_by_ties};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu},
@@ -26,12 +27,6 @@ pub(super) struct GridGather<'a> {
     pub build_seconds: f64,
     /// Seconds of all gathers, without reading back.
     pub seconds: f64,
-}
-
-/// What the grid found at each point of a tile.
-pub(super) struct GridAnswer {
-    pub gathered: Vec<Gathered>,
-    pub radiance: Vec<[f32; 4]>,
 }
 
 impl<'a> GridGather<'a> {
@@ -159,7 +154,7 @@ impl<'a> KdTreeGather<'a> {
 
     /// Whether the photons that the grid summed differ from those of the estimate in tied ones only.
     pub fn explains(&self, map: usize, point: &VisiblePoint, estimate: &Estimate, gathered: &Gathered) -> bool {
-        super::measure::explained_by_ties(&self.maps[map], point, self.settings, estimate, gathered)
+        explained_by_ties(&self.maps[map], point, self.settings, estimate, gathered)
     }
 
     /// Memory of the photons and the trees, bytes.

@@ -18,7 +18,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     layout::{self, LightChoice},
-    scene::{LEAST_FALLOFF, LUMENS_PER_WATT, LightKind, Scene},
+    scene::{LUMENS_PER_WATT, LightKind, MIN_FALLOFF, Scene},
     settings::{LightSampling, LightSettings, LightUnit},
 };
 
@@ -166,7 +166,7 @@ impl LightTable {
             LightKind::Point => (layout::POINT_LIGHT, "point", Vec3::ZERO),
             LightKind::Spot { inner, outer } => {
                 let height = 1.0 - f64::from(outer).cos();
-                let width = (f64::from(inner).cos() - f64::from(outer).cos()).max(f64::from(LEAST_FALLOFF));
+                let width = (f64::from(inner).cos() - f64::from(outer).cos()).max(f64::from(MIN_FALLOFF));
                 (layout::SPOT_LIGHT, "spot", Vec3::new(height as f32, width as f32, 0.0))
             }
             LightKind::Directional => (layout::DIRECTIONAL_LIGHT, "directional", Vec3::ZERO),

@@ -1,5 +1,6 @@
 //! Finding adapters and choosing one.
 
+use super::shaders;
 use crate::error::{Error, Result};
 
 /// One adapter of this machine and whether it can be used.
@@ -17,9 +18,6 @@ pub struct AdapterReport {
     pub unusable: Option<String>,
     pub(super) adapter: wgpu::Adapter,
 }
-
-/// Storage buffers that the largest kernel binds.
-pub const NEEDED_STORAGE_BUFFERS: u32 = 14;
 
 /// All adapters, best first: real GPUs before software, discrete before integrated, usable before others.
 #[must_use]
@@ -86,14 +84,7 @@ fn report(adapter: wgpu::Adapter) -> AdapterReport {
         wgpu::DeviceType::Cpu => "software",
         wgpu::DeviceType::Other => "other",
     };
-    let needs = [
-        ("storage buffers per shader stage", limits.max_storage_buffers_per_shader_stage, NEEDED_STORAGE_BUFFERS),
-        ("invocations per workgroup", limits.max_compute_invocations_per_workgroup, crate::layout::WORKGROUP_SIZE),
-    ];
-    let unusable = needs
-        .iter()
-        .find(|(_, has, needed)| has < needed)
-        .map(|(what, has, needed)| format!("it has {has} {what}, {needed} are needed"));
+    let unusable = missing(&limits, &shaders::needs());
     let subgroup = match adapter.features().contains(wgpu::Features::SUBGROUP) {
         true => (info.subgroup_min_size, info.subgroup_max_size),
         false => (0, 0),
@@ -104,8 +95,24 @@ fn report(adapter: wgpu::Adapter) -> AdapterReport {
     AdapterReport { name: info.name, driver, backend, kind, limits, subgroup, unusable, adapter }
 }
 
+/// Which of the limits that some kernel reaches is too low, if one is.
+fn missing(has: &wgpu::Limits, needs: &wgpu::Limits) -> Option<String> {
+    let each = |l: &wgpu::Limits| {
+        [
+            ("storage buffers per shader stage", l.max_storage_buffers_per_shader_stage),
+            ("uniform buffers per shader stage", l.max_uniform_buffers_per_shader_stage),
+            ("sampled textures per shader stage", l.max_sampled_textures_per_shader_stage),
+            ("bind groups", l.max_bind_groups),
+            ("invocations per workgroup", l.max_compute_invocations_per_workgroup),
+        ]
+    };
+    let all = each(has).into_iter().zip(each(needs));
+    let mut lacking = all.filter(|((_, has), (_, needed))| has < needed);
+    lacking.next().map(|((what, has), (_, needed))| format!("it has {has} {what}, {needed} are needed"))
+}
+
 /// Invocations that share what they load; the smallest subgroup that the kernels work with.
-const NEEDED_SUBGROUP: u32 = 8;
+const NEEDED_SUBGROUP: u32 = 4;
 
 /// Why subgroups of so many invocations, or none at all, do not do.
 fn no_subgroups(least: u32) -> Option<String> {
@@ -121,9 +128,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn each_limit_that_a_kernel_exceeds_is_named() {
+        let needs = shaders::needs();
+        assert_eq!(missing(&needs, &needs), None, "control: just enough");
+        let less = |change: &dyn Fn(&mut wgpu::Limits) -> &mut u32| {
+            let mut has = needs.clone();
+            let limit = change(&mut has);
+            *limit -= 1;
+            let had = *limit;
+            missing(&has, &needs).is_some_and(|why| why.contains(&format!("it has {had} ")))
+        };
+        assert!(less(&|l| &mut l.max_storage_buffers_per_shader_stage));
+        assert!(less(&|l| &mut l.max_uniform_buffers_per_shader_stage));
+        assert!(less(&|l| &mut l.max_sampled_textures_per_shader_stage));
+        assert!(less(&|l| &mut l.max_bind_groups));
+        assert!(less(&|l| &mut l.max_compute_invocations_per_workgroup));
+    }
+
+    #[test]
     fn small_subgroups_are_refused() {
         assert!(no_subgroups(0).is_some_and(|why| why.contains("lacks subgroup operations")));
-        assert!(no_subgroups(4).is_some_and(|why| why.contains("4 invocations")));
-        assert!(no_subgroups(8).is_none() && no_subgroups(32).is_none());
+        assert!(no_subgroups(2).is_some_and(|why| why.contains("2 invocations")));
+        assert!(no_subgroups(4).is_none() && no_subgroups(32).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! Buffers that count the device memory they take.
+//! Buffers, and the count of the device memory that these and tables take.
 
 use std::{
     ops::Deref,
@@ -8,7 +8,7 @@ use std::{
     },
 };
 
-/// Bytes of all live buffers, now and at most.
+/// Bytes of all live buffers and tables, now and at most.
 #[derive(Debug)]
 pub struct MemoryCount {
     now: AtomicU64,
@@ -28,7 +28,11 @@ impl MemoryCount {
         self.peak.fetch_max(now, Ordering::Relaxed);
     }
 
-    /// Bytes of the buffers alive now.
+    pub(super) fn subtract(&self, bytes: u64) {
+        self.now.fetch_sub(bytes, Ordering::Relaxed);
+    }
+
+    /// Bytes of the buffers and tables alive now.
     #[must_use]
     pub fn now(&self) -> u64 {
         self.now.load(Ordering::Relaxed)
@@ -73,6 +77,6 @@ impl Deref for Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        self.memory.now.fetch_sub(self.inner.size(), Ordering::Relaxed);
+        self.memory.subtract(self.inner.size());
     }
 }

@@ -3,8 +3,8 @@
 use std::sync::{Arc, OnceLock};
 
 use super::{
-    Buffer, Commands, Gpu,
-    shaders::{BindingKind, Shader, shader},
+    Buffer, Commands, Gpu, Table,
+    shaders::{BindingKind, SHADERS, Shader, shader},
 };
 
 /// The bind group that says which part of a dispatch runs: owned here, filled for each dispatch (`shaders/bindings/dispatch.wesl`).
@@ -12,7 +12,11 @@ const PART_GROUP: u32 = 3;
 
 /// A compute kernel. Several that are equal share what was compiled.
 #[derive(Clone, Debug)]
-pub struct Kernel(Arc<Program>);
+pub struct Kernel {
+    program: Arc<Program>,
+    /// Those of which its dispatches read, by the names of the shader's variables.
+    tables: Vec<(&'static str, Table)>,
+}
 
 /// The buffers of one dispatch, one bind group per group that the kernel uses.
 #[derive(Debug)]
@@ -87,11 +91,11 @@ impl Program {
 }
 
 impl Kernel {
-    /// The kernel `stem`, which other threads begin to compile; `overrides` sets its `override` constants. Names that this
-    /// kernel does not have are passed over, so that one list serves several kernels.
+    /// The kernel `stem`, which other threads begin to compile; `overrides` sets its `override` constants. Names that only
+    /// other kernels have are passed over, so that one list serves several kernels.
     ///
     /// # Panics
-    /// If no kernel has that stem.
+    /// If no kernel has that stem, or none a constant of one of the names.
     #[must_use]
     pub fn new(gpu: &Gpu, stem: &str, overrides: &[(&str, f64)]) -> Self {
         Self::of(gpu, shader(stem), overrides)
@@ -101,42 +105,61 @@ impl Kernel {
     #[doc(hidden)]
     #[must_use]
     pub fn of(gpu: &Gpu, shader: &'static Shader, overrides: &[(&str, f64)]) -> Self {
-        let value = |name: &str| overrides.iter().find(|(n, _)| *n == name).map(|(_, value)| *value);
+        for (name, _) in overrides {
+            let is_known = SHADERS.iter().chain([shader]).any(|s| s.overrides.contains(name));
+            assert!(is_known, "{}: no kernel has an override {name}", shader.stem);
+        }
+        let of_device = [("LANES", f64::from(gpu.lanes))];
+        let value = |name: &str| overrides.iter().chain(&of_device).find(|(n, _)| *n == name).map(|(_, value)| *value);
         let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();
-        Self(gpu.compiler.program(&gpu.device, &gpu.parts.layout, shader, constants))
+        let program = gpu.compiler.program(&gpu.device, &gpu.parts.layout, shader, constants);
+        Self { program, tables: Vec::new() }
     }
 
-    /// Binds buffers by the names of the shader's variables. Names that this kernel does not use are passed over, so
+    /// The kernel with tables for all its dispatches. Names that only other kernels use are passed over.
+    #[must_use]
+    pub fn with_tables(mut self, tables: &[(&'static str, &Table)]) -> Self {
+        let binds = |name: &str| self.program.shader.bindings.iter().any(|b| b.name == name);
+        let used = tables.iter().filter(|(name, _)| binds(name));
+        self.tables = used.map(|(name, table)| (*name, (*table).clone())).collect();
+        self
+    }
+
+    /// Binds buffers by the names of the shader's variables. Names that only other kernels use are passed over, so
     /// that one list serves several kernels.
     ///
     /// # Panics
-    /// If a variable of the kernel has no buffer in the list.
+    /// If a variable of the kernel has no buffer in the list, nor a table in [`Self::with_tables`], or no kernel has a variable of one of the names.
     #[must_use]
     pub fn bind(&self, gpu: &Gpu, buffers: &[(&str, &Buffer)]) -> Bindings {
+        for (name, _) in buffers {
+            let mut all = SHADERS.iter().chain([self.program.shader]);
+            let is_known = all.any(|s| s.bindings.iter().any(|b| b.name == *name));
+            assert!(is_known, "{}: no kernel binds {name}", self.program.shader.stem);
+        }
         let find = |name: &str| {
-            buffers
-                .iter()
-                .find(|(n, _)| *n == name)
-                .unwrap_or_else(|| panic!("{}: no buffer is bound to {name}", self.0.shader.stem))
-                .1
+            let buffer = buffers.iter().find(|(n, _)| *n == name).map(|(_, buffer)| buffer.as_entire_binding());
+            let table = self.tables.iter().find(|(n, _)| *n == name).map(|(_, table)| table.view());
+            let found = buffer.or(table.map(wgpu::BindingResource::TextureView));
+            found.unwrap_or_else(|| panic!("{}: nothing is bound to {name}", self.program.shader.stem))
         };
         let group = |(g, layout): (usize, &Option<wgpu::BindGroupLayout>)| {
             let entries: Vec<_> = self
-                .0
+                .program
                 .shader
                 .bindings
                 .iter()
                 .filter(|b| b.group as usize == g)
-                .map(|b| wgpu::BindGroupEntry { binding: b.index, resource: find(b.name).as_entire_binding() })
+                .map(|b| wgpu::BindGroupEntry { binding: b.index, resource: find(b.name) })
                 .collect();
             let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some(self.0.shader.stem),
+                label: Some(self.program.shader.stem),
                 layout: layout.as_ref()?,
                 entries: &entries,
             });
             Some((g as u32, bind_group))
         };
-        Bindings(self.0.compiled().layouts.iter().enumerate().filter_map(group).collect())
+        Bindings(self.program.compiled().layouts.iter().enumerate().filter_map(group).collect())
     }
 
     /// Runs `invocations` invocations, in workgroups of [`crate::layout::WORKGROUP_SIZE`] folded to two dimensions
@@ -154,13 +177,13 @@ impl Kernel {
 
     fn record(&self, commands: &mut Commands, bindings: &Bindings, most: u64, arguments: Option<&Buffer>) {
         let gpu = commands.gpu;
-        let stem = self.0.shader.stem;
+        let stem = self.program.shader.stem;
         let record = |pass: &mut wgpu::ComputePass<'_>, first: u64, invocations: u64| {
-            pass.set_pipeline(&self.0.compiled().pipeline);
+            pass.set_pipeline(&self.program.compiled().pipeline);
             for (group, bind_group) in &bindings.0 {
                 pass.set_bind_group(*group, bind_group, &[]);
             }
-            if self.0.can_be_cut() {
+            if self.program.can_be_cut() {
                 pass.set_bind_group(PART_GROUP, &gpu.parts.from(gpu, first), &[]);
             }
             match arguments {
@@ -172,7 +195,7 @@ impl Kernel {
                 }
             }
         };
-        match self.0.can_be_cut() {
+        match self.program.can_be_cut() {
             true => commands.dispatch(stem, most, record),
             false => {
                 assert_eq!(most, 1, "{stem}: a kernel without invocation_index is a single invocation");
@@ -225,8 +248,7 @@ fn starting_at(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, first: u64
     })
 }
 
-/// Workgroups per dimension that every adapter can dispatch.
-const MAX_WORKGROUPS: u64 = 65_535;
+const MAX_WORKGROUPS: u64 = crate::layout::MAX_WORKGROUPS as u64;
 
 /// Folds a count of workgroups to two dimensions; all rows but the last are full, none is needless.
 fn fold(workgroups: u64) -> (u32, u32) {
@@ -247,25 +269,26 @@ fn group_layout(device: &wgpu::Device, shader: &Shader, group: u32) -> Option<wg
 }
 
 fn layout_entry(binding: u32, kind: BindingKind) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty: match kind {
-                BindingKind::Uniform => wgpu::BufferBindingType::Uniform,
-                BindingKind::ReadOnly => wgpu::BufferBindingType::Storage { read_only: true },
-                BindingKind::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
-            },
-            has_dynamic_offset: false,
-            min_binding_size: None,
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let ty = match kind {
+        BindingKind::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+        BindingKind::ReadOnly => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+        BindingKind::ReadWrite => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+        BindingKind::Table => wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Uint,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
         },
-        count: None,
-    }
+    };
+    wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
+    use std::{
+        panic::{AssertUnwindSafe, catch_unwind},
+        sync::Arc,
+    };
 
     use super::{Kernel, fold};
     use crate::gpu::{Gpu, shaders::SHADERS};
@@ -274,13 +297,31 @@ mod tests {
     fn equal_kernels_are_compiled_once() {
         let gpu = Gpu::open(None).expect("tests need an adapter");
         let same = |a: &[(&str, f64)], b: &[(&str, f64)]| {
-            Arc::ptr_eq(&Kernel::new(&gpu, "gather", a).0, &Kernel::new(&gpu, "gather", b).0)
+            Arc::ptr_eq(&Kernel::new(&gpu, "gather", a).program, &Kernel::new(&gpu, "gather", b).program)
         };
-        assert!(same(&[("WINDOWS", 1.0)], &[("NOT_OF_THIS_KERNEL", 3.0), ("WINDOWS", 1.0)]));
+        assert!(same(&[("WINDOWS", 1.0)], &[("STACK_WORDS", 3.0), ("WINDOWS", 1.0)]));
         assert!(!same(&[("WINDOWS", 1.0)], &[("WINDOWS", 2.0)]), "control: constants matter");
         // Those that were asked for and never used hold up nobody.
         let all: Vec<_> = SHADERS.iter().map(|shader| Kernel::new(&gpu, shader.stem, &[])).collect();
         drop((gpu, all));
+    }
+
+    #[test]
+    fn names_that_no_kernel_has_are_bugs() {
+        let gpu = Gpu::open(None).expect("tests need an adapter");
+        let buffer = gpu.storage::<u32>("anything", 1).expect("fits");
+        let message = |what: &dyn Fn()| {
+            let panic = catch_unwind(AssertUnwindSafe(what)).expect_err("it panics");
+            panic.downcast::<String>().map_or_else(|_| String::new(), |text| *text)
+        };
+        let kernel = Kernel::new(&gpu, "merge_bounds", &[("WINDOWS", 1.0)]);
+        let wrong_override = message(&|| drop(Kernel::new(&gpu, "merge_bounds", &[("WINDOW", 1.0)])));
+        assert_eq!(wrong_override, "merge_bounds: no kernel has an override WINDOW");
+        let name = kernel.program.shader.bindings[0].name;
+        let wrong_binding = message(&|| drop(kernel.bind(&gpu, &[(name, &buffer), ("photon", &buffer)])));
+        assert_eq!(wrong_binding, "merge_bounds: no kernel binds photon");
+        // Control: those of other kernels are passed over.
+        drop(kernel.bind(&gpu, &[(name, &buffer), ("points", &buffer)]));
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod fault;
 mod kernel;
 mod pace;
 pub mod shaders;
+mod table;
 mod timer;
 
 use std::{
@@ -24,6 +25,7 @@ pub use buffer::{Buffer, MemoryCount};
 pub use commands::Commands;
 pub use kernel::{Bindings, Kernel};
 pub use pace::{MOST_PER_DISPATCH, Pacing};
+pub use table::Table;
 
 use crate::{
     error::{Error, Result},
@@ -52,11 +54,16 @@ pub struct Gpu {
     parts: Parts,
     compiler: Compiler,
     dispatches: AtomicU64,
+    /// The kernels' override `LANES`.
+    lanes: u32,
 }
 
 /// How long the device may work on what was submitted before it counts as hung. Submissions are kept far shorter than
 /// that on GPUs; software works through all of them at the pace of its processor, and cannot hang.
 const HUNG_AFTER: Duration = Duration::from_secs(300);
+
+/// Lanes of a subgroup that share the parts of a cell at most, one each: as many as a cell has parts.
+const MOST_LANES: u32 = crate::layout::CELL_FAN;
 
 impl Gpu {
     /// Opens the adapter of that name or index, or the best one.
@@ -88,6 +95,7 @@ impl Gpu {
         .map_err(|e| Error::Device(format!("adapter {} cannot be opened: {e}", chosen.name)))?;
         let faults = Faults::of(&device);
         let (timer, parts) = (Timer::new(&device, &queue), Parts::new(&device));
+        let lanes = chosen.subgroup.0.min(MOST_LANES);
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);
         let (memory, dispatches) = (Arc::<MemoryCount>::default(), AtomicU64::new(0));
         // Memory of software is the host's, which gives more than it has and then ends the process.
@@ -107,6 +115,7 @@ impl Gpu {
             parts,
             compiler: Compiler::new(),
             dispatches,
+            lanes,
         })
     }
 
@@ -120,6 +129,12 @@ impl Gpu {
     #[must_use]
     pub fn max_binding(&self) -> u64 {
         self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size)
+    }
+
+    /// The most bytes that one [`Table`] of 16-byte texels can hold.
+    #[must_use]
+    pub fn max_table(&self) -> u64 {
+        16 * table::most_texels(&self.limits)
     }
 
     /// A zeroed storage buffer of `count` elements of `T` (at least one: a binding cannot be empty), which can be
@@ -165,25 +180,35 @@ impl Gpu {
 
     /// A buffer, or what hinders it.
     fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Result<Buffer> {
+        let inner = self.allot(label, size, || self.create_uncounted(label, size, usage))?;
+        Ok(Buffer { inner, memory: Arc::clone(&self.memory) })
+    }
+
+    /// Makes something that takes `size` bytes of the device's memory and counts them, or says that they are not there.
+    fn allot<T>(&self, label: &str, size: u64, create: impl FnOnce() -> T) -> Result<T> {
         let used = self.memory.now();
         let missing =
             || Error::Memory { what: label.to_string(), needed: Some(size), adapter: self.name.clone(), used };
         if size > self.memory.limit().saturating_sub(used) {
             return Err(missing());
         }
-        let buffer = self.create(label, size, usage);
-        if self.faults.take_missing_memory() { Err(missing()) } else { Ok(buffer) }
+        let created = create();
+        if self.faults.take_missing_memory() {
+            return Err(missing());
+        }
+        self.memory.add(size);
+        Ok(created)
     }
 
     fn create(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Buffer {
-        let inner = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage,
-            mapped_at_creation: false,
-        });
+        let inner = self.create_uncounted(label, size, usage);
         self.memory.add(size);
         Buffer { inner, memory: Arc::clone(&self.memory) }
+    }
+
+    fn create_uncounted(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let label = Some(label);
+        self.device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false })
     }
 
     /// Writes `data` from byte `offset` of the buffer on, before the next submission.

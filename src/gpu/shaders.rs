@@ -6,9 +6,11 @@ pub enum BindingKind {
     Uniform,
     ReadOnly,
     ReadWrite,
+    /// A texture that is read texel by texel.
+    Table,
 }
 
-/// One buffer that a kernel uses.
+/// One buffer or table that a kernel uses.
 #[derive(Clone, Copy, Debug)]
 pub struct Binding {
     pub group: u32,
@@ -28,10 +30,35 @@ pub struct Shader {
     /// Names of its `override` constants.
     pub overrides: &'static [&'static str],
     pub bindings: &'static [Binding],
+    /// Invocations of a workgroup.
+    pub workgroup_size: u32,
 }
 
 /// All kernels, sorted by stem.
 pub const SHADERS: &[Shader] = &include!(concat!(env!("OUT_DIR"), "/shader_table.rs"));
+
+impl Shader {
+    /// Bindings of a kind.
+    #[must_use]
+    pub fn bound(&self, kinds: &[BindingKind]) -> u32 {
+        self.bindings.iter().filter(|b| kinds.contains(&b.kind)).count() as u32
+    }
+}
+
+/// What the kernels ask of a device beyond the usual limits: of each kind the most that one of them uses.
+#[must_use]
+pub fn needs() -> wgpu::Limits {
+    let most = |of: &dyn Fn(&Shader) -> u32| SHADERS.iter().map(of).max().unwrap_or(0);
+    let groups = |s: &Shader| s.bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
+    wgpu::Limits {
+        max_bind_groups: most(&groups),
+        max_storage_buffers_per_shader_stage: most(&|s| s.bound(&[BindingKind::ReadOnly, BindingKind::ReadWrite])),
+        max_uniform_buffers_per_shader_stage: most(&|s| s.bound(&[BindingKind::Uniform])),
+        max_sampled_textures_per_shader_stage: most(&|s| s.bound(&[BindingKind::Table])),
+        max_compute_invocations_per_workgroup: most(&|s| s.workgroup_size),
+        ..wgpu::Limits::default()
+    }
+}
 
 /// The kernel of that stem.
 ///
@@ -40,4 +67,41 @@ pub const SHADERS: &[Shader] = &include!(concat!(env!("OUT_DIR"), "/shader_table
 #[must_use]
 pub fn shader(stem: &str) -> &'static Shader {
     SHADERS.iter().find(|s| s.stem == stem).unwrap_or_else(|| panic!("no kernel {stem} in shaders/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What of the kernels exceeds what nearly every device has, a line each.
+    fn not_portable(shaders: &[Shader]) -> Vec<String> {
+        let line = |s: &Shader| {
+            let counts = [
+                ("storage buffers", s.bound(&[BindingKind::ReadOnly, BindingKind::ReadWrite]), 10),
+                ("uniform buffers", s.bound(&[BindingKind::Uniform]), 4),
+                ("textures", s.bound(&[BindingKind::Table]), 16),
+                ("invocations", s.workgroup_size, 256),
+            ];
+            let over = counts.into_iter().filter(|(_, has, most)| has > most);
+            over.map(|(what, has, most)| format!("{}: {has} {what}, at most {most}", s.stem)).collect::<Vec<_>>()
+        };
+        shaders.iter().flat_map(line).collect()
+    }
+
+    #[test]
+    fn kernels_are_portable() {
+        assert_eq!(not_portable(SHADERS), Vec::<String>::new());
+        // Control: the kernel that binds most, with one more of each kind.
+        let most = *shader("trace_camera");
+        let more = |kind, count| {
+            let extra = (0..count).map(|index| Binding { group: 2, index: 100 + index, name: "more", kind });
+            let bindings: Vec<_> = most.bindings.iter().copied().chain(extra).collect();
+            not_portable(&[Shader { bindings: bindings.leak(), ..most }])
+        };
+        assert_eq!(more(BindingKind::ReadOnly, 1), ["trace_camera: 11 storage buffers, at most 10"]);
+        assert_eq!(more(BindingKind::Uniform, 2), ["trace_camera: 5 uniform buffers, at most 4"]);
+        assert_eq!(more(BindingKind::Table, 12), ["trace_camera: 17 textures, at most 16"]);
+        let large = Shader { workgroup_size: 512, ..most };
+        assert_eq!(not_portable(&[large]), ["trace_camera: 512 invocations, at most 256"]);
+    }
 }

@@ -1,4 +1,4 @@
-//! An 8-bit picture to draw and write on: scales, legends, captions.
+//! 8-bit canvas for drawing and text: colour scales, legends, captions.
 
 use std::{convert::Infallible, io};
 
@@ -13,10 +13,10 @@ use embedded_graphics::{
 
 use super::png::encode_rgb8;
 
-/// Colour in sRGB, 0 to 255 a channel.
+/// sRGB colour, 0 to 255 per channel.
 pub type Rgb8 = [u8; 3];
 
-/// An sRGB picture of 8 bits a channel, row 0 at the top. What is drawn outside it is cut off.
+/// sRGB picture with 8 bits per channel, row 0 at the top. Drawing outside it is clipped.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Canvas {
     width: u32,
@@ -25,7 +25,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A picture of one colour.
+    /// Creates a canvas of one colour.
     #[must_use]
     pub fn new(width: u32, height: u32, color: Rgb8) -> Self {
         Self { width, height, pixels: color.repeat(width as usize * height as usize) }
@@ -49,7 +49,7 @@ impl Canvas {
         }
     }
 
-    /// The colour of a pixel inside the picture.
+    /// Colour of a pixel; `None` outside the canvas.
     #[must_use]
     pub fn get(&self, x: u32, y: u32) -> Option<Rgb8> {
         let inside = x < self.width && y < self.height;
@@ -57,7 +57,7 @@ impl Canvas {
         inside.then(|| [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]])
     }
 
-    /// Fills the rectangle of that corner and size.
+    /// Fills the rectangle with the given upper left corner and size.
     pub fn fill(&mut self, (x, y): (u32, u32), (width, height): (u32, u32), color: Rgb8) {
         for row in y..y.saturating_add(height).min(self.height) {
             for column in x..x.saturating_add(width).min(self.width) {
@@ -66,17 +66,18 @@ impl Canvas {
         }
     }
 
-    /// Writes a line of text whose upper edge is at `y`; `x` is its left end, middle or right end as `alignment` says.
+    /// Draws a line of text with its upper edge at `y`; `x` is its left end, middle or right end as
+    /// `alignment` says.
     pub fn write(&mut self, text: &str, (x, y): (i32, i32), font: &MonoFont, color: Rgb8, alignment: Alignment) {
         let style = MonoTextStyle::new(font, Rgb888::new(color[0], color[1], color[2]));
         let place = TextStyleBuilder::new().alignment(alignment).baseline(Baseline::Top).build();
         let Ok(_) = Text::with_text_style(text, Point::new(x, y), style, place).draw(self);
     }
 
-    /// The picture as a PNG file.
+    /// Encodes the canvas as a PNG file.
     ///
     /// # Errors
-    /// If the picture has no pixel.
+    /// If the canvas has no pixel.
     pub fn to_png(&self) -> io::Result<Vec<u8>> {
         encode_rgb8(&self.pixels, self.width, self.height)
     }
@@ -109,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_lies_outside_is_cut_off() {
+    fn drawing_is_clipped() {
         let mut canvas = Canvas::new(4, 3, [9; 3]);
         canvas.fill((2, 1), (100, u32::MAX), [1, 2, 3]);
         canvas.set(4, 0, [0; 3]);
@@ -119,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn text_leaves_ink() {
+    fn text_is_drawn() {
         let mut canvas = Canvas::new(40, 12, [0; 3]);
         let blank = canvas.clone();
         canvas.write(" ", (20, 1), &FONT_6X10, [255; 3], Alignment::Center);

@@ -1,6 +1,8 @@
-//! Difference measures between a picture and a reference, over linear radiance, pixels and channels alike.
+//! Error metrics of a picture against a reference, over linear radiance; all pixels and channels
+//! have equal weight.
 
-/// Mean of (I − R)² / (R² + 0.01). With a mask, only pixels whose entry is `true` count.
+/// Relative mean squared error: mean of (I − R)² / (R² + 0.01). With a mask, only pixels whose
+/// entry is `true` count.
 ///
 /// # Panics
 /// If the lengths differ or no pixel counts.
@@ -9,7 +11,7 @@ pub fn rel_mse(image: &[[f32; 3]], reference: &[[f32; 3]], mask: Option<&[bool]>
     average(image, reference, mask, |i, r| (i - r).powi(2) / (r * r + 0.01))
 }
 
-/// Root of the mean square difference.
+/// Root mean squared error. `mask` as in [`rel_mse`].
 ///
 /// # Panics
 /// If the lengths differ or no pixel counts.
@@ -18,7 +20,7 @@ pub fn rmse(image: &[[f32; 3]], reference: &[[f32; 3]], mask: Option<&[bool]>) -
     average(image, reference, mask, |i, r| (i - r).powi(2)).sqrt()
 }
 
-/// Mean of |I − R|.
+/// Mean absolute error: mean of |I − R|. `mask` as in [`rel_mse`].
 ///
 /// # Panics
 /// If the lengths differ or no pixel counts.
@@ -59,7 +61,7 @@ mod tests {
 
     #[test]
     fn measures_agree_with_a_hand_computation() {
-        // Squares of the differences: 0.25, 0, 0.01 | 0, 0, 1; divisors of those: 0.26, -, 0.02 | -, -, 1.01.
+        // Squared differences: 0.25, 0, 0.01 | 0, 0, 1; their divisors: 0.26, -, 0.02 | -, -, 1.01.
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-7, "{a} is not {b}");
         near(rel_mse(&IMAGE, &REFERENCE, None), (0.25 / 0.26 + 0.01 / 0.02 + 1.0 / 1.01) / 6.0);
         near(rel_mse(&IMAGE, &REFERENCE, Some(&[true, false])), (0.25 / 0.26 + 0.01 / 0.02) / 3.0);

@@ -19,7 +19,11 @@ use exr::{
     },
 };
 
-use super::{Frame, PlaceInWhole, file::open_regular, write_file};
+use super::{
+    file::{open_regular, write_file},
+    frame::{DataWindow, Frame},
+    layers::LAYERS,
+};
 use crate::{
     error::{Error, Result},
     settings::Settings,
@@ -28,13 +32,13 @@ use crate::{
 
 /// Where a frame comes from; kept in the file's attributes.
 #[derive(Clone, Copy, Debug)]
-pub struct Origin<'a> {
+pub struct Provenance<'a> {
     /// File name of the scene, without folders.
     pub scene: &'a str,
     /// Hash of the scene's bytes.
     pub scene_hash: &'a str,
     /// The light from all around, if there is any.
-    pub environment: Option<EnvironmentOrigin<'a>>,
+    pub environment: Option<EnvironmentProvenance<'a>>,
     pub settings: &'a Settings,
     /// Of these the device and the photon counts are kept: equal runs give equal files.
     pub stats: &'a Stats,
@@ -42,7 +46,7 @@ pub struct Origin<'a> {
 
 /// The light from all around, as a file's attributes tell of it.
 #[derive(Clone, Copy, Debug)]
-pub struct EnvironmentOrigin<'a> {
+pub struct EnvironmentProvenance<'a> {
     /// File name without folders, or what stands for one.
     pub name: &'a str,
     /// Hash of the file's bytes.
@@ -58,31 +62,29 @@ pub struct EnvironmentOrigin<'a> {
 const REC709: Chromaticities =
     Chromaticities { red: Vec2(0.64, 0.33), green: Vec2(0.3, 0.6), blue: Vec2(0.15, 0.06), white: Vec2(0.3127, 0.329) };
 
-/// Writes the frame with ZIP compression. Equal frames of equal origin give equal bytes.
+/// Writes the frame with ZIP compression. Equal frames of equal provenance give equal bytes.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written; an older file is kept then.
-pub fn write_exr(path: &Path, frame: &Frame, origin: &Origin) -> Result<()> {
-    let bytes = encode(frame, origin).map_err(|e| failure(path, e))?;
+pub fn write_exr(path: &Path, frame: &Frame, provenance: &Provenance) -> Result<()> {
+    let bytes = encode(frame, provenance).map_err(|e| failure(path, e))?;
     write_file(path, &bytes)
 }
 
-fn encode(frame: &Frame, origin: &Origin) -> exr::error::Result<Vec<u8>> {
+fn encode(frame: &Frame, provenance: &Provenance) -> exr::error::Result<Vec<u8>> {
     let channel = |name: &str, samples: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(samples));
-    let of = |pixels: &[[f32; 3]], c: usize| pixels.iter().map(|p| p[c]).collect::<Vec<f32>>();
-    let mut channels = vec![channel("A", frame.alpha.clone()), channel("Z", frame.depth.clone())];
-    let layers = [(["R", "G", "B"], &frame.radiance), (["N.X", "N.Y", "N.Z"], &frame.normal)];
-    let albedo = (["albedo.R", "albedo.G", "albedo.B"], &frame.albedo);
-    for (names, pixels) in layers.into_iter().chain([albedo]) {
-        channels.extend((0..3).map(|c| channel(names[c], of(pixels, c))));
-    }
+    let channels = LAYERS.iter().flat_map(|layer| {
+        let numbers = frame.layer(layer.name);
+        let of = move |c: usize| numbers.iter().skip(c).step_by(layer.channels.len()).copied().collect();
+        layer.channels.iter().enumerate().map(move |(c, name)| channel(name, of(c)))
+    });
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let size = (frame.width as usize, frame.height as usize);
-    let mut image = Image::from_encoded_channels(size, encoding, AnyChannels::sort(channels.into_iter().collect()));
+    let mut image = Image::from_encoded_channels(size, encoding, AnyChannels::sort(channels.collect()));
     image.attributes.chromaticities = Some(REC709);
-    image.layer_data.attributes = attributes(origin);
-    if let Some(PlaceInWhole { whole, column, row }) = frame.place {
+    image.layer_data.attributes = attributes(provenance);
+    if let Some(DataWindow { whole, column, row }) = frame.window {
         // The display window is the whole picture, the data window the part that is there.
         image.attributes.display_window = IntegerBounds::from_dimensions((whole.0 as usize, whole.1 as usize));
         image.layer_data.attributes.layer_position = Vec2(column as i32, row as i32);
@@ -94,17 +96,17 @@ fn encode(frame: &Frame, origin: &Origin) -> exr::error::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What the file tells of its origin. Counts and the seed are text, for the format's integers end at 2³¹.
-fn attributes(origin: &Origin) -> LayerAttributes {
-    let (stats, settings) = (origin.stats, origin.settings);
+/// What the file tells of its provenance. Counts and the seed are text, for the format's integers end at 2³¹.
+fn attributes(provenance: &Provenance) -> LayerAttributes {
+    let (stats, settings) = (provenance.stats, provenance.settings);
     let version = env!("CARGO_PKG_VERSION");
     let maps = &stats.photons;
     let texts = [
         ("version", version.to_string()),
         ("settings", serde_json::to_string(settings).expect("settings hold nothing that JSON cannot")),
         ("seed", settings.photons.seed.to_string()),
-        ("scene", origin.scene.to_string()),
-        ("sceneHash", origin.scene_hash.to_string()),
+        ("scene", provenance.scene.to_string()),
+        ("sceneHash", provenance.scene_hash.to_string()),
         ("device", stats.device.name.clone()),
         ("driver", stats.device.driver.clone()),
         ("globalEmitted", maps.global.emitted.to_string()),
@@ -112,7 +114,7 @@ fn attributes(origin: &Origin) -> LayerAttributes {
         ("causticEmitted", maps.caustic.emitted.to_string()),
         ("causticStored", maps.caustic.stored.to_string()),
     ];
-    let environment = origin.environment.iter().flat_map(|environment| {
+    let environment = provenance.environment.iter().flat_map(|environment| {
         let degrees = (f64::from(environment.rotation).to_degrees() * 1e4).round() / 1e4;
         let uniform = environment.radiance.map(|[r, g, b]| ("environmentRadiance", format!("{r},{g},{b}")));
         let file = [
@@ -168,30 +170,28 @@ pub fn read_exr(path: &Path) -> Result<Frame> {
         let channel = layer.channel_data.list.iter().find(|c| c.name == *name)?;
         Some(channel.sample_data.values_as_f32().collect::<Vec<_>>()).filter(|samples| samples.len() == pixels)
     };
-    let need = |name: &str| find(name).ok_or_else(|| failure(path, format!("the file has no channel {name}")));
-    let or = |name: &str, value: f32| find(name).unwrap_or_else(|| vec![value; pixels]);
-    let zip = |[x, y, z]: [Vec<f32>; 3]| (0..pixels).map(|i| [x[i], y[i], z[i]]).collect();
-    Ok(Frame {
-        width: layer.size.width() as u32,
-        height: layer.size.height() as u32,
-        place: place_of(&image),
-        radiance: zip([need("R")?, need("G")?, need("B")?]),
-        alpha: or("A", 1.0),
-        depth: or("Z", 0.0),
-        normal: zip(["N.X", "N.Y", "N.Z"].map(|name| or(name, 0.0))),
-        albedo: zip(["albedo.R", "albedo.G", "albedo.B"].map(|name| or(name, 0.0))),
-    })
+    let mut layers = [const { Vec::new() }; LAYERS.len()];
+    for (numbers, row) in layers.iter_mut().zip(&LAYERS) {
+        let channels = row.channels.iter().map(|name| {
+            let missing = || failure(path, format!("the file has no channel {name}"));
+            find(name).or(row.missing.map(|value| vec![value; pixels])).ok_or_else(missing)
+        });
+        let channels: Vec<Vec<f32>> = channels.collect::<Result<_>>()?;
+        *numbers = (0..pixels).flat_map(|i| channels.iter().map(move |channel| channel[i])).collect();
+    }
+    let size = (layer.size.width() as u32, layer.size.height() as u32);
+    Ok(Frame::of_layers(size, window_of(&image), layers))
 }
 
 /// Where the data window lies in the display window, if it is a part of that.
-fn place_of(image: &Image<exr::image::Layer<AnyChannels<FlatSamples>>>) -> Option<PlaceInWhole> {
+fn window_of(image: &Image<exr::image::Layer<AnyChannels<FlatSamples>>>) -> Option<DataWindow> {
     let (whole, layer) = (image.attributes.display_window, &image.layer_data);
     let from = layer.attributes.layer_position - whole.position;
     let offset = |at: i32, size: usize, whole: usize| u32::try_from(at).ok().filter(|&at| at as usize + size <= whole);
     let column = offset(from.x(), layer.size.width(), whole.size.width())?;
     let row = offset(from.y(), layer.size.height(), whole.size.height())?;
     let size = (whole.size.width() as u32, whole.size.height() as u32);
-    (layer.size != whole.size).then_some(PlaceInWhole { whole: size, column, row })
+    (layer.size != whole.size).then_some(DataWindow { whole: size, column, row })
 }
 
 /// Reads the texts that [`write_exr`] left, by name without the prefix `caustica:`.
@@ -238,18 +238,9 @@ mod tests {
     use crate::stats::{DeviceStats, MapStats, PhotonStats};
 
     fn frame() -> Frame {
-        let pixels = |seed: usize| (0..6).map(|i| [0.5, 1.0, 1e4].map(|x| x * (i + seed) as f32)).collect();
-        let samples = |seed: usize| (0..6).map(|i| (i + seed) as f32 * 0.1).collect();
-        Frame {
-            width: 3,
-            height: 2,
-            place: None,
-            radiance: pixels(1),
-            alpha: samples(2),
-            depth: samples(3),
-            normal: pixels(4),
-            albedo: pixels(5),
-        }
+        let numbers =
+            |i: usize| (0..6 * LAYERS[i].channels.len()).map(move |at| 0.1 * (at + i) as f32 + 1e4 * at as f32);
+        Frame::of_layers((3, 2), None, std::array::from_fn(|i| numbers(i).collect()))
     }
 
     fn stats() -> Stats {
@@ -262,8 +253,9 @@ mod tests {
     }
 
     fn write(path: &Path, frame: &Frame, settings: &Settings) {
-        let origin = Origin { scene: "räume.gltf", scene_hash: "ab12", environment: None, settings, stats: &stats() };
-        write_exr(path, frame, &origin).unwrap();
+        let provenance =
+            Provenance { scene: "räume.gltf", scene_hash: "ab12", environment: None, settings, stats: &stats() };
+        write_exr(path, frame, &provenance).unwrap();
     }
 
     #[test]
@@ -295,16 +287,17 @@ mod tests {
     #[test]
     fn tells_how_the_scene_was_lit_from_all_around() {
         let folder = tempfile::tempdir().unwrap();
-        let found = |environment: Option<EnvironmentOrigin>| {
+        let found = |environment: Option<EnvironmentProvenance>| {
             let path = folder.path().join("a.exr");
             let settings = Settings::default();
-            let origin = Origin { scene: "", scene_hash: "", environment, settings: &settings, stats: &stats() };
-            write_exr(&path, &frame(), &origin).unwrap();
+            let provenance =
+                Provenance { scene: "", scene_hash: "", environment, settings: &settings, stats: &stats() };
+            write_exr(&path, &frame(), &provenance).unwrap();
             let mut all = read_exr_attributes(&path).unwrap();
             all.retain(|name, _| name.starts_with("environment"));
             all.into_iter().map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>()
         };
-        let map = EnvironmentOrigin {
+        let map = EnvironmentProvenance {
             name: "sky.hdr",
             hash: "cd",
             radiance: None,
@@ -313,7 +306,7 @@ mod tests {
         };
         let of_map = ["environment sky.hdr", "environmentHash cd", "environmentRotation 30", "environmentStrength 0.5"];
         assert_eq!(found(Some(map)), of_map);
-        let uniform = EnvironmentOrigin { radiance: Some([1.0, 0.25, 0.0]), ..map };
+        let uniform = EnvironmentProvenance { radiance: Some([1.0, 0.25, 0.0]), ..map };
         assert_eq!(found(Some(uniform))[2], "environmentRadiance 1,0.25,0");
         assert_eq!(found(None), [""; 0]);
     }
@@ -345,7 +338,7 @@ mod tests {
         let first = bytes("0.exr", &frame());
         assert!((1..8).all(|i| bytes(&format!("{i}.exr"), &frame()) == first));
         let mut other = frame();
-        other.albedo[5][2] = 0.25;
+        other.layer_mut("albedo")[17] = 0.25;
         assert_ne!(bytes("other.exr", &other), first);
     }
 

@@ -1,4 +1,4 @@
-//! Output files that appear whole or not at all: written under a temporary name beside their place, then renamed.
+//! Atomic output files: written under a temporary name in the target folder, then renamed.
 
 use std::{
     fs::{self, File},
@@ -11,14 +11,14 @@ use tempfile::{Builder, NamedTempFile};
 
 use crate::error::{Error, Result};
 
-/// Temporary files of writes under way.
+/// Temporary files of writes in progress.
 struct Open {
     paths: Vec<PathBuf>,
     closed: bool,
 }
 
 impl Open {
-    /// Whether the file was on the list; it is not any more.
+    /// Removes the file from the list. Returns whether it was listed.
     fn forget(&mut self, path: &Path) -> bool {
         self.paths.iter().position(|p| p == path).map(|i| self.paths.swap_remove(i)).is_some()
     }
@@ -30,12 +30,12 @@ fn open_files() -> MutexGuard<'static, Open> {
     OPEN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Writes a file whole: an older one is replaced only when all bytes of the new one are on the disk. What is neither
-/// a file nor a folder, as a pipe, is written as it stands.
+/// Writes a file atomically: an older file is replaced only when all bytes of the new one are on
+/// disk. A target that is neither a file nor a folder, such as a pipe, is written directly.
 ///
 /// # Errors
-/// [`Error::Io`] if the folder is missing or cannot be written, the path is a folder or a write-protected file, or
-/// [`close_files`] was called. Nothing is left behind then.
+/// [`Error::Io`] if the folder is missing or not writable, the path is a folder or a
+/// write-protected file, or [`close_files`] was called. No temporary file remains then.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     let write = || -> io::Result<()> {
         let Some(target) = target_of(path)? else {
@@ -48,10 +48,11 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     write().map_err(|source| Error::Io { path: path.to_path_buf(), source })
 }
 
-/// Opens a file to be read. Pipes and devices are refused: they may never end, or never begin.
+/// Opens a file for reading. Refuses pipes and devices: they may never end, or never deliver a
+/// byte.
 ///
 /// # Errors
-/// What the system says, and folders and all that is no file.
+/// Errors of the system; and for folders and other paths that are no regular file.
 pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
     let found = fs::metadata(path)?;
     match (found.is_dir(), found.is_file()) {
@@ -61,7 +62,7 @@ pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Finds out, before hours of work, whether [`write_file`] could write there now.
+/// Checks, before hours of work, whether [`write_file`] could write to the path now.
 ///
 /// # Errors
 /// As [`write_file`].
@@ -75,8 +76,8 @@ pub fn check_output(path: &Path) -> Result<()> {
     check().map_err(|source| Error::Io { path: path.to_path_buf(), source })
 }
 
-/// Removes the temporary files of all writes under way and lets no write begin or end any more: what a process does
-/// just before it exits in the middle of its work.
+/// Removes the temporary files of all writes in progress and blocks further writes. For a process
+/// that is about to exit in the middle of its work.
 pub fn close_files() {
     let mut open = open_files();
     open.closed = true;
@@ -85,7 +86,7 @@ pub fn close_files() {
     }
 }
 
-/// The file to replace, links followed; `None` for a pipe or a device.
+/// Resolves the file to replace, following links; `None` for a pipe or a device.
 fn target_of(path: &Path) -> io::Result<Option<PathBuf>> {
     match fs::metadata(path) {
         Ok(found) if found.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder")),
@@ -104,12 +105,12 @@ fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
     if target.file_name().is_none() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "names no file"));
     }
-    // Short whatever the target's name: that may be as long as names can be.
+    // Uses a short temporary name: the name of the target may already have the maximum length.
     let mut builder = Builder::new();
     builder.prefix(".caustica-").suffix(".part");
     #[cfg(unix)]
     {
-        // As any new file: the umask takes its bits away.
+        // Permissions of a new file; the umask removes its bits.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
@@ -122,9 +123,9 @@ fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
     Ok(temporary)
 }
 
-/// Renames the temporary file if it was written well, else removes it.
+/// Renames the temporary file if it was written completely, else removes it.
 fn put_in_place(temporary: NamedTempFile, written: io::Result<()>, target: &Path) -> io::Result<()> {
-    // Held to the end, so that `close_files` comes before or after the renaming.
+    // Holds the lock to the end, so that `close_files` runs before or after the renaming.
     let mut open = open_files();
     let known = open.forget(temporary.path());
     written?;
@@ -137,12 +138,13 @@ fn put_in_place(temporary: NamedTempFile, written: io::Result<()>, target: &Path
     temporary.persist(target).map(|_| ()).map_err(|e| e.error)
 }
 
-/// Names the folder, for the system's message tells of a temporary name that means nothing to the user.
+/// Names the folder: the message of the system contains only the temporary name, which means
+/// nothing to the user.
 fn explain(error: io::Error, folder: &Path) -> io::Error {
     let kind = error.kind();
     let why = match kind {
         io::ErrorKind::NotFound if !folder.exists() => "does not exist",
-        // Folders that the system makes up say so as well.
+        // Virtual folders, such as /proc, report `NotFound` as well.
         io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             "cannot be written"
         }

@@ -1,17 +1,17 @@
-//! FLIP: how strongly an observer who flips between two pictures sees them differ (Andersson et al. 2020, "FLIP: A
-//! Difference Evaluator for Alternating Images", Proc. ACM Comput. Graph. Interact. Tech. 3(2)), the form for displayed
-//! colours. Names and constants are the paper's.
+//! FLIP: perceived difference between two pictures in alternation (Andersson et al. 2020, "FLIP: A
+//! Difference Evaluator for Alternating Images", Proc. ACM Comput. Graph. Interact. Tech. 3(2)), in
+//! the variant for displayed colours. Names and constants are those of the paper.
 
 use rayon::prelude::*;
 
 use super::Tonemap;
 
-/// Pixels per degree of the paper's observer: 0.7 m before a screen 0.7 m wide with 3840 pixels.
+/// Pixels per degree of the observer in the paper: 0.7 m from a screen 0.7 m wide with 3840 pixels.
 pub const PIXELS_PER_DEGREE: f32 = 67.020_64;
 
-/// Exponent that makes small colour differences count for more.
+/// Exponent of the colour difference; emphasizes small differences.
 const QC: f32 = 0.7;
-/// Share of the largest colour difference that is spread over the lower [`PT`] of the range.
+/// Fraction of the largest colour difference that is mapped to the lower [`PT`] of the range.
 const PC: f32 = 0.4;
 const PT: f32 = 0.95;
 /// Width of the feature detectors, degrees.
@@ -19,25 +19,26 @@ const FEATURE_WIDTH: f32 = 0.082;
 /// Exponent of the feature difference.
 const QF: f32 = 0.5;
 
-/// Linear Rec.709 to XYZ, the matrix of the paper's code.
+/// Linear Rec.709 to XYZ: the matrix of the code that accompanies the paper.
 const TO_XYZ: [[f32; 3]; 3] = [
     [10_135_552.0 / 24_577_794.0, 8_788_810.0 / 24_577_794.0, 4_435_075.0 / 24_577_794.0],
     [2_613_072.0 / 12_288_897.0, 8_788_810.0 / 12_288_897.0, 887_015.0 / 12_288_897.0],
     [1_425_312.0 / 73_733_382.0, 8_788_810.0 / 73_733_382.0, 70_074_185.0 / 73_733_382.0],
 ];
-/// Its inverse.
+/// Inverse of [`TO_XYZ`].
 const FROM_XYZ: [[f32; 3]; 3] = [
     [3.241_003_2, -1.537_399, -0.498_615_9],
     [-0.969_224_3, 1.875_93, 0.041_554_23],
     [0.055_639_42, -0.204_011_21, 1.057_149],
 ];
-/// XYZ of white.
+/// XYZ of the white point.
 const WHITE: [f32; 3] = [0.950_428_55, 1.0, 1.088_900_4];
 
 type Color = [f32; 3];
 
-/// Mean FLIP error of a picture against its reference, 0 (nobody sees a difference) to 1. Both are scene-linear
-/// radiance, multiplied by 2^`exposure` and mapped by the curve first. Rows of `width` pixels; 0 for an empty picture.
+/// Mean FLIP error of a picture against its reference: 0 (no visible difference) to 1. Both are
+/// scene-linear radiance, multiplied by 2^`exposure` and tone mapped first, in rows of `width`
+/// pixels. 0 for an empty picture.
 ///
 /// # Panics
 /// If the lengths differ or are no multiple of the width.
@@ -51,7 +52,7 @@ pub fn flip(image: &[Color], reference: &[Color], width: u32, exposure: f32, cur
     errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len().max(1) as f64
 }
 
-/// FLIP error of each pixel, 0 to 1, between pictures of linear display values 0 to 1.
+/// FLIP error of each pixel, 0 to 1, between pictures of linear display values in [0, 1].
 ///
 /// # Panics
 /// If the lengths differ or are no multiple of the width.
@@ -75,9 +76,11 @@ pub fn flip_map(image: &[Color], reference: &[Color], width: u32, pixels_per_deg
         .collect()
 }
 
-/// What is left of the picture after the eye's contrast sensitivity, in Hunt-adjusted CIELAB.
+/// Filters the picture by the contrast sensitivity of the eye and converts it to Hunt-adjusted
+/// CIELAB.
 fn perceived(ycxcz: &[Color], width: usize, ppd: f32) -> Vec<Color> {
-    // Sums of Gaussians (amplitude, width), the paper's table 1; each is normalised over the plane.
+    // Sums of Gaussians (amplitude, width): table 1 of the paper. Each sum is normalised over the
+    // plane.
     const ACHROMATIC: [(f32, f32); 2] = [(1.0, 0.0047), (0.0, 1e-5)];
     const RED_GREEN: [(f32, f32); 2] = [(1.0, 0.0053), (0.0, 1e-5)];
     const BLUE_YELLOW: [(f32, f32); 2] = [(34.1, 0.04), (13.5, 0.025)];
@@ -104,7 +107,7 @@ fn perceived(ycxcz: &[Color], width: usize, ppd: f32) -> Vec<Color> {
     filtered.par_iter().map(to_hunt).collect()
 }
 
-/// Strength of edges and of points, per pixel.
+/// Strength of edges and points at each pixel.
 fn features(ycxcz: &[Color], width: usize, ppd: f32) -> Vec<[f32; 2]> {
     let deviation = 0.5 * FEATURE_WIDTH * ppd;
     let radius = (3.0 * deviation).ceil() as i32;
@@ -112,7 +115,7 @@ fn features(ycxcz: &[Color], width: usize, ppd: f32) -> Vec<[f32; 2]> {
     let smooth = normalised(taps(radius).map(gauss).collect());
     let edge = normalised(taps(radius).map(|x| -x * gauss(x)).collect());
     let point = normalised(taps(radius).map(|x| (x * x / (deviation * deviation) - 1.0) * gauss(x)).collect());
-    // Luminance to 0..1.
+    // Luminance in [0, 1].
     let plane: Vec<f32> = ycxcz.iter().map(|p| (p[0] + 16.0) / 116.0).collect();
     let strength = |detector: &[f32]| -> Vec<f32> {
         let across = convolve(&plane, width, detector, &smooth);
@@ -126,14 +129,14 @@ fn taps(radius: i32) -> impl Iterator<Item = f32> {
     (-radius..=radius).map(|x| x as f32)
 }
 
-/// Scales the positive weights to the sum 1 and the negative ones, if any, to the sum -1.
+/// Normalises the positive weights to the sum 1 and the negative ones, if any, to the sum -1.
 fn normalised(taps: Vec<f32>) -> Vec<f32> {
     let positive: f32 = taps.iter().filter(|t| **t > 0.0).sum();
     let negative: f32 = -taps.iter().filter(|t| **t < 0.0).sum::<f32>();
     taps.into_iter().map(|t| if t < 0.0 { t / negative } else { t / positive }).collect()
 }
 
-/// Separable filter; beyond the border the border's pixels go on.
+/// Separable convolution. Pixels beyond the border have the value of the nearest border pixel.
 fn convolve(plane: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32> {
     if plane.is_empty() {
         return Vec::new();
@@ -156,7 +159,7 @@ fn convolve(plane: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f3
     result
 }
 
-/// Spreads the colour differences over 0..1, most of it for the common ones.
+/// Maps the colour differences to [0, 1], with most of the range for the common ones.
 fn redistribute(difference: f32, largest: f32) -> f32 {
     let bend = PC * largest;
     if difference < bend {
@@ -166,12 +169,12 @@ fn redistribute(difference: f32, largest: f32) -> f32 {
     }
 }
 
-/// Distance of large colour differences: city block in lightness, Euclidean in chroma.
+/// HyAB distance for large colour differences: city block in lightness, Euclidean in chroma.
 fn hyab(a: Color, b: Color) -> f32 {
     (a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])
 }
 
-/// Colours look more colourful where it is lighter.
+/// Hunt effect: colourfulness grows with lightness.
 fn hunt([l, a, b]: Color) -> Color {
     [l, 0.01 * l * a, 0.01 * l * b]
 }
@@ -180,7 +183,7 @@ fn times(m: &[[f32; 3]; 3], v: Color) -> Color {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// XYZ over that of white.
+/// XYZ relative to the white point.
 fn relative_xyz(linear: Color) -> Color {
     let xyz = times(&TO_XYZ, linear);
     std::array::from_fn(|i| xyz[i] / WHITE[i])
@@ -197,7 +200,7 @@ fn from_ycxcz([luma, cx, cz]: Color) -> Color {
     times(&FROM_XYZ, std::array::from_fn(|i| relative[i] * WHITE[i]))
 }
 
-/// CIELAB of a linear colour.
+/// Converts a linear colour to CIELAB.
 fn to_lab(linear: Color) -> Color {
     const DELTA: f32 = 6.0 / 29.0;
     let f = |t: f32| if t > DELTA.powi(3) { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 };
@@ -216,7 +219,7 @@ mod tests {
         if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
     }
 
-    /// A picture of encoded values, as linear ones.
+    /// Picture of sRGB-encoded values, decoded to linear ones.
     fn picture(pixel: impl Fn(u32, u32) -> Color) -> Vec<Color> {
         (0..24).flat_map(|y| (0..WIDTH).map(move |x| (x, y))).map(|(x, y)| pixel(x, y).map(srgb_decode)).collect()
     }
@@ -232,7 +235,7 @@ mod tests {
 
     #[test]
     fn values_are_those_of_the_published_evaluator() {
-        // From `flip_evaluator` 1.7 of the paper's authors.
+        // Values of `flip_evaluator` 1.7 by the authors of the paper.
         let reference = picture(ramp);
         let checked = picture(|x, y| [ramp(x, y)[0], ramp(x, y)[1], if (x / 4 + y / 4) % 2 == 1 { 0.5 } else { 0.6 }]);
         let dot = picture(|x, y| if (x, y) == (16, 12) { [1.0, 0.2, 0.1] } else { ramp(x, y) });
@@ -251,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn alike_is_nothing_and_growing_errors_grow() {
+    fn the_error_is_zero_for_equal_pictures_and_grows() {
         let reference: Vec<Color> = picture(ramp);
         let error = |strength: f32| {
             let wrong: Vec<Color> = reference.iter().map(|p| p.map(|x| x * (1.0 + strength))).collect();

@@ -1,4 +1,4 @@
-//! 8-bit preview: exposure, tone curve, sRGB.
+//! 8-bit PNG: exposure, tone curve, sRGB.
 
 use std::{io, path::Path};
 
@@ -7,8 +7,8 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use super::{Frame, Tonemap, srgb_encode, write_file};
 use crate::error::{Error, Result};
 
-/// Writes the frame's radiance as 8-bit sRGB. Radiance is multiplied by 2^`exposure`, then mapped by the curve.
-/// Where no ray hit anything the picture is black.
+/// Writes the radiance of the frame as 8-bit sRGB. Radiance is multiplied by 2^`exposure`, then
+/// tone mapped. Pixels without any hit are black.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written; an older file is kept then.
@@ -17,7 +17,7 @@ pub fn write_png(path: &Path, frame: &Frame, exposure: f32, curve: Tonemap) -> R
     write_file(path, &bytes)
 }
 
-/// The bytes that [`write_png`] writes.
+/// Encodes the bytes that [`write_png`] writes.
 ///
 /// # Errors
 /// If the frame has no pixel.
@@ -25,7 +25,7 @@ pub fn encode_png(frame: &Frame, exposure: f32, curve: Tonemap) -> io::Result<Ve
     encode_rgb8(&to_srgb8(frame, exposure, curve), frame.width, frame.height)
 }
 
-/// A PNG file of three bytes a pixel, rows from the top.
+/// Encodes a PNG file from three bytes per pixel, rows from the top.
 pub(super) fn encode_rgb8(pixels: &[u8], width: u32, height: u32) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     PngEncoder::new(&mut bytes)
@@ -34,11 +34,11 @@ pub(super) fn encode_rgb8(pixels: &[u8], width: u32, height: u32) -> io::Result<
     Ok(bytes)
 }
 
-/// Three bytes a pixel, rows from the top.
+/// Converts to three bytes per pixel, rows from the top.
 fn to_srgb8(frame: &Frame, exposure: f32, curve: Tonemap) -> Vec<u8> {
     let scale = exposure.exp2();
     let pixel = |radiance: &[f32; 3]| curve.apply(radiance.map(|x| x * scale)).map(to_byte);
-    frame.radiance.iter().flat_map(pixel).collect()
+    frame.radiance().iter().flat_map(pixel).collect()
 }
 
 fn to_byte(linear: f32) -> u8 {
@@ -51,14 +51,14 @@ mod tests {
 
     #[test]
     fn a_written_file_holds_the_mapped_pixels() {
-        let radiance = vec![[0.0; 3], [0.09, 0.25, 4.0]];
-        let frame = Frame { width: 2, height: 1, radiance, ..Frame::default() };
+        let frame = Frame::new(2, 1, &[[0.0; 3], [0.09, 0.25, 4.0]]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         write_png(&path, &frame, 1.0, Tonemap::None).unwrap();
         let read = image::open(&path).unwrap().into_rgb8();
         assert_eq!(read.dimensions(), (2, 1));
-        // One stop more: 18 % grey is 118, one half is 188, and what is above 1 is clipped.
+        // One stop more: 18 % grey becomes 118, one half becomes 188, and values above 1 are
+        // clipped.
         assert_eq!(read.into_raw(), [0, 0, 0, 118, 188, 255]);
         write_png(&path, &frame, 0.0, Tonemap::None).unwrap();
         assert_ne!(image::open(&path).unwrap().into_rgb8().into_raw()[3], 118);

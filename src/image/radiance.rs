@@ -1,4 +1,4 @@
-//! Pictures of radiance that others made, OpenEXR and Radiance HDR, read for their colours alone.
+//! Reading of foreign radiance pictures, OpenEXR and Radiance HDR: colours only.
 
 use std::{
     io::{self, Cursor, Read},
@@ -15,41 +15,41 @@ use image::{ImageDecoder, ImageError, codecs::hdr::HdrDecoder};
 use super::file::open_regular;
 use crate::error::{Error, Result};
 
-/// Bytes of a file that are read: more than the largest picture takes uncompressed.
+/// Size limit of a file, bytes: above the size of the largest picture uncompressed.
 const MAX_BYTES: u64 = 4 << 30;
-/// Pixels of a picture: 16384 x 8192.
+/// Size limit of a picture, pixels: 16384 x 8192.
 const MAX_PIXELS: u64 = 1 << 27;
 
-/// Pixels that any file may claim, and those that it may claim for each of its bytes: the best of the formats'
-/// compressions, deflate, makes 1032 bytes of one.
-const PIXELS_BEFORE_DOUBT: u64 = 1 << 20;
+/// Size limits by file length: pixels that any file may claim, and pixels per byte beyond that.
+/// Deflate, the strongest compression of the formats, expands one byte to at most 1032.
+const UNCHECKED_PIXELS: u64 = 1 << 20;
 const PIXELS_PER_BYTE: u64 = 1032;
 
-/// How files of the two formats begin.
+/// Magic bytes of the two formats.
 const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 const HDR: &[u8] = b"#?";
 
-/// Scene-linear colours, row 0 at the top, each number finite and ≥ 0.
+/// Scene-linear colours, row 0 at the top. All values are finite and ≥ 0.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RadiancePicture {
     pub width: u32,
     pub height: u32,
     pub pixels: Vec<[f32; 3]>,
-    /// What was read in a special way, one line each.
+    /// Features that were approximated, one line each.
     pub notes: Vec<String>,
 }
 
-/// What is wrong with a file.
+/// Description of a fault in a file.
 type Problem = Box<dyn std::error::Error + Send + Sync>;
 
-/// Bytes of a file that begins as one of the two formats.
+/// Reads the bytes of a file that begins with the magic bytes of one of the formats.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read, begins otherwise or is too large.
+/// [`Error::Io`] if the file cannot be read, begins otherwise or is too large.
 pub(crate) fn read_radiance_bytes(path: &Path) -> Result<Vec<u8>> {
     let read = || -> std::result::Result<Vec<u8>, Problem> {
         let mut file = open_regular(path)?;
-        // Only what looks right is read to the end.
+        // Reads to the end only if the magic bytes match.
         let mut bytes = Vec::new();
         file.by_ref().take(EXR.len() as u64).read_to_end(&mut bytes)?;
         if !bytes.starts_with(EXR) && !bytes.starts_with(HDR) {
@@ -64,11 +64,12 @@ pub(crate) fn read_radiance_bytes(path: &Path) -> Result<Vec<u8>> {
     read().map_err(|problem| failure(path, problem))
 }
 
-/// The picture in the bytes of [`read_radiance_bytes`]. NaN and numbers below 0 become 0, infinity the largest finite
-/// number of the picture.
+/// Decodes the bytes from [`read_radiance_bytes`]. NaN and negative values become 0, infinity the
+/// largest finite value of the picture.
 ///
 /// # Errors
-/// [`Error::Io`] with the path if they are damaged, hold no R, G, B and no luminance, or are too large.
+/// [`Error::Io`] with the path if the bytes are damaged, hold neither R, G, B nor luminance, or the
+/// picture is too large.
 pub(crate) fn decode_radiance(path: &Path, bytes: &[u8]) -> Result<RadiancePicture> {
     let decoded = if bytes.starts_with(EXR) { decode_exr(bytes) } else { decode_hdr(bytes) };
     let mut picture = decoded.map_err(|problem| failure(path, problem))?;
@@ -85,20 +86,20 @@ fn failure(path: &Path, problem: Problem) -> Error {
     Error::Io { path: path.to_path_buf(), source }
 }
 
-/// Width and height of a picture that may be read, given the length of its file.
+/// Checks the size of a picture against the limits and the length of its file.
 fn checked_size(width: u64, height: u64, length: usize) -> std::result::Result<(u32, u32), Problem> {
     let (width, height) = match (u32::try_from(width), u32::try_from(height)) {
         (Ok(w @ 1..), Ok(h @ 1..)) if width * height <= MAX_PIXELS => (w, h),
         _ => return Err(format!("is {width} x {height} pixels; 1 to {MAX_PIXELS} pixels are read").into()),
     };
-    if u64::from(width) * u64::from(height) > PIXELS_BEFORE_DOUBT + PIXELS_PER_BYTE * length as u64 {
+    if u64::from(width) * u64::from(height) > UNCHECKED_PIXELS + PIXELS_PER_BYTE * length as u64 {
         return Err(format!("is damaged: {length} bytes do not hold {width} x {height} pixels").into());
     }
     Ok((width, height))
 }
 
-/// What a decoder says of a file that it does not take to its end.
-fn of_hdr(error: ImageError) -> Problem {
+/// Converts an error of the Radiance HDR decoder.
+fn hdr_problem(error: ImageError) -> Problem {
     match error {
         ImageError::IoError(_) => "is damaged: it ends too early".into(),
         ImageError::Unsupported(error) => format!("cannot be read: {error}").into(),
@@ -106,8 +107,8 @@ fn of_hdr(error: ImageError) -> Problem {
     }
 }
 
-/// The same of OpenEXR.
-fn of_exr(error: exr::error::Error) -> Problem {
+/// Converts an error of the OpenEXR decoder.
+fn exr_problem(error: exr::error::Error) -> Problem {
     match error {
         exr::error::Error::NotSupported(what) => format!("cannot be read: {what}").into(),
         exr::error::Error::Invalid(what) => format!("is damaged: {what}").into(),
@@ -116,24 +117,24 @@ fn of_exr(error: exr::error::Error) -> Problem {
 }
 
 fn decode_hdr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
-    // The strict decoder takes one of the signatures in use only, and this one takes any.
-    let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(of_hdr)?;
+    // The strict decoder accepts only one of the signatures in use; this one accepts any.
+    let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(hdr_problem)?;
     let exposure = decoder.metadata().exposure.unwrap_or(1.0);
     let (width, height) = decoder.dimensions();
     let (width, height) = checked_size(width.into(), height.into(), bytes.len())?;
     let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
-    decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(of_hdr)?;
+    decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(hdr_problem)?;
     let note = format!("its EXPOSURE of {exposure} is not undone, as in other renderers");
     Ok(RadiancePicture { width, height, pixels, notes: Vec::from_iter((exposure != 1.0).then_some(note)) })
 }
 
-/// Channels of an OpenEXR part that make up a colour.
+/// Channels of an OpenEXR part that hold the colour.
 enum Channels {
     Rgb([String; 3]),
     Luminance(String),
 }
 
-/// The first of the part's layers with R, G and B, the one without a name before others; else its luminance.
+/// Finds the first layer with R, G and B, the unnamed one before others; else the luminance.
 fn channels(header: &Header) -> Option<Channels> {
     let names: Vec<String> = header.channels.list.iter().map(|channel| channel.name.to_string()).collect();
     let has = |name: &str| names.iter().any(|n| n == name);
@@ -144,9 +145,9 @@ fn channels(header: &Header) -> Option<Channels> {
     colors.find(|names| names.iter().all(|name| has(name))).map(Channels::Rgb).or(luminance)
 }
 
-// On one thread: a job of exr's that panics on its own would end the process.
+// Decodes on one thread: a panic in a worker thread of the exr crate would end the process.
 fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(of_exr)?;
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(exr_problem)?;
     let part = meta.headers.iter().filter(|header| !header.deep).find_map(|header| Some((header, channels(header)?)));
     let (header, channels) = part.ok_or("has neither the channels R, G and B nor the luminance Y alone")?;
     if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
@@ -170,7 +171,7 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
                 .all_attributes()
                 .non_parallel()
                 .from_buffered(Cursor::new(bytes))
-                .map_err(of_exr)?
+                .map_err(exr_problem)?
                 .layer_data
                 .channel_data
                 .pixels
@@ -185,7 +186,7 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
                 .all_attributes()
                 .non_parallel()
                 .from_buffered(Cursor::new(bytes))
-                .map_err(of_exr)?
+                .map_err(exr_problem)?
                 .layer_data
                 .channel_data
                 .pixels
@@ -194,12 +195,12 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
     Ok(RadiancePicture { width, height, pixels, notes: Vec::new() })
 }
 
-/// The display window of an OpenEXR file: what of the data lies outside is cut off, where there are none it is black.
+/// Display window of an OpenEXR file. Data outside it is cropped; pixels without data are black.
 #[derive(Clone, Copy)]
 struct Window {
     width: u32,
     height: u32,
-    /// Of the first datum from the window's corner.
+    /// Offset of the data window from the corner of the display window.
     offset: Vec2<i32>,
 }
 
@@ -208,7 +209,7 @@ impl Window {
         vec![[0.0; 3]; self.width as usize * self.height as usize]
     }
 
-    /// Writes the pixel of the datum `at`.
+    /// Writes the colour of the data pixel `at`.
     fn put(self, pixels: &mut [[f32; 3]], at: Vec2<usize>, color: [f32; 3]) {
         let (x, y) = (at.x() as i64 + i64::from(self.offset.x()), at.y() as i64 + i64::from(self.offset.y()));
         if (0..i64::from(self.width)).contains(&x) && (0..i64::from(self.height)).contains(&y) {
@@ -217,7 +218,7 @@ impl Window {
     }
 }
 
-/// Makes all numbers finite and ≥ 0. Returns what had to be changed.
+/// Makes all values finite and ≥ 0. Describes what was changed.
 fn make_finite(pixels: &mut [[f32; 3]]) -> Option<String> {
     let numbers = || pixels.as_flattened().iter();
     let largest = numbers().copied().filter(|x| x.is_finite()).fold(0.0, f32::max);

@@ -1,4 +1,5 @@
-//! Files of either format, made on the spot: what is read, what is mended, what is refused and with which words.
+//! Tests with generated files of both formats: what is decoded, what is repaired, what is refused
+//! with which message.
 
 use exr::{
     image::{AnyChannel, AnyChannels, FlatSamples, Image, Layer},
@@ -8,7 +9,8 @@ use exr::{
 
 use super::*;
 
-/// A file of that many columns and two rows, with its data that far from the display window.
+/// OpenEXR file of `columns` columns and two rows, whose data window is offset by `at` from the
+/// display window.
 fn exr(columns: usize, at: Vec2<i32>, channels: &[(&str, FlatSamples)]) -> Vec<u8> {
     let list = channels.iter().map(|(name, samples)| AnyChannel::new(*name, samples.clone())).collect();
     let attributes = LayerAttributes { layer_position: at, ..LayerAttributes::default() };
@@ -28,7 +30,7 @@ fn halves(numbers: &[f32]) -> FlatSamples {
     FlatSamples::F16(numbers.iter().map(|&x| f16::from_f32(x)).collect())
 }
 
-/// A Radiance file of bytes r, g, b, exponent.
+/// Radiance HDR file of RGBE bytes: r, g, b, exponent.
 fn hdr(header: &str, width: u32, height: u32, pixels: &[[u8; 4]]) -> Vec<u8> {
     [format!("{header}\n\n-Y {height} +X {width}\n").as_bytes(), pixels.as_flattened()].concat()
 }
@@ -86,7 +88,7 @@ fn the_display_window_is_the_picture() {
 
 #[test]
 fn radiance_files_of_either_signature_are_read() {
-    // Mantissa times 2^(exponent - 136).
+    // Value: mantissa times 2^(exponent - 136).
     let pixels = [[128, 64, 0, 129], [255, 0, 1, 136], [0, 0, 0, 0]];
     let expected = [[1.0, 0.5, 0.0], [255.0, 0.0, 1.0], [0.0; 3]];
     for signature in ["#?RADIANCE", "#?RGBE"] {
@@ -100,7 +102,7 @@ fn radiance_files_of_either_signature_are_read() {
 }
 
 #[test]
-fn what_is_no_radiance_is_mended_and_said() {
+fn invalid_radiance_is_repaired_and_noted() {
     let (inf, nan) = (f32::INFINITY, f32::NAN);
     let bytes =
         |y: [f32; 4]| exr(2, Vec2(0, 0), &[("B", floats(&[0.0; 4])), ("G", floats(&[7.0; 4])), ("R", floats(&y))]);
@@ -123,7 +125,7 @@ fn what_cannot_be_read_is_one_line() {
     for length in [4, 20, whole.len() / 2, whole.len() - 1] {
         assert_eq!(refusal(&whole[..length]), "is damaged: reference to missing bytes");
     }
-    // The data window's right end is the first number of its second half.
+    // The right edge of the data window is the first number of the second half of the attribute.
     let at = whole.windows(10).position(|bytes| bytes == b"dataWindow").expect("a window") + 10 + 1 + 6 + 4 + 8;
     let mut wide = whole.clone();
     wide[at..at + 4].copy_from_slice(&0x0fff_ffff_i32.to_le_bytes());
@@ -163,7 +165,7 @@ fn what_cannot_be_read_is_one_line() {
 }
 
 #[test]
-fn files_that_are_none_are_refused_before_they_are_read() {
+fn other_files_are_refused_by_their_first_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let refused = |bytes: &[u8]| {
         let path = folder.path().join("sky.hdr");

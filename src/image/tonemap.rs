@@ -1,31 +1,34 @@
-//! From scene-linear radiance to display values: tone curves and the sRGB transfer function.
+//! Tone mapping of scene-linear radiance to display values: tone curves and the sRGB transfer
+//! function.
 
 use serde::{Deserialize, Serialize};
 
-/// Curve that maps radiance to the range of a display.
+/// Tone curve: maps radiance to the range of a display.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tonemap {
-    /// Khronos PBR Neutral (Khronos Group 2024): keeps base colours as they are and rolls off highlights.
+    /// Khronos PBR Neutral (Khronos Group 2024): preserves base colours and compresses highlights.
     #[default]
     Neutral,
-    /// ACES reference and output transforms, as fitted by Stephen Hill (BakingLab, `ACES.hlsl`), without its exposure
-    /// bias.
+    /// ACES reference and output transforms, as fitted by Stephen Hill (BakingLab, `ACES.hlsl`),
+    /// without its exposure bias.
     Aces,
-    /// Reinhard et al. 2002, eq. 3, on Rec.709 luminance Y: the colour is divided by 1 + Y, then clipped.
+    /// Reinhard et al. 2002, eq. 3, on Rec.709 luminance Y: the colour is divided by 1 + Y, then
+    /// clipped.
     Reinhard,
     /// Clips to 0..1.
     None,
 }
 
-/// The largest value that a half float holds: brighter is drawn alike, and infinity stays out of the curves.
-const BRIGHTEST: f32 = 65504.0;
+/// Largest finite half float: upper limit of the input of a curve, which keeps infinity out.
+const MAX_INPUT: f32 = 65504.0;
 
 impl Tonemap {
-    /// Maps linear Rec.709 to linear display values, each 0 to 1. Negative values and NaN are drawn black.
+    /// Maps linear Rec.709 to linear display values in [0, 1]. Negative values and NaN become
+    /// black.
     #[must_use]
     pub fn apply(self, color: [f32; 3]) -> [f32; 3] {
-        let c = color.map(|x| if x > 0.0 { x.min(BRIGHTEST) } else { 0.0 });
+        let c = color.map(|x| if x > 0.0 { x.min(MAX_INPUT) } else { 0.0 });
         let mapped = match self {
             Self::Neutral => neutral(c),
             Self::Aces => aces(c),
@@ -44,7 +47,8 @@ fn neutral(color: [f32; 3]) -> [f32; 3] {
     const F90: f32 = 0.04;
     const START_COMPRESSION: f32 = 0.8 - F90;
     const DESATURATION: f32 = 0.15;
-    // Takes away the 4 % that a dielectric reflects at normal incidence, gently near black.
+    // Subtracts the 4 % that a dielectric reflects at normal incidence, with a smooth transition
+    // near black.
     let x = color[0].min(color[1]).min(color[2]);
     let offset = if x < 2.0 * F90 { x - x * x / (4.0 * F90) } else { F90 };
     let color = color.map(|c| c - offset);
@@ -52,14 +56,14 @@ fn neutral(color: [f32; 3]) -> [f32; 3] {
     if peak <= START_COMPRESSION {
         return color;
     }
-    // Compresses the peak below 1 and pulls bright colours towards white.
+    // Compresses the peak below 1 and desaturates bright colours.
     let d = 1.0 - START_COMPRESSION;
     let new_peak = 1.0 - d * d / (peak + d - START_COMPRESSION);
     let g = 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
     color.map(|c| new_peak + (c * new_peak / peak - new_peak) * g)
 }
 
-/// sRGB to the fit's working space: XYZ, D65 to D60, AP1, RRT saturation.
+/// sRGB to the working space of the fit: XYZ, D65 to D60, AP1, RRT saturation.
 const ACES_INPUT: [[f32; 3]; 3] =
     [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]];
 /// ODT saturation, XYZ, D60 to D65, sRGB.
@@ -72,7 +76,7 @@ fn aces(color: [f32; 3]) -> [f32; 3] {
     times(&ACES_OUTPUT, times(&ACES_INPUT, color).map(fit))
 }
 
-/// Transfer function of sRGB (IEC 61966-2-1): linear 0..1 to encoded 0..1.
+/// sRGB transfer function (IEC 61966-2-1): linear [0, 1] to encoded [0, 1].
 #[must_use]
 pub fn srgb_encode(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
@@ -88,12 +92,13 @@ mod tests {
 
     #[test]
     fn curves_have_their_known_values() {
-        // Neutral, from the specification's formula by hand: below the compression it subtracts 0.04, near black
-        // x²/0.16 stays, and grey 2 becomes 1 - 0.24²/(1.96 + 0.24 - 0.76) = 0.96.
+        // Neutral, from the formula of the specification by hand: below the compression it
+        // subtracts 0.04, near black x²/0.16 remains, and grey 2 becomes
+        // 1 - 0.24²/(1.96 + 0.24 - 0.76) = 0.96.
         assert_near(Tonemap::Neutral.apply([0.5, 0.4, 0.3]), [0.46, 0.36, 0.26]);
         assert_near(Tonemap::Neutral.apply([0.04; 3]), [0.01; 3]);
         assert_near(Tonemap::Neutral.apply([2.0; 3]), [0.96; 3]);
-        // Hill's fit of grey 1: (1.0245786 - 0.000090537) / 1.654761, times rows that sum to 1.
+        // Hill's fit at grey 1: (1.0245786 - 0.000090537) / 1.654761, times rows that sum to 1.
         assert_near(Tonemap::Aces.apply([1.0; 3]), [0.6191; 3]);
         assert_near(Tonemap::Reinhard.apply([1.0; 3]), [0.5; 3]);
         assert_near(Tonemap::Reinhard.apply([0.0, 1.0, 0.0]), [0.0, 1.0 / 1.7152, 0.0]);
@@ -114,7 +119,7 @@ mod tests {
     fn srgb_transfer_has_its_known_values() {
         assert_eq!(srgb_encode(0.0), 0.0);
         assert!((srgb_encode(1.0) - 1.0).abs() < 1e-6);
-        // 18 % grey is encoded as 0.4614, and the two pieces meet.
+        // 18 % grey is encoded as 0.4614, and the two pieces are continuous.
         assert!((srgb_encode(0.18) - 0.461_356).abs() < 1e-5);
         assert!((srgb_encode(0.003_130_8) - srgb_encode(0.003_130_9)).abs() < 1e-5);
     }

@@ -4,8 +4,9 @@ pub mod camera;
 pub mod estimate;
 pub mod maps;
 pub mod photons;
+pub mod wavefront;
 
 pub use camera::{CameraKernels, CameraTracer, FinalGather, StepCount, Tile};
-pub use estimate::{Asked, EstimateSharing, Gather, GatherOptions, GatherSettings, SharedPoints};
+pub use estimate::{EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, SharedPoints};
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
 pub use photons::{PhotonTracer, RawMap, TracedPhotons};

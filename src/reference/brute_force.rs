@@ -1,20 +1,25 @@
-//! k nearest neighbours by looking at every point.
+//! Brute-force search for the k nearest neighbours.
 
 use glam::Vec3;
 
-/// What a search for the k nearest usable photons found.
+/// Result of a search for the k nearest usable photons.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
-    /// Indices of the photons that are summed, nearest first; among equals in rising order.
+    /// Indices of the photons that are summed, nearest first; equal distances in ascending order of
+    /// index.
     pub photons: Vec<u32>,
-    /// Radius of the estimate squared, m²; 0 if there is no photon.
+    /// Square of the radius of the estimate, m²; 0 if there is no photon.
     pub radius_squared: f32,
 }
 
 impl Found {
-    /// Of the nearest photons, as squared distance and index in rising order: the first `k` and the distance of the next one.
-    /// Of `m <= k` the first `m - 1` and the distance of the last; with a `max_radius`, inside which they all lie, all
-    /// of them and that radius.
+    /// Chooses photons and radius from `near`, the squared distances and indices of the nearest
+    /// photons in ascending order.
+    ///
+    /// * More than `k` photons: the first `k`, and the distance of the next one.
+    /// * `m <= k` photons: the first `m - 1`, and the distance of the last one.
+    /// * `m <= k` photons and a `max_radius`, inside which all of them lie: all of them, and that
+    ///   radius.
     #[must_use]
     pub fn of(near: &[(f32, u32)], k: u32, max_radius: Option<f32>) -> Self {
         let (count, radius_squared) = match (near.get(k as usize), max_radius) {
@@ -26,8 +31,9 @@ impl Found {
     }
 }
 
-/// The `k` nearest of the positions that `usable` accepts, and the distance of the next one. Where only `m <= k` are
-/// usable, the nearest `m - 1` and the distance of the last. With a `max_radius` nearer than that of the (k+1)-th, all inside it.
+/// Finds the `k` nearest positions that `usable` accepts; the radius is the distance of the next
+/// one. If only `m <= k` are usable: the nearest `m - 1`, and the distance of the last one. If
+/// `max_radius` is smaller than the distance of the (k+1)-th: all positions inside it.
 #[must_use]
 pub fn brute_force(
     positions: &[Vec3],
@@ -46,7 +52,7 @@ pub fn brute_force(
     Found::of(&near, k, max_radius)
 }
 
-/// Square of the distance in single precision, the sum in the order of the axes as on the device.
+/// Squared distance in single precision, summed in the order of the axes as on the device.
 pub(super) fn squared_distance(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
     d.x * d.x + d.y * d.y + d.z * d.z

@@ -1,4 +1,5 @@
-//! A photon map on the CPU: the photons of the device in a kd-tree, and the device's gather over them.
+//! Photon map on the CPU: the photons of the device in a kd-tree, and the radiance estimate over
+//! them.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -11,37 +12,39 @@ use crate::{
     settings::EstimateSettings,
 };
 
-/// Two squared distances that differ by at most this fraction are tied: rounding alone decides which is the smaller.
+/// Relative difference of squared distances up to which they count as tied: rounding alone decides
+/// which is smaller.
 pub const TIE: f32 = 1e-6;
 
-/// Photons in a kd-tree.
+/// A photon map in a kd-tree.
 #[derive(Clone, Debug)]
 pub struct KdMap {
     places: Vec<PhotonPlace>,
     fluxes: Vec<PhotonFlux>,
     emitted: u64,
     tree: KdTree,
-    /// Photons that no search finds, in rising order.
+    /// Photons excluded from every search, in ascending order.
     left_out: Vec<u32>,
 }
 
-/// The radiance estimate at one point.
+/// Radiance estimate at one point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
     /// Square of the radius, m².
     pub radius_squared: f32,
-    /// Photons summed.
+    /// Number of photons summed.
     pub count: u32,
-    /// [`fingerprint`] of these.
+    /// [`fingerprint`] of the photons summed.
     pub fingerprint: u32,
-    /// The last photon that is summed and the next one, or the bound of the radius, are tied.
+    /// Whether the last photon summed is tied with the next one, or a photon with the maximum
+    /// radius.
     pub tied: bool,
-    /// Radiance that leaves towards the viewer, W/(m² sr).
+    /// Radiance towards the viewer, W/(m² sr).
     pub radiance: [f64; 3],
 }
 
 impl KdMap {
-    /// Balances the photons, which `emitted` paths shot.
+    /// Builds the kd-tree over the photons of `emitted` photon paths.
     ///
     /// # Panics
     /// If there are not as many fluxes as places.
@@ -52,13 +55,13 @@ impl KdMap {
         Self { tree: KdTree::new(&positions), places, fluxes, emitted, left_out: Vec::new() }
     }
 
-    /// Photons of the map.
+    /// Number of photons.
     #[must_use]
     pub fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// There is no photon.
+    /// Whether the map has no photon.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
@@ -70,27 +73,28 @@ impl KdMap {
         (size_of_val(self.places.as_slice()) + size_of_val(self.fluxes.as_slice())) as u64 + self.tree.bytes()
     }
 
-    /// Lets no search find this photon any more.
+    /// Excludes a photon from all further searches.
     pub fn leave_out(&mut self, photon: u32) {
         if let Err(place) = self.left_out.binary_search(&photon) {
             self.left_out.insert(place, photon);
         }
     }
 
-    /// The usable photons nearest to the point, `count` at most and nearer than the root of `limit` (m²): squared
-    /// distances and indices, nearest first.
+    /// Finds the usable photons nearest to the point, at most `count`, with squared distances below
+    /// `limit` (m²). Returns squared distances and indices, nearest first.
     #[must_use]
     pub fn search(&self, point: &VisiblePoint, count: u32, limit: f32) -> Vec<(f32, u32)> {
         let there = |i: usize| self.left_out.is_empty() || self.left_out.binary_search(&(i as u32)).is_err();
         self.tree.search(point.position.into(), count, limit, |i| usable(&self.places[i], point) && there(i))
     }
 
-    /// The estimate at a point with `neighbors`, `kernel`, `cone_constant` and `max_radius` of the settings.
+    /// Estimates the radiance at a point with `neighbors`, `kernel`, `cone_constant` and
+    /// `max_radius` of the settings.
     #[must_use]
     pub fn estimate(&self, point: &VisiblePoint, settings: &EstimateSettings) -> Estimate {
         let k = settings.neighbors;
         let bound = settings.max_radius.map_or(f32::INFINITY, |r| r * r);
-        // What lies just beyond the bound could on the device lie just inside.
+        // A photon just beyond the bound may lie just inside it on the device.
         let near = self.search(point, k.saturating_add(1), bound * (1.0 + TIE));
         let inside = near.partition_point(|n| n.0 < bound);
         let found = Found::of(&near[..inside], k, settings.max_radius);
@@ -105,10 +109,11 @@ impl KdMap {
         }
     }
 
-    /// The estimates at all valid points, on all threads of rayon's pool; zeros at the others.
+    /// Estimates the radiance at all valid points, on all threads of the rayon pool. Other points
+    /// get zeros.
     ///
     /// # Errors
-    /// [`crate::Error::Stopped`] when `progress` says so.
+    /// [`crate::Error::Stopped`] if `progress` requests a stop.
     pub fn gather(
         &self,
         points: &[VisiblePoint],
@@ -129,13 +134,14 @@ pub fn are_tied(a: f32, b: f32) -> bool {
     (a - b).abs() <= TIE * a.max(b)
 }
 
-/// A number that tells sets of photons apart, whatever their order: the wrapping sum of their mixed indices.
+/// Order-independent hash of a set of photons: the wrapping sum of [`mix`] over their indices.
 #[must_use]
 pub fn fingerprint(photons: &[u32]) -> u32 {
     photons.iter().fold(0, |sum, &photon| sum.wrapping_add(mix(photon)))
 }
 
-/// A bijection whose every output bit depends on every input bit (lowbias32 of Wellons, "hash-prospector").
+/// Bijective integer hash: every output bit depends on every input bit (lowbias32 of Wellons,
+/// "hash-prospector").
 #[must_use]
 pub fn mix(mut x: u32) -> u32 {
     x ^= x >> 16;

@@ -1,10 +1,10 @@
-//! k nearest neighbours with a left-balanced kd-tree (Jensen 2001, "Realistic Image Synthesis Using Photon Mapping",
-//! sections 6.1 to 6.3).
+//! Search for the k nearest neighbours in a left-balanced kd-tree (Jensen 2001, "Realistic Image
+//! Synthesis Using Photon Mapping", sections 6.1 to 6.3).
 //!
-//! The tree is an implicit heap: the children of node `i` are `2 i + 1` and `2 i + 2`, and all levels but the last are
-//! full, so it needs no pointers and its depth is that of log N. Each node holds the median photon of its part, along
-//! the axis in which that part is longest: those to the left have a coordinate of at most the node's, those to the
-//! right of at least it.
+//! The tree is an implicit heap: the children of node `i` are `2 i + 1` and `2 i + 2`. All levels
+//! but the last are full, so it needs no pointers and has depth O(log N). Each node holds the
+//! median photon of its subtree along the axis in which that subtree is longest. Photons on the
+//! left have a coordinate at most that of the node, those on the right at least that.
 
 use std::collections::BinaryHeap;
 
@@ -12,10 +12,10 @@ use glam::Vec3;
 
 use super::{Found, brute_force::squared_distance};
 
-/// Parts of fewer photons are not worth a task of their own.
-const SEQUENTIAL: usize = 4096;
+/// Subtrees of fewer photons are balanced without a task of their own.
+const MIN_TASK: usize = 4096;
 
-/// Photons in a balanced tree.
+/// A balanced kd-tree of photons.
 #[derive(Clone, Debug)]
 pub struct KdTree {
     nodes: Vec<Node>,
@@ -24,14 +24,15 @@ pub struct KdTree {
 #[derive(Clone, Copy, Debug, Default)]
 struct Node {
     position: Vec3,
-    /// Index of the photon in the list that the tree was built of.
+    /// Index of the photon in the list from which the tree was built.
     photon: u32,
-    /// Axis that the node divides: 0, 1 or 2.
+    /// Split axis: 0, 1 or 2.
     axis: u8,
 }
 
 impl KdTree {
-    /// Balances the photons: O(N log N), on all threads of rayon's pool. Equal lists give equal trees.
+    /// Builds the tree in O(N log N) on all threads of the rayon pool. Equal lists give equal
+    /// trees.
     ///
     /// # Panics
     /// If there are more than 2³² positions.
@@ -52,7 +53,7 @@ impl KdTree {
         self.nodes.len()
     }
 
-    /// There is no photon.
+    /// Whether the tree has no photon.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
@@ -64,16 +65,18 @@ impl KdTree {
         size_of_val(self.nodes.as_slice()) as u64
     }
 
-    /// What [`super::brute_force`] finds, in O(k log N): the same photons in the same order, and the same radius.
+    /// Finds in O(k log N) what [`super::brute_force`] finds: the same photons in the same order,
+    /// and the same radius.
     #[must_use]
     pub fn nearest(&self, query: Vec3, k: u32, max_radius: Option<f32>, usable: impl Fn(usize) -> bool) -> Found {
         let limit = max_radius.map_or(f32::INFINITY, |radius| radius * radius);
-        // One more than is summed: its distance is the radius.
+        // Searches for one more photon than is summed: its distance is the radius.
         Found::of(&self.search(query, k.saturating_add(1), limit, usable), k, max_radius)
     }
 
-    /// Squared distances and indices of the `count` nearest photons that `usable` accepts and whose squared distance is
-    /// below `limit`, m²: nearest first, among equals in rising order.
+    /// Finds the `count` nearest photons that `usable` accepts and whose squared distance is below
+    /// `limit`, m². Returns squared distances and indices: nearest first, equal distances in
+    /// ascending order of index.
     #[must_use]
     pub fn search(&self, query: Vec3, count: u32, limit: f32, usable: impl Fn(usize) -> bool) -> Vec<(f32, u32)> {
         let room = count as usize;
@@ -87,8 +90,8 @@ impl KdTree {
         sorted.map(|(bits, photon)| (f32::from_bits(bits), photon)).collect()
     }
 
-    /// Searches the part below a node: first the side that the query lies on, then the node itself, and the other side only
-    /// if it can hold something near enough.
+    /// Searches a subtree: first the side on which the query lies, then the node itself, then the
+    /// other side if it can hold a photon that is near enough.
     fn visit(&self, i: usize, search: &mut Search<impl Fn(usize) -> bool>) {
         let Some(node) = self.nodes.get(i) else { return };
         let axis = usize::from(node.axis);
@@ -97,28 +100,28 @@ impl KdTree {
         let (near, far) = if beyond < 0.0 { (left, right) } else { (right, left) };
         self.visit(near, search);
         search.offer(node);
-        // Equality too: at an equal distance the lower index counts.
+        // Includes equality: at equal distance the lower index is nearer.
         if beyond * beyond <= search.bound() {
             self.visit(far, search);
         }
     }
 }
 
-/// A search under way.
+/// State of a search.
 struct Search<Usable> {
     query: Vec3,
-    /// Square of the largest radius, exclusive.
+    /// Square of the maximum radius, exclusive, m².
     limit: f32,
-    /// Photons that are kept at most, ≥ 1.
+    /// Maximum number of photons to keep, ≥ 1.
     room: usize,
-    /// The nearest so far: bits of the squared distance (of numbers ≥ 0 these sort as the numbers do) and index, the
-    /// farthest on top.
+    /// The nearest photons so far, farthest on top: bits of the squared distance and index. For
+    /// numbers ≥ 0 the bit patterns sort as the numbers do.
     nearest: BinaryHeap<(u32, u32)>,
     usable: Usable,
 }
 
 impl<Usable: Fn(usize) -> bool> Search<Usable> {
-    /// Squared distance beyond which nothing counts any more.
+    /// Squared distance beyond which no photon can be among the nearest.
     fn bound(&self) -> f32 {
         match self.nearest.peek() {
             Some((bits, _)) if self.nearest.len() == self.room => f32::from_bits(*bits),
@@ -126,7 +129,7 @@ impl<Usable: Fn(usize) -> bool> Search<Usable> {
         }
     }
 
-    /// Keeps the photon if it is among the nearest so far.
+    /// Inserts the photon if it is among the nearest so far.
     fn offer(&mut self, node: &Node) {
         let distance = squared_distance(self.query, node.position);
         if distance >= self.limit || distance > self.bound() || !(self.usable)(node.photon as usize) {
@@ -141,8 +144,8 @@ impl<Usable: Fn(usize) -> bool> Search<Usable> {
     }
 }
 
-/// Orders the nodes so that the root of a left-balanced tree stands between its left and its right part, and so on in
-/// both parts.
+/// Orders the nodes so that the root of a left-balanced tree lies between its left and right
+/// subtree, recursively.
 fn balance(nodes: &mut [Node]) {
     if nodes.len() < 2 {
         return;
@@ -151,7 +154,7 @@ fn balance(nodes: &mut [Node]) {
     let order = |a: &Node, b: &Node| a.position[axis].total_cmp(&b.position[axis]).then(a.photon.cmp(&b.photon));
     let (left, root, right) = nodes.select_nth_unstable_by(left_size(nodes.len()), order);
     root.axis = axis as u8;
-    if left.len() < SEQUENTIAL {
+    if left.len() < MIN_TASK {
         balance(left);
         balance(right);
     } else {
@@ -159,7 +162,7 @@ fn balance(nodes: &mut [Node]) {
     }
 }
 
-/// Puts balanced nodes into heap order, the root of them at `i`.
+/// Copies balanced nodes into heap order, their root at index `i`.
 fn fill(heap: &mut [Node], i: usize, nodes: &[Node]) {
     if nodes.is_empty() {
         return;
@@ -170,16 +173,18 @@ fn fill(heap: &mut [Node], i: usize, nodes: &[Node]) {
     fill(heap, 2 * i + 2, &rest[1..]);
 }
 
-/// Nodes left of the root in a tree of `count` ≥ 1 whose last level is filled from the left.
+/// Number of nodes left of the root in a tree of `count` ≥ 1 nodes whose last level is filled from
+/// the left.
 fn left_size(count: usize) -> usize {
-    // The levels above the last hold 2^d - 1 nodes, the last up to 2^d, the left half of it under the left child.
+    // The levels above the last hold 2^d - 1 nodes. The last holds up to 2^d, the left half of them
+    // under the left child.
     let last = 1 << count.ilog2();
     let above = (last - 1) / 2;
     let in_last = count - (last - 1);
     above + in_last.min(last / 2)
 }
 
-/// Axis in which the bounds of the nodes are longest; among equals the first.
+/// Axis in which the bounds of the nodes are longest; the first of equals.
 fn longest_axis(nodes: &[Node]) -> usize {
     let bounds = |(low, high): (Vec3, Vec3), node: &Node| (low.min(node.position), high.max(node.position));
     let (low, high) = nodes.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), bounds);
@@ -198,13 +203,13 @@ mod tests {
     }
 
     #[test]
-    fn every_node_divides_its_part() {
+    fn every_node_splits_its_subtree() {
         for count in [0, 1, 2, 3, 31, 32, 33, 1000] {
             let tree = KdTree::new(&positions(count));
             assert_eq!(tree.len(), count);
             assert_eq!(misplaced(&tree), 0, "{count} photons");
         }
-        // The control: two photons that lie far apart change places.
+        // Control: exchanges two photons that lie far apart.
         let mut tree = KdTree::new(&positions(1000));
         let (a, b) = (tree.nodes[500].position, tree.nodes[999].position);
         (tree.nodes[500].position, tree.nodes[999].position) = (b, a);
@@ -212,12 +217,12 @@ mod tests {
     }
 
     fn positions(count: usize) -> Vec<Vec3> {
-        // Fractions of multiples of irrational numbers: even and without repetition.
+        // Fractions of multiples of irrational numbers: evenly distributed, without repetition.
         let at = |i: usize, step: f32| (i as f32 * step).fract();
         (0..count).map(|i| Vec3::new(at(i, 0.618_034), at(i, 0.414_214), at(i, 0.732_051))).collect()
     }
 
-    /// Nodes that lie on the wrong side of a node above.
+    /// Number of nodes on the wrong side of an ancestor.
     fn misplaced(tree: &KdTree) -> usize {
         let wrong = |i: usize| {
             let mut child = i;

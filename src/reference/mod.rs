@@ -1,4 +1,5 @@
-//! The same estimate in plain Rust, written to be read: what the device's kernels are measured against.
+//! Reference implementation of the radiance estimate on the CPU, written for readability. Tests and
+//! `caustica compare` hold the kernels against it.
 
 mod brute_force;
 mod estimate;

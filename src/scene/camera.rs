@@ -5,18 +5,18 @@ use serde::Serialize;
 
 use super::Bounds;
 
-/// How a camera maps what it sees to a picture.
+/// Projection of a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Projection {
-    /// From one point; `yfov` is the full vertical angle of view, radians, 0 < yfov < π.
+    /// Perspective projection; `yfov` is the full vertical field of view, radians, 0 < yfov < π.
     Perspective { yfov: f32 },
-    /// Along parallel rays; `ymag` is half the height of what is seen, metres, > 0.
+    /// Orthographic projection; `ymag` is half the height of the view, metres, > 0.
     Orthographic { ymag: f32 },
 }
 
 impl Projection {
-    /// Half the height of what is seen at a distance along the camera's axis, metres.
+    /// Half the height of the view at a distance along the camera's axis, metres.
     #[must_use]
     pub fn half_height_at(&self, depth: f32) -> f32 {
         match *self {
@@ -31,29 +31,30 @@ impl Projection {
 pub struct Camera {
     pub name: String,
     pub position: Vec3,
-    /// Unit axes: right, up, and the direction of view.
+    /// Unit vectors of the camera frame: right, up, and the viewing direction.
     pub right: Vec3,
     pub up: Vec3,
     pub forward: Vec3,
     pub projection: Projection,
-    /// Width over height, where the file says.
+    /// Aspect ratio, width over height, if the file gives one.
     pub aspect: Option<f32>,
-    /// In a picture that is higher than wide, what is seen is as wide as it is high in a square one, so that nothing is
-    /// cut off at the sides.
+    /// Keeps the horizontal field of view of a square picture if the picture is higher than wide,
+    /// so that nothing is cut off at the sides.
     pub keeps_width: bool,
 }
 
-/// Angles of [`Camera::framing`], degrees: from +Z towards +X, above the horizon, and of view.
+/// Angles of [`Camera::framing`], degrees: azimuth from +Z towards +X, elevation above the horizon,
+/// and vertical field of view.
 const AZIMUTH: f32 = 30.0;
 const ELEVATION: f32 = 22.0;
 const ANGLE_OF_VIEW: f32 = 35.0;
 
-/// Part of the picture that the box around all geometry may fill.
+/// Fraction of the picture that the bounding box may fill.
 const FILL: f32 = 0.94;
 
 impl Camera {
-    /// A camera that sees all of `bounds` in a picture of any shape: from the front, which is +Z in glTF, a little from the
-    /// right and from above.
+    /// Camera that sees all of `bounds` in a picture of any aspect ratio: from the front, which is
+    /// +Z in glTF, slightly from the right and from above.
     #[must_use]
     pub fn framing(bounds: Bounds) -> Self {
         let is_empty = bounds.min.x > bounds.max.x;
@@ -63,11 +64,11 @@ impl Camera {
             (0.5 * (bounds.min + bounds.max), 0.5 * (bounds.max - bounds.min))
         };
         let half = if half == Vec3::ZERO { Vec3::ONE } else { half };
-        let turn = Quat::from_rotation_y(AZIMUTH.to_radians()) * Quat::from_rotation_x(-ELEVATION.to_radians());
-        let [right, up, back] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| turn * axis);
+        let rotation = Quat::from_rotation_y(AZIMUTH.to_radians()) * Quat::from_rotation_x(-ELEVATION.to_radians());
+        let [right, up, back] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| rotation * axis);
         let yfov = ANGLE_OF_VIEW.to_radians();
         let slope = FILL * (0.5 * yfov).tan();
-        // Each corner of the box asks for a distance at which it is in view.
+        // Each corner of the box requires a distance at which it is in view.
         let distance = (0..8)
             .map(|i| half * Vec3::from_array([1, 2, 4].map(|bit| if i & bit == 0 { -1.0 } else { 1.0 })))
             .map(|corner| corner.dot(right).abs().max(corner.dot(up).abs()) / slope + corner.dot(back))
@@ -84,7 +85,8 @@ impl Camera {
         }
     }
 
-    /// Half the height of what is seen at a distance along the axis in a picture of so many pixels, metres.
+    /// Half the height of the view at a distance along the axis, in a picture of `width` × `height`
+    /// pixels, metres.
     #[must_use]
     pub fn half_height_at(&self, depth: f32, (width, height): (u32, u32)) -> f32 {
         let stretch = if self.keeps_width { (height as f32 / width as f32).max(1.0) } else { 1.0 };

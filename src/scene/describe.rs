@@ -1,4 +1,4 @@
-//! What a file holds and how it is read, for `caustica info`.
+//! Scene summary for `caustica info`.
 
 use std::{f64::consts::PI, fmt};
 
@@ -6,7 +6,8 @@ use serde::Serialize;
 
 use super::{LightKind, Projection, Scene, words::one_line};
 
-/// Facts about a scene. Coordinates are the file's: metres in its world. Angles are in radians.
+/// Summary of a scene. Coordinates are those of the file: world space, metres. Angles are in
+/// radians.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneInfo {
     pub file_name: String,
@@ -15,28 +16,29 @@ pub struct SceneInfo {
     pub meshes: usize,
     pub triangles: usize,
     pub spheres: usize,
-    /// Corners of the box around all geometry; none without any.
+    /// Corners of the bounding box of all geometry; `None` if there is no geometry.
     pub bounds: Option<[[f64; 3]; 2]>,
-    /// Lights without extent.
+    /// Punctual lights.
     pub lights: Vec<LightInfo>,
-    /// Materials in use that give light.
+    /// Emissive materials in use.
     pub emitters: Vec<EmitterInfo>,
     pub cameras: Vec<CameraInfo>,
     pub materials: Vec<MaterialInfo>,
-    /// What is ignored or read in a special way.
+    /// Features that are ignored or approximated.
     pub notes: Vec<String>,
 }
 
-/// A light without extent.
+/// Punctual light.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LightInfo {
     pub name: String,
     pub kind: LightKind,
-    /// None for a directional light.
+    /// `None` for a directional light.
     pub position: Option<[f64; 3]>,
-    /// Unit vector along which it shines; none for a point light.
+    /// Unit vector along which it shines; `None` for a point light.
     pub direction: Option<[f32; 3]>,
-    /// Power in W, each channel; of a directional light what the sphere around the scene's box catches.
+    /// Power, W in each channel; of a directional light, the power received by the bounding sphere
+    /// of the scene.
     pub power: [f64; 3],
 }
 
@@ -46,12 +48,13 @@ pub struct EmitterInfo {
     pub name: String,
     pub triangles: usize,
     pub spheres: usize,
-    /// Square metres, one side.
+    /// Area of one side, m².
     pub area: f64,
-    /// W/(m² sr), each channel.
+    /// Emitted radiance, W/(m² sr) in each channel.
     pub radiance: [f32; 3],
     pub double_sided: bool,
-    /// Power in W, each channel: π times radiance and area, of both sides where the material has two.
+    /// Power, W in each channel: π times radiance and area, of both sides if the material is
+    /// double-sided.
     pub power: [f64; 3],
 }
 
@@ -61,7 +64,7 @@ pub struct CameraInfo {
     pub name: String,
     pub position: [f64; 3],
     pub projection: Projection,
-    /// Width over height, where the file says.
+    /// Aspect ratio, width over height, if the file gives one.
     pub aspect: Option<f32>,
 }
 
@@ -69,12 +72,12 @@ pub struct CameraInfo {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MaterialInfo {
     pub name: String,
-    /// The surface that it is read as.
+    /// Surface type that the material is read as.
     pub read_as: String,
 }
 
 impl Scene {
-    /// What the file holds and how it is read.
+    /// Summarizes the scene.
     #[must_use]
     pub fn describe(&self) -> SceneInfo {
         let world = |point: glam::Vec3| (self.center + point.as_dvec3()).to_array();
@@ -111,7 +114,7 @@ impl Scene {
         }
     }
 
-    /// The emissive materials that something shows.
+    /// Emissive materials of visible geometry.
     fn emitters(&self) -> Vec<EmitterInfo> {
         let mut emitters: Vec<EmitterInfo> = (self.materials.iter())
             .map(|material| EmitterInfo {
@@ -143,7 +146,7 @@ impl Scene {
     }
 }
 
-/// Three numbers with about six digits of the largest.
+/// Formats three numbers with about six digits of the largest.
 fn triple(v: [f64; 3]) -> String {
     let largest = v.into_iter().map(f64::abs).fold(1e-6, f64::max);
     v.map(|x| decimal(x, largest)).join(" ")
@@ -218,7 +221,7 @@ impl fmt::Display for EmitterInfo {
     }
 }
 
-/// A heading with the number of entries, and a line for each with its index.
+/// Writes a heading with the number of entries, and one line for each entry with its index.
 fn section<T>(
     f: &mut fmt::Formatter<'_>,
     heading: &str,

@@ -1,4 +1,4 @@
-//! Light from all around, infinitely far away.
+//! Environment light: radiance that arrives from infinitely far away.
 
 use std::{f64::consts::TAU, path::Path};
 
@@ -10,48 +10,50 @@ use crate::{
     image::{decode_radiance, read_radiance_bytes},
 };
 
-/// An equirectangular picture of the radiance that arrives from each direction: row 0 is the top (+Y), and a direction
-/// (x, y, z) lies at u = 0.5 + atan2(z, x)/2π, v = acos(y)/π, before the rotation.
+/// Equirectangular map of incident radiance. Row 0 is the top (+Y). Before the rotation, a
+/// direction (x, y, z) has the coordinates u = 0.5 + atan2(z, x)/2π, v = acos(y)/π.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
-    /// What it is called in statistics: the name of its file, or "background".
+    /// Name in statistics: the name of the file, or "background".
     pub name: String,
-    /// SHA-256 of the file's bytes, in hexadecimal; of a uniform one's numbers.
+    /// SHA-256 in hexadecimal: of the bytes of the file, or of the radiance if uniform.
     pub hash: String,
-    /// Pixels, each ≥ 1.
+    /// Size in pixels, each ≥ 1.
     pub width: u32,
     pub height: u32,
     /// Radiance, W/(m² sr) in each channel, row by row; finite, ≥ 0.
     pub pixels: Vec<[f32; 3]>,
-    /// Factor on all of it, ≥ 0.
+    /// Scale factor of the radiance, ≥ 0.
     pub strength: f32,
-    /// Turn about +Y, radians, counterclockwise as seen from above: what lay at direction d lies at d so turned.
+    /// Rotation of the map about +Y, radians, counterclockwise as seen from above.
     pub rotation: f32,
-    /// What of the file was read in a special way, one line each.
+    /// Features of the file that were approximated, one line each.
     pub warnings: Vec<String>,
 }
 
-/// Radiance from below in [`Environment::sky`].
+/// Radiance of the ground in [`Environment::sky`].
 const GROUND: f32 = 0.3;
 
 impl Environment {
-    /// Reads an OpenEXR or Radiance HDR file, whichever it is by its content. OpenEXR: any type of sample; R, G and B,
-    /// or luminance alone, of the first part and layer that has them. `strength` is a factor ≥ 0, `rotation` in degrees.
+    /// Reads an OpenEXR or Radiance HDR file; the content decides which. OpenEXR: any sample type;
+    /// R, G and B, or luminance alone, of the first part and layer that has them. `strength` is a
+    /// factor ≥ 0, `rotation` is in degrees.
     ///
     /// # Errors
-    /// [`Error::Io`] if the file cannot be read, is damaged, or has more than 2²⁷ pixels; [`Error::Setting`] for a
-    /// strength or rotation that is no such number, or a strength that takes the brightest pixel beyond all numbers.
+    /// [`Error::Io`] if the file cannot be read, is damaged, or has more than 2²⁷ pixels.
+    /// [`Error::Setting`] if the strength or rotation is out of range, or if the strength makes the
+    /// brightest pixel infinite.
     pub fn load(path: &Path, strength: f32, rotation: f32) -> Result<Self> {
-        check_turn(strength, rotation)?;
+        check_parameters(strength, rotation)?;
         Self::from_bytes(&read_radiance_bytes(path)?, path, strength, rotation)
     }
 
-    /// As [`Environment::load`], of a file's bytes; `path` is what messages call it.
+    /// Decodes the bytes of a file as [`Environment::load`]; messages name it by `path`.
     ///
     /// # Errors
     /// As [`Environment::load`].
     pub fn from_bytes(bytes: &[u8], path: &Path, strength: f32, rotation: f32) -> Result<Self> {
-        check_turn(strength, rotation)?;
+        check_parameters(strength, rotation)?;
         let picture = decode_radiance(path, bytes)?;
         let brightest = picture.pixels.as_flattened().iter().copied().fold(0.0, f32::max);
         if !(brightest * strength).is_finite() {
@@ -72,7 +74,7 @@ impl Environment {
         })
     }
 
-    /// The same radiance from everywhere.
+    /// Uniform radiance from all directions.
     #[must_use]
     pub fn uniform(radiance: Vec3) -> Self {
         Self {
@@ -87,8 +89,8 @@ impl Environment {
         }
     }
 
-    /// A uniform sky of radiance 1 that goes over into ground of 0.3 about the horizon: under the same light from
-    /// everywhere, what is white could not be told from what is behind it.
+    /// Uniform sky of radiance 1 with a smooth transition to a ground of 0.3 at the horizon. Under
+    /// uniform light a white object could not be told from its background.
     #[must_use]
     pub fn sky() -> Self {
         let pixels = vec![[1.0; 3], [1.0; 3], [GROUND; 3], [GROUND; 3]];
@@ -96,18 +98,19 @@ impl Environment {
         Self { name: "default sky".to_owned(), hash, height: 4, pixels, ..Self::uniform(Vec3::ONE) }
     }
 
-    /// It gives no light at all.
+    /// Whether it emits no light.
     #[must_use]
     pub fn is_dark(&self) -> bool {
         self.strength == 0.0 || self.pixels.iter().all(|pixel| *pixel == [0.0; 3])
     }
 
-    /// Radiance that arrives from a direction (a unit vector), W/(m² sr): bilinear between the middles of pixels, around
-    /// the horizon without a seam, and above the top row's and below the bottom row's middles as there.
+    /// Radiance from a direction (a unit vector), W/(m² sr). Bilinear interpolation between pixel
+    /// centres: periodic in u; beyond the centres of the top and bottom rows v is clamped.
     #[must_use]
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
         let DVec3 { x, y, z } = direction.as_dvec3();
-        // A turn counterclockwise lessens the azimuth atan2(z, x), since z points to the viewer from above.
+        // A counterclockwise rotation decreases the azimuth atan2(z, x), since z points to the
+        // viewer from above.
         let u = 0.5 + (z.atan2(x) + f64::from(self.rotation)) / TAU;
         let v = y.clamp(-1.0, 1.0).acos() / (0.5 * TAU);
         let (width, height) = (i64::from(self.width), i64::from(self.height));
@@ -128,7 +131,7 @@ fn wrong(name: &'static str, value: f32, problem: &str) -> Error {
     Error::Setting { name, value: value.to_string(), problem: problem.to_owned() }
 }
 
-fn check_turn(strength: f32, rotation: f32) -> Result<()> {
+fn check_parameters(strength: f32, rotation: f32) -> Result<()> {
     if !(strength.is_finite() && strength >= 0.0) {
         return Err(wrong("environment strength", strength, "is not a number from 0"));
     }
@@ -149,7 +152,8 @@ mod tests {
 
     use super::*;
 
-    /// Eight columns and four rows, each pixel of a colour of its own: red counts columns, green rows.
+    /// Map of eight columns and four rows, each pixel of its own colour: red is the column, green
+    /// the row.
     fn map() -> Environment {
         let pixels = (0..32).map(|i| [(i % 8) as f32, (i / 8) as f32, 1.0]).collect();
         Environment { width: 8, height: 4, pixels, ..Environment::uniform(Vec3::ZERO) }
@@ -160,10 +164,11 @@ mod tests {
     }
 
     #[test]
-    fn directions_lie_where_three_js_has_them() {
+    fn directions_map_as_in_three_js() {
         let map = map();
-        // u = 0.5 + atan2(z, x)/2π: +X is the middle of the picture, +Z three quarters, -Z one quarter, -X both ends.
-        // Between two columns both count half; the horizon is between the rows 1 and 2.
+        // u = 0.5 + atan2(z, x)/2π: +X is the middle of the map, +Z three quarters, -Z one quarter,
+        // -X both ends. Between two columns both have weight one half; the horizon lies between
+        // rows 1 and 2.
         for (direction, column, row) in [
             (Vec3::X, 3.5, 1.5),
             (Vec3::Z, 5.5, 1.5),
@@ -174,22 +179,22 @@ mod tests {
         ] {
             assert_near(map.radiance(direction), Vec3::new(column, row, 1.0));
         }
-        // The poles take the outer rows as they are.
+        // At the poles the outer rows are not interpolated.
         assert_eq!((map.radiance(Vec3::Y).y, map.radiance(Vec3::NEG_Y).y), (0.0, 3.0));
-        // The middle of a pixel is that pixel.
+        // At the centre of a pixel the result is that pixel.
         let (sin, cos) = (std::f32::consts::TAU * (2.5 / 8.0 - 0.5)).sin_cos();
         let v = std::f32::consts::PI * 2.5 / 4.0;
         assert_near(map.radiance(Vec3::new(cos * v.sin(), v.cos(), sin * v.sin())), Vec3::new(2.0, 2.0, 1.0));
     }
 
     #[test]
-    fn the_seam_is_none_and_pixels_blend() {
+    fn interpolation_is_bilinear_without_a_seam() {
         let map = map();
         let at = |u: f32| {
             let (sin, cos) = (std::f32::consts::TAU * (u - 0.5)).sin_cos();
             map.radiance(Vec3::new(cos, 0.0, sin)).x
         };
-        // From the middle of the last column to that of the first: 7, then 0.
+        // From the centre of the last column to that of the first: 7, then 0.
         for (u, expected) in [(7.5, 7.0), (7.75, 5.25), (8.0, 3.5), (0.0, 3.5), (0.25, 1.75), (0.5, 0.0), (1.25, 0.75)]
         {
             assert!((at(u / 8.0) - expected).abs() < 1e-4, "{u}: {}", at(u / 8.0));
@@ -205,13 +210,13 @@ mod tests {
             assert_near(turned.radiance(turn(degrees) * d) / 3.0, plain.radiance(d));
             assert!((turned.radiance(turn(-degrees) * d) / 3.0 - plain.radiance(d)).length() > 0.1, "control: {d}");
         }
-        // Counterclockwise from above: a quarter turn takes +X to -Z.
+        // Counterclockwise from above: a rotation by 90° takes +X to -Z.
         let quarter = Environment { rotation: 90_f32.to_radians(), ..map() };
         assert_near(quarter.radiance(Vec3::NEG_Z), plain.radiance(Vec3::X));
     }
 
     #[test]
-    fn a_uniform_one_is_the_same_from_everywhere() {
+    fn a_uniform_environment_is_isotropic() {
         let (sky, other) = (Environment::uniform(Vec3::new(1.0, 2.0, 3.0)), Environment::uniform(Vec3::ONE));
         for d in [Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(-0.6, 0.0, 0.8)] {
             assert_near(sky.radiance(d), Vec3::new(1.0, 2.0, 3.0));

@@ -1,5 +1,5 @@
-//! Lights without extent. Those with one are geometry: a [`Material`](super::Material) with emission; or all around:
-//! [`Environment`](super::Environment).
+//! Punctual lights. Area lights are geometry with an emissive [`Material`](super::Material); light
+//! from all directions is an [`Environment`](super::Environment).
 
 use std::f32::consts::PI;
 
@@ -8,37 +8,39 @@ use serde::Serialize;
 
 use crate::settings::LightUnit;
 
-/// Lumens in a watt of green light: what a photometric unit is divided by.
+/// Luminous efficacy of green light, lm/W: divisor of photometric units.
 pub const LUMENS_PER_WATT: f32 = 683.0;
 
-/// How a light without extent shines (KHR_lights_punctual).
+/// Kind of a punctual light (KHR_lights_punctual).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LightKind {
-    /// Alike in all directions.
+    /// Isotropic.
     Point,
-    /// Full within the inner cone, nothing outside the outer one; half angles in radians, 0 ≤ inner < outer ≤ π/2.
+    /// Full intensity within the inner cone, none outside the outer one; half angles in radians,
+    /// 0 ≤ inner < outer ≤ π/2.
     Spot { inner: f32, outer: f32 },
-    /// From infinitely far away.
+    /// Parallel light from infinitely far away.
     Directional,
 }
 
-/// A light without extent.
+/// Punctual light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
     pub name: String,
     pub kind: LightKind,
-    /// Metres; of no meaning for a directional light.
+    /// Metres; unused by a directional light.
     pub position: Vec3,
-    /// Unit vector along which it shines; of no meaning for a point light.
+    /// Unit vector along which it shines; unused by a point light.
     pub direction: Vec3,
-    /// Point: radiant intensity, W/sr in each channel. Spot: the same along its axis. Directional: irradiance of a
-    /// surface that faces it, W/m². As the file's candela or lux are read.
+    /// Point: radiant intensity, W/sr in each channel. Spot: the same, along its axis. Directional:
+    /// irradiance of a surface that faces it, W/m². The candela or lux of the file are taken as
+    /// these units.
     pub intensity: Vec3,
 }
 
 impl Light {
-    /// `intensity` in the unit that the file's numbers are taken for.
+    /// Intensity, with the numbers of the file read in the given unit.
     #[must_use]
     pub fn intensity_in(&self, unit: LightUnit) -> Vec3 {
         match unit {
@@ -47,7 +49,7 @@ impl Light {
         }
     }
 
-    /// Integral over all directions of the share of `intensity` that goes there, sr; 0 for a directional light.
+    /// Integral over the sphere of the relative intensity, sr; 0 for a directional light.
     #[must_use]
     pub fn solid_angle(&self) -> f32 {
         match self.kind {
@@ -57,11 +59,11 @@ impl Light {
         }
     }
 
-    /// Power, W in each channel: intensity times solid angle. A directional light sends as much as a disc of
-    /// `scene_radius`, metres, catches.
+    /// Power, W in each channel: intensity times solid angle. For a directional light, the power
+    /// through a disc of radius `scene_radius`, metres.
     #[must_use]
     pub fn power(&self, scene_radius: f32) -> DVec3 {
-        // In f64: of the brightest lights of f32 the product leaves its range.
+        // Computes in f64: the product of the brightest lights overflows f32.
         let factor = match self.kind {
             LightKind::Point | LightKind::Spot { .. } => f64::from(self.solid_angle()),
             LightKind::Directional => std::f64::consts::PI * f64::from(scene_radius).powi(2),
@@ -70,15 +72,17 @@ impl Light {
     }
 }
 
-/// Least width, in cosines, of the falloff between a spot's cones (KHR_lights_punctual, "Inner and Outer Cone Angles").
-pub const LEAST_FALLOFF: f32 = 0.001;
+/// Minimum width, in cosines, of the falloff between the cones of a spot (KHR_lights_punctual,
+/// "Inner and Outer Cone Angles").
+pub const MIN_FALLOFF: f32 = 0.001;
 
-/// Integral over the sphere of a spot's falloff `clamp((cos θ − cos outer) / (cos inner − cos outer), 0, 1)²`,
-/// steradians: 2π ((1 − cos inner) + (cos inner − cos outer)/3).
+/// Integral over the sphere of a spot's falloff, sr. The falloff is
+/// `clamp((cos θ − cos outer) / (cos inner − cos outer), 0, 1)²`, its integral
+/// 2π ((1 − cos inner) + (cos inner − cos outer)/3).
 fn spot_solid_angle(inner: f32, outer: f32) -> f32 {
     let (inner, outer) = (f64::from(inner).cos(), f64::from(outer).cos());
-    let width = (inner - outer).max(f64::from(LEAST_FALLOFF));
-    // A cone so narrow that the falloff reaches past its axis never gets to full intensity.
+    let width = (inner - outer).max(f64::from(MIN_FALLOFF));
+    // In a cone so narrow that the falloff extends past its axis, full intensity is never reached.
     let reached = ((1.0 - outer) / width).min(1.0);
     let full = (1.0 - outer - width).max(0.0);
     (std::f64::consts::TAU * (full + width * reached.powi(3) / 3.0)) as f32

@@ -1,12 +1,12 @@
-//! What may be chosen when a file is read.
+//! Options of reading a scene file.
 
-/// How a file is read into a [`Scene`](super::Scene).
+/// Options of reading a file into a [`Scene`](super::Scene).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LoadOptions {
-    /// Which of the file's scenes, by name or else by number from 0; the file's default one if none is asked for.
+    /// Scene of the file, by name or else by index from 0; `None` for its default scene.
     pub scene: Option<String>,
-    /// Buffers may lie anywhere, not only in the folder of the file and below it.
+    /// Allows buffers outside the folder of the file and its subfolders.
     pub allow_outside: bool,
-    /// Extensions that are not supported and that are read past although the file requires them, by name.
+    /// Names of unsupported extensions that are ignored although the file requires them.
     pub ignore_required: Vec<String>,
 }

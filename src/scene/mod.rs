@@ -1,5 +1,5 @@
-//! What a file holds, in the renderer's own nouns. Coordinates are metres, right-handed, +Y up, relative to
-//! [`Scene::center`].
+//! Scene description: geometry, materials, lights and cameras, independent of the file format.
+//! Coordinates are metres, right-handed, +Y up, relative to [`Scene::center`].
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     Error, Result,
-    image::{EnvironmentOrigin, Origin},
+    image::{EnvironmentProvenance, Provenance},
     settings::Settings,
     stats::Stats,
 };
@@ -25,34 +25,34 @@ mod words;
 pub use camera::{Camera, Projection};
 pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};
 pub use environment::Environment;
-pub use light::{LEAST_FALLOFF, LUMENS_PER_WATT, Light, LightKind};
+pub use light::{LUMENS_PER_WATT, Light, LightKind, MIN_FALLOFF};
 pub use load_options::LoadOptions;
 pub use material::{Material, MediaTable, Medium, Surface};
 pub use shape::{Bounds, Sphere, Triangle};
 
-/// A scene ready to be traced.
+/// A scene, ready to be traced.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
     /// File name without folders.
     pub file_name: String,
-    /// Files that it names: buffers and images, read or not.
+    /// Files that the file refers to: buffers and images, read or not.
     pub files: Vec<PathBuf>,
-    /// SHA-256 of the bytes of the file and of the buffers it names, in hexadecimal.
+    /// SHA-256 of the bytes of the file and its buffers, in hexadecimal.
     pub hash: String,
-    /// What was subtracted from every world coordinate of the file: the middle of its geometry.
+    /// Offset subtracted from all world coordinates of the file: the centre of its geometry.
     pub center: DVec3,
     pub triangles: Vec<Triangle>,
     pub spheres: Vec<Sphere>,
     pub materials: Vec<Material>,
-    /// Lights without extent.
+    /// Punctual lights.
     pub lights: Vec<Light>,
-    /// Light from infinitely far away, all around.
+    /// Environment light, infinitely far away.
     pub environment: Option<Environment>,
-    /// Never empty after [`Scene::load`]: a camera that frames the scene stands in where the file has none.
+    /// Never empty after [`Scene::load`]: a file without cameras gets one that frames the scene.
     pub cameras: Vec<Camera>,
-    /// What was ignored or read in a special way, one line each.
+    /// Features that were ignored or approximated, one line each.
     pub warnings: Vec<String>,
     /// Number of meshes in the file.
     pub mesh_count: usize,
@@ -62,21 +62,23 @@ impl Scene {
     /// Reads a `.gltf` or `.glb` file and the buffers beside it.
     ///
     /// # Errors
-    /// [`Error::Io`] where the file cannot be read; [`Error::Scene`] with the JSON path of what is wrong in it.
+    /// [`Error::Io`] where the file cannot be read; [`Error::Scene`] with the JSON path of what is
+    /// wrong in it.
     pub fn load(path: &Path) -> Result<Self> {
         Self::load_with(path, &LoadOptions::default())
     }
 
-    /// [`Scene::load`] with a choice of scene and of what is allowed.
+    /// Reads a file as [`Scene::load`], with options.
     ///
     /// # Errors
-    /// As [`Scene::load`]; [`Error::Setting`] that lists the file's scenes where the one asked for is not among them.
+    /// As [`Scene::load`]; [`Error::Setting`], which lists the scenes of the file, if the requested
+    /// scene is not among them.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         gltf::load(path, options)
     }
 
-    /// Reads the bytes of a `.gltf` or `.glb` file as if they were those of the file at `path`, which need not be there:
-    /// the buffers that they name are looked for beside it.
+    /// Reads the bytes of a `.gltf` or `.glb` file as if they were read from `path`, which need not
+    /// exist. Buffers are searched beside it.
     ///
     /// # Errors
     /// As [`Scene::load_with`].
@@ -84,15 +86,15 @@ impl Scene {
         gltf::read(bytes, path, options)
     }
 
-    /// Smallest box around all geometry, in scene coordinates; [`Bounds::EMPTY`] without any.
+    /// Bounding box of all geometry in scene coordinates; [`Bounds::EMPTY`] if there is none.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         let triangles = self.triangles.iter().map(Bounds::from);
         triangles.chain(self.spheres.iter().map(Bounds::from)).fold(Bounds::EMPTY, Bounds::union)
     }
 
-    /// Sphere around all geometry, about the middle of its box: centre and radius, metres. Zero and zero without
-    /// geometry.
+    /// Bounding sphere of all geometry, around the centre of its bounding box: centre and radius,
+    /// metres. Zero and zero if there is no geometry.
     #[must_use]
     pub fn bounding_sphere(&self) -> (Vec3, f32) {
         let bounds = self.bounds();
@@ -105,28 +107,28 @@ impl Scene {
         (center, corners.chain(balls).fold(0.0, f32::max))
     }
 
-    /// Some surface scatters into single directions only, so that there can be caustics.
+    /// Whether a surface has a delta BSDF, so that there can be caustics.
     #[must_use]
     pub fn has_delta(&self) -> bool {
-        self.shows(|material| material.surface.is_delta())
+        self.uses_material(|material| material.surface.is_delta())
     }
 
-    /// Some surface gives light by itself.
+    /// Whether a surface emits light.
     #[must_use]
     pub fn has_emission(&self) -> bool {
-        self.shows(|material| material.emission != Vec3::ZERO)
+        self.uses_material(|material| material.emission != Vec3::ZERO)
     }
 
-    /// Some triangle or sphere has such a material.
-    fn shows(&self, such: impl Fn(&Material) -> bool) -> bool {
-        let such: Vec<bool> = self.materials.iter().map(such).collect();
-        let is_such = |material: u32| such.get(material as usize) == Some(&true);
-        self.triangles.iter().any(|triangle| is_such(triangle.material))
-            || self.spheres.iter().any(|sphere| is_such(sphere.material))
+    /// Whether a triangle or sphere has a material that satisfies the predicate.
+    fn uses_material(&self, predicate: impl Fn(&Material) -> bool) -> bool {
+        let satisfied: Vec<bool> = self.materials.iter().map(predicate).collect();
+        let satisfies = |material: u32| satisfied.get(material as usize) == Some(&true);
+        self.triangles.iter().any(|triangle| satisfies(triangle.material))
+            || self.spheres.iter().any(|sphere| satisfies(sphere.material))
     }
 
-    /// Lights a scene that has no light of its own by a soft uniform sky ([`Environment::sky`]), and notes it. A scene with an
-    /// environment keeps it, dark or not.
+    /// Adds a soft uniform sky ([`Environment::sky`]) to a scene without any light, and a warning.
+    /// A scene with an environment keeps it, dark or not.
     pub fn add_default_light(&mut self) {
         if self.lights.is_empty() && !self.has_emission() && self.environment.is_none() {
             self.environment = Some(Environment::sky());
@@ -134,31 +136,32 @@ impl Scene {
         }
     }
 
-    /// What a picture's file is to tell of where it comes from.
+    /// Provenance of a picture, for the metadata of its file.
     #[must_use]
-    pub fn origin<'a>(&'a self, settings: &'a Settings, stats: &'a Stats) -> Origin<'a> {
-        let environment = self.environment.as_ref().map(|environment| EnvironmentOrigin {
+    pub fn origin<'a>(&'a self, settings: &'a Settings, stats: &'a Stats) -> Provenance<'a> {
+        let environment = self.environment.as_ref().map(|environment| EnvironmentProvenance {
             name: &environment.name,
             hash: &environment.hash,
             radiance: (environment.pixels.len() == 1).then(|| environment.pixels[0]),
             strength: environment.strength,
             rotation: environment.rotation,
         });
-        Origin { scene: &self.file_name, scene_hash: &self.hash, environment, settings, stats }
+        Provenance { scene: &self.file_name, scene_hash: &self.hash, environment, settings, stats }
     }
 
-    /// The camera of that name, or of that number in [`Scene::cameras`]; the first if none is asked for.
+    /// Finds a camera by its name or by its index in [`Scene::cameras`]; the first if `wanted` is
+    /// `None`.
     ///
     /// # Errors
-    /// [`Error::Setting`] that lists the cameras.
+    /// [`Error::Setting`], which lists the cameras.
     pub fn camera(&self, wanted: Option<&str>) -> Result<&Camera> {
         Ok(&self.cameras[self.camera_number(wanted)?])
     }
 
-    /// Index in [`Scene::cameras`] of [`Scene::camera`].
+    /// Index in [`Scene::cameras`] of the camera that [`Scene::camera`] finds.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Scene::camera`].
     pub fn camera_number(&self, wanted: Option<&str>) -> Result<usize> {
         let numbered = |number: usize| (number < self.cameras.len()).then_some(number);
         let found = match wanted {
@@ -179,10 +182,10 @@ impl Scene {
         })
     }
 
-    /// Whether there is something to draw and light to see it by.
+    /// Checks that the scene has geometry and light.
     ///
     /// # Errors
-    /// [`Error::Scene`] that says what is missing.
+    /// [`Error::Scene`], which names what is missing.
     pub fn check_renderable(&self) -> Result<()> {
         let error =
             |place: &str, problem: String| Error::Scene { path: self.path.clone(), place: place.to_owned(), problem };

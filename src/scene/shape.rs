@@ -1,24 +1,25 @@
-//! What light meets: triangles and exact spheres.
+//! Shapes: triangles and exact spheres.
 
 use std::f64::consts::PI;
 
 use glam::Vec3;
 
-/// A triangle in scene coordinates; its outside is where the corners run counterclockwise.
+/// Triangle in scene coordinates. Its outside is the side from which the vertices run
+/// counterclockwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     pub positions: [Vec3; 3],
-    /// Unit normals at the corners, interpolated across the face.
+    /// Unit vertex normals, interpolated across the face.
     pub normals: [Vec3; 3],
     /// Index into [`Scene::materials`](super::Scene::materials).
     pub material: u32,
 }
 
 impl Triangle {
-    /// Unit normal of the plane, to the outside; zero for a triangle without area.
+    /// Unit normal of the plane, towards the outside; zero for a degenerate triangle.
     #[must_use]
     pub fn geometric_normal(&self) -> Vec3 {
-        // In f64, as the product of two edges of a small triangle leaves the range of f32.
+        // Computes in f64: the product of two edges of a small triangle underflows f32.
         let [a, b, c] = self.positions.map(Vec3::as_dvec3);
         (b - a).cross(c - a).normalize_or_zero().as_vec3()
     }
@@ -49,7 +50,7 @@ impl Sphere {
     }
 }
 
-/// An axis-aligned box.
+/// Axis-aligned bounding box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     pub min: Vec3,
@@ -57,10 +58,10 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box that holds nothing: any union with it gives the other.
+    /// Empty box: the identity of [`Bounds::union`].
     pub const EMPTY: Bounds = Bounds { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// Smallest box around both.
+    /// Smallest box that contains both.
     #[must_use]
     pub fn union(self, other: Bounds) -> Bounds {
         Bounds { min: self.min.min(other.min), max: self.max.max(other.max) }

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::fail;
 use crate::error::Result;
 
-/// Longest path, surfaces: a photon's number on its path has 12 bits.
-pub const MAX_BOUNCES: u32 = 4095;
+/// Longest path, surfaces: so far the key of a staged photon counts along its path.
+pub const MAX_BOUNCES: u32 = crate::layout::PLACE_MASK;
 
 /// Which light reaches the picture, and by which way (the report's five modes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -8,7 +8,7 @@ use plotters::{
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-use super::sheet::brief;
+use super::numbers::brief;
 
 /// A line through points.
 #[derive(Clone, Debug, PartialEq)]

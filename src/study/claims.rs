@@ -2,23 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Figure, Row, findings};
-
-/// A claim of the report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Question {
-    Energy,
-    GatherDominates,
-    TimeWithNeighbors,
-    TimeWithPhotons,
-    Proportion,
-    NoiseForBias,
-    CornersBright,
-    DirectAgrees,
-    DeltaShadows,
-    ThreeLights,
-}
+use super::{Figure, Question, Row, findings};
 
 /// Whether a claim held in this run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -42,17 +26,6 @@ pub struct Claim {
 }
 
 impl Question {
-    /// What can be asked of a plane of n and k.
-    pub(super) const OF_A_PLANE: [Self; 7] = [
-        Self::Energy,
-        Self::GatherDominates,
-        Self::TimeWithNeighbors,
-        Self::TimeWithPhotons,
-        Self::Proportion,
-        Self::NoiseForBias,
-        Self::CornersBright,
-    ];
-
     /// The claim, and the rule by which it is judged.
     fn texts(self) -> (&'static str, &'static str) {
         match self {

@@ -51,20 +51,20 @@ impl<'a> Points<'a> {
         let (width, height) = (frame.width as usize, frame.height as f32);
         let size = (frame.width, frame.height);
         let widths: Vec<f32> =
-            frame.depth.iter().map(|&depth| 2.0 * camera.half_height_at(depth, size) / height).collect();
+            frame.depth().iter().map(|&depth| 2.0 * camera.half_height_at(depth, size) / height).collect();
         let across = |i: usize| {
             let x = ((i % width) as f32 + 0.5 - width as f32 / 2.0) * widths[i];
             let y = (height / 2.0 - (i / width) as f32 - 0.5) * widths[i];
             camera.right * x + camera.up * y
         };
-        let position = |i: usize| camera.position + across(i) + camera.forward * frame.depth[i];
+        let position = |i: usize| camera.position + across(i) + camera.forward * frame.depth()[i];
         let positions: Vec<_> = (0..frame.pixels()).map(position).collect();
         let view = |i: usize| match camera.projection {
             Projection::Perspective { .. } => positions[i] - camera.position,
             Projection::Orthographic { .. } => camera.forward,
         };
         let towards_viewer = |i: usize| {
-            let normal = Vec3::from(frame.normal[i]);
+            let normal = Vec3::from(frame.normal()[i]);
             if normal.dot(view(i)) > 0.0 { -normal } else { normal }
         };
         let normals = (0..frame.pixels()).map(towards_viewer).collect();
@@ -75,7 +75,7 @@ impl<'a> Points<'a> {
     /// something before the other, and each lies before the other's plane.
     fn meet(&self, a: usize, b: usize, step: usize) -> bool {
         // Pixels that hold more than one surface have no normal of their own.
-        let whole = |i: usize| self.frame.alpha[i] > 0.99 && self.normals[i].length_squared() > 0.98;
+        let whole = |i: usize| self.frame.alpha()[i] > 0.99 && self.normals[i].length_squared() > 0.98;
         let (na, nb, between) = (self.normals[a], self.normals[b], self.positions[b] - self.positions[a]);
         let near = 8.0 * step as f32 * self.widths[a].min(self.widths[b]);
         let slack = 0.05 * between.length();
@@ -106,14 +106,14 @@ mod tests {
             aspect: None,
             keeps_width: false,
         };
-        let mut frame = Frame { width: SIZE, height: SIZE, ..Frame::default() };
-        for i in 0..SIZE * SIZE {
-            let tangent = ((i % SIZE) as f32 + 0.5) / SIZE as f32 * 2.0 - 1.0;
+        let mut frame = Frame::new(SIZE, SIZE, &[[1.0; 3]; (SIZE * SIZE) as usize]);
+        for i in 0..(SIZE * SIZE) as usize {
+            let tangent = ((i as u32 % SIZE) as f32 + 0.5) / SIZE as f32 * 2.0 - 1.0;
             // |x| = sign (2 - depth): a corner, or an edge that points at the viewer.
-            frame.depth.push(2.0 / (1.0 + sign * tangent.abs()));
-            frame.normal.push(Vec3::new(-sign * tangent.signum(), 0.0, 1.0).normalize().to_array());
-            frame.alpha.push(1.0);
-            frame.radiance.push([1.0; 3]);
+            frame.layer_mut("depth")[i] = 2.0 / (1.0 + sign * tangent.abs());
+            let normal = Vec3::new(-sign * tangent.signum(), 0.0, 1.0).normalize().to_array();
+            frame.layer_mut("normal")[3 * i..][..3].copy_from_slice(&normal);
+            frame.layer_mut("alpha")[i] = 1.0;
         }
         (frame, camera)
     }
@@ -130,7 +130,7 @@ mod tests {
     fn an_orthographic_camera_finds_it_too() {
         let camera = Camera { projection: Projection::Orthographic { ymag: 2.0 }, ..wedge(1.0).1 };
         let mut frame = wedge(1.0).0;
-        for (i, depth) in frame.depth.iter_mut().enumerate() {
+        for (i, depth) in frame.layer_mut("depth").iter_mut().enumerate() {
             *depth = 2.0 - 2.0 * (((i % SIZE as usize) as f32 + 0.5) / SIZE as f32 * 2.0 - 1.0).abs();
         }
         let region = corner_region(&frame, &camera);
@@ -143,7 +143,7 @@ mod tests {
         let (edge, camera) = wedge(-0.5);
         assert!(corner_region(&edge, &camera).iter().all(|found| !found));
         let (mut apart, camera) = wedge(1.0);
-        for (i, depth) in apart.depth.iter_mut().enumerate() {
+        for (i, depth) in apart.layer_mut("depth").iter_mut().enumerate() {
             *depth *= if i % SIZE as usize >= 24 { 10.0 } else { 1.0 };
         }
         assert!(corner_region(&apart, &camera).iter().all(|found| !found));

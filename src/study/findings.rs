@@ -1,6 +1,9 @@
 //! What rows say to the claims: each function looks at the rows of one figure.
 
-use super::{Row, grid::short, sheet::brief};
+use super::{
+    Row,
+    numbers::{brief, short},
+};
 use crate::settings::Mode;
 
 /// Part by which means may differ and still count as the same.

@@ -1,6 +1,6 @@
 //! The plan of a plain study: every mode with every n and every k.
 
-use super::{Combination, Figure, Look, Plan, Question, Subject};
+use super::{Combination, Figure, Look, Plan, Question, Subject, numbers::short};
 use crate::settings::{Mode, Settings};
 
 /// Every combination of the modes, photon counts and neighbours with the other settings as given.
@@ -49,14 +49,4 @@ pub(super) fn add_plane(
     let columns = neighbors.iter().map(|k| format!("k = {k}")).collect();
     let questions = if base.photons.mode.traces_photons() { Question::OF_A_PLANE.to_vec() } else { Vec::new() };
     plan.figures.push(Figure { title, columns, rows, questions, plane: base.photons.mode.traces_photons() });
-}
-
-/// 1000 as `1k`, 1500000 as `1.5M`; exact.
-pub(super) fn short(n: u32) -> String {
-    match n {
-        0 => "0".to_string(),
-        _ if n.is_multiple_of(100_000) && n >= 1_000_000 => format!("{}M", f64::from(n) / 1e6),
-        _ if n.is_multiple_of(100) && n >= 1000 => format!("{}k", f64::from(n) / 1e3),
-        _ => n.to_string(),
-    }
 }

@@ -6,7 +6,7 @@ use super::{
     Combination, Plan, Radii,
     cells::Measured,
     corners::corner_region,
-    grid::short,
+    numbers::short,
     plan::Look,
     spread::{bias, noise},
 };
@@ -145,7 +145,7 @@ pub(super) fn measure(
     row.seconds = mean_seconds(renders);
     row.global = map_row(measured.stats.photons.global, measured.radii[0]);
     row.caustic = map_row(measured.stats.photons.caustic, measured.radii[1]);
-    row.mean_radiance = std::array::from_fn(|c| average(renders, |frame| mean(&frame.radiance)[c]));
+    row.mean_radiance = std::array::from_fn(|c| average(renders, |frame| mean(&frame.radiance())[c]));
     row.noise = noise(&frames(renders));
     row.thumbnail = Thumbnail::new(first, plan.look);
     if let Some(reference) = reference.filter(|r| (r.width, r.height) == (first.width, first.height)) {
@@ -161,10 +161,10 @@ pub(super) fn measure(
 }
 
 fn compare(row: &mut Row, renders: &[(Frame, Measured)], reference: &Frame, look: Look) {
-    let right = &reference.radiance;
-    row.rel_mse = Some(average(renders, |frame| rel_mse(&frame.radiance, right, None)));
-    row.rmse = Some(average(renders, |frame| rmse(&frame.radiance, right, None).powi(2)).sqrt());
-    row.flip = Some(average(renders, |frame| flip(&frame.radiance, right, frame.width, look.exposure, look.tonemap)));
+    let right = &reference.radiance();
+    row.rel_mse = Some(average(renders, |frame| rel_mse(&frame.radiance(), right, None)));
+    row.rmse = Some(average(renders, |frame| rmse(&frame.radiance(), right, None).powi(2)).sqrt());
+    row.flip = Some(average(renders, |frame| flip(&frame.radiance(), right, frame.width, look.exposure, look.tonemap)));
     let bias = bias(&frames(renders), reference);
     (row.bias, row.bias_limit) = (bias.map(|b| b.value), bias.map(|b| b.limit));
 }
@@ -199,7 +199,7 @@ fn map_row(map: MapStats, radius: Option<Radii>) -> MapRow {
 
 /// Mean of the channels over the pixels of the region.
 fn mean_in(frame: &Frame, region: &[bool]) -> Option<f64> {
-    let inside = || frame.radiance.iter().zip(region).filter(|(_, inside)| **inside).map(|(pixel, _)| pixel);
+    let inside = || frame.radiance().iter().zip(region).filter(|(_, inside)| **inside).map(|(pixel, _)| pixel);
     let count = inside().count();
     (count > 0).then(|| inside().flatten().map(|&x| f64::from(x)).sum::<f64>() / (3 * count) as f64)
 }
@@ -225,7 +225,7 @@ impl Thumbnail {
             let (mut sum, mut count) = ([0.0_f32; 3], 0.0);
             for row in (y * factor)..((y + 1) * factor).min(frame.height) {
                 for column in (x * factor)..((x + 1) * factor).min(frame.width) {
-                    let radiance = frame.radiance[(row * frame.width + column) as usize];
+                    let radiance = frame.radiance()[(row * frame.width + column) as usize];
                     let shown = look.tonemap.apply(radiance.map(|v| v * scale));
                     (0..3).for_each(|c| sum[c] += shown[c]);
                     count += 1.0;
@@ -244,8 +244,8 @@ mod tests {
     use crate::{image::Tonemap, stats::Stats};
 
     fn render(values: &[f32]) -> (Frame, Measured) {
-        let radiance = values.iter().map(|&v| [v; 3]).collect();
-        let frame = Frame { width: values.len() as u32, height: 1, radiance, ..Frame::default() };
+        let radiance: Vec<_> = values.iter().map(|&v| [v; 3]).collect();
+        let frame = Frame::new(values.len() as u32, 1, &radiance);
         (frame, Measured { stats: Stats::default(), radii: [None; 2] })
     }
 
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_thumbnail_is_no_larger_than_its_side() {
-        let frame = Frame { width: 400, height: 100, radiance: vec![[1.0; 3]; 40_000], ..Frame::default() };
+        let frame = Frame::new(400, 100, &[[1.0; 3]; 40_000]);
         let look = Look { exposure: 0.0, tonemap: Tonemap::None };
         let small = Thumbnail::new(&frame, look);
         assert_eq!((small.width, small.height, small.pixels.len()), (133, 33, 133 * 33));

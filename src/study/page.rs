@@ -8,9 +8,9 @@ use super::{
     Claim, Figure, Plan, Results, Row, Verdict,
     chart::INK,
     claims::answers,
-    grid::short,
+    numbers::{brief, short},
     plots::Plot,
-    sheet::{brief, contact_sheet},
+    sheet::contact_sheet,
 };
 use crate::html::{escaped, filled};
 

@@ -3,55 +3,39 @@
 use super::{cells::Measured, radii::Counts};
 use crate::{
     error::{Error, Result},
-    gpu::Gpu,
     image::Frame,
     layout::Gathered,
-    progress::{Progress, Stage},
-    renderer::{CameraPass, PhotonMaps, Session},
+    map_kind::{ByKind, MapKind},
+    progress::Progress,
+    renderer::{Observer, PhotonMaps, Session},
     settings::Settings,
-    stats::timed,
 };
 
-/// One picture of the maps, as [`Session::picture`] makes it where no estimates are shared, and the radii of its estimates.
+/// Counts the radii of the estimates of each map.
+#[derive(Default)]
+struct Radii(ByKind<Counts>);
+
+impl Observer for Radii {
+    fn observe(&mut self, kind: MapKind, gathered: &[Gathered]) {
+        self.0[kind].add(gathered);
+    }
+}
+
+/// One picture of the maps and the radii of its estimates. No estimates are shared.
 pub(super) fn picture(
-    gpu: &Gpu,
     session: &Session,
     maps: &PhotonMaps,
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<(Frame, Measured)> {
-    if settings.photons.final_gather > 0 {
-        let (name, value) = ("final-gather", settings.photons.final_gather.to_string());
+    if maps.settings().final_gather > 0 {
+        let (name, value) = ("final-gather", maps.settings().final_gather.to_string());
         return Err(Error::Setting { name, value, problem: "is not studied".to_string() });
     }
-    let mut stats = maps.stats().clone();
-    let pass = CameraPass::new(session, settings)?;
-    let mut gather = session.gather(settings);
-    let mut film = pass.film();
-    let tiles = pass.tracer.tiles();
-    // Maps without a photon are not there; the global one comes first.
-    let first = usize::from(stats.photons.global.stored == 0);
-    let mut radii = [Counts::default(), Counts::default()];
-    for (done, tile) in tiles.iter().enumerate() {
-        progress.check()?;
-        progress.report(Stage::Camera, done as u64, tiles.len() as u64);
-        pass.trace(tile, &mut stats)?;
-        let (tracer, points) = (&pass.tracer, pass.tracer.point_count(tile));
-        for (map, counts) in maps.maps().iter().zip(&mut radii[first..]) {
-            // Places without a valid point would keep what an older tile left there.
-            let mut encoder = gpu.encoder();
-            encoder.clear_buffer(&tracer.gathered, 0, None);
-            gpu.submit(encoder);
-            timed(&mut stats.seconds.gather, || {
-                let results = (&tracer.radiance, &tracer.gathered);
-                gather.run(gpu, map, &tracer.points, points, &pass.estimate, results, progress)
-            })?;
-            counts.add(&gpu.read::<Gathered>(&tracer.gathered, 0, points.into())?);
-        }
-        pass.resolve(tile, &mut film)?;
-    }
-    session.close(&mut stats);
-    Ok((film.finish(settings.picture.spp), Measured { stats, radii: radii.map(|counts| counts.finish()) }))
+    let mut radii = Radii::default();
+    let (estimate, picture) = (&settings.estimate, &settings.picture);
+    let (film, stats) = session.observed_film(maps, estimate, picture, Some(&mut radii), progress)?;
+    Ok((film.finish(), Measured { stats, radii: [radii.0.global.finish(), radii.0.caustic.finish()] }))
 }
 
 /// Mean of pictures of one size; the other layers are the first one's.
@@ -60,8 +44,8 @@ pub(super) fn mean_frame(frames: Vec<Frame>) -> Frame {
     let mut frames = frames.into_iter();
     let mut mean = frames.next().unwrap_or_default();
     for frame in frames {
-        mean.radiance.iter_mut().zip(&frame.radiance).for_each(|(a, b)| (0..3).for_each(|c| a[c] += b[c]));
+        mean.radiance_mut().iter_mut().zip(frame.radiance()).for_each(|(a, b)| (0..3).for_each(|c| a[c] += b[c]));
     }
-    mean.radiance.iter_mut().flatten().for_each(|x| *x *= scale);
+    mean.radiance_mut().iter_mut().flatten().for_each(|x| *x *= scale);
     mean
 }

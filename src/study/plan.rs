@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::claims::Question;
+use super::question::Question;
 use crate::{
     error::{Error, Result},
     image::{Frame, Tonemap},
@@ -142,7 +142,7 @@ impl Plan {
             let Reference::Picture { name, frame } = &subject.reference else { continue };
             let size = crate::renderer::picture_size(
                 subject.scene.camera(combination.settings.picture.camera.as_deref())?,
-                &combination.settings,
+                &combination.settings.picture,
             )?;
             if combination.measured && size != (frame.width, frame.height) {
                 return Err(Error::Setting {

@@ -3,7 +3,7 @@
 use super::{
     Figure, Row,
     chart::{Series, heat_map, line_chart},
-    grid::short,
+    numbers::short,
 };
 
 /// A plot: the stem of its file's name, and the picture as SVG.

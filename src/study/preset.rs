@@ -2,10 +2,7 @@
 
 use std::path::Path;
 
-use super::{
-    Combination, Figure, Finer, Look, Plan, Question, Reference, Subject,
-    grid::{add_plane, short},
-};
+use super::{Combination, Figure, Finer, Look, Plan, Question, Reference, Subject, grid::add_plane, numbers::short};
 use crate::{
     error::Result,
     scene::Scene,

@@ -18,7 +18,7 @@ use crate::{
     gpu::Gpu,
     image::Frame,
     progress::{Progress, Silent},
-    renderer::{PhotonMaps, Session},
+    renderer::{PhotonMaps, Session, check},
     settings::Settings,
     stats::DeviceStats,
 };
@@ -113,13 +113,14 @@ impl Study<'_> {
             for sharing in of_subject.chunk_by(|a, b| photon_part(&a.settings) == photon_part(&b.settings)) {
                 let settings = &sharing[0].settings;
                 let begun = self.begin(&sharing[0], meter);
-                let opened = Session::open(self.gpu, scene, settings, meter);
+                let opened =
+                    check(scene, settings).and_then(|()| Session::open(self.gpu, scene, &settings.lights, meter));
                 let traced = opened.and_then(|session| {
                     begun?;
                     if warm.insert((sharing[0].subject, settings.photons.mode as u32)) {
                         self.warm_up(&session, settings)?;
                     }
-                    let maps = session.photon_maps(settings, meter)?;
+                    let maps = session.photon_maps(&settings.photons, meter)?;
                     Ok((session, maps))
                 });
                 match traced {
@@ -162,7 +163,7 @@ impl Study<'_> {
                 self.begin(job, meter)?;
             }
             let scene = &self.plan.subjects[job.subject].scene;
-            let made = picture(self.gpu, session, maps, &job.settings, meter);
+            let made = picture(session, maps, &job.settings, meter);
             let kept =
                 made.and_then(|(frame, measured)| self.cells.keep(&job.key, scene, &job.settings, &frame, measured));
             if let Err(error) = kept {
@@ -176,7 +177,7 @@ impl Study<'_> {
 
     /// A tiny render before the first that is timed: drivers compile kernels when they are used first.
     fn warm_up(&self, session: &Session, settings: &Settings) -> Result<()> {
-        session.compile_ahead(settings);
+        session.prefetch(settings);
         let tiny = settings.clone().with(|s| {
             s.photons.global = 64;
             s.photons.caustic = 64;
@@ -184,8 +185,8 @@ impl Study<'_> {
             s.picture.spp = 1;
             s.picture.size = Some((8, 8));
         });
-        let maps = session.photon_maps(&tiny, &Silent)?;
-        session.picture(&maps, &tiny, &Silent)?;
+        let maps = session.photon_maps(&tiny.photons, &Silent)?;
+        session.picture(&maps, &tiny.estimate, &tiny.picture, &Silent)?;
         Ok(())
     }
 
@@ -245,7 +246,7 @@ impl Study<'_> {
                 "{}: our own finer render, the mean of {} passes of {} photons a map, k = {}, {} samples a pixel",
                 subject.scene.file_name,
                 f.passes,
-                super::grid::short(f.photons),
+                super::numbers::short(f.photons),
                 f.neighbors,
                 f.spp
             )),

@@ -10,7 +10,7 @@ use embedded_graphics::{
     text::Alignment,
 };
 
-use super::{Figure, Row, measure::Thumbnail};
+use super::{Figure, Row, measure::Thumbnail, numbers::brief};
 use crate::image::{Canvas, Rgb8};
 
 const PAPER: Rgb8 = [24, 24, 27];
@@ -123,30 +123,8 @@ fn captions(row: &Row) -> [String; 2] {
     [first, format!("{} s{radius}", brief(row.seconds.total))]
 }
 
-/// Three digits that count.
-pub(super) fn brief(x: f64) -> String {
-    let magnitude = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
-    if x != 0.0 && !(-3..=5).contains(&magnitude) {
-        return format!("{x:.1e}");
-    }
-    format!("{x:.*}", (2 - magnitude).clamp(0, 5) as usize)
-}
-
 fn paste(canvas: &mut Canvas, picture: &Thumbnail, (left, top): (u32, u32)) {
     for (i, color) in (0..).zip(&picture.pixels) {
         canvas.set(left + i % picture.width, top + i / picture.width, *color);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_brief() {
-        for (x, text) in [(0.0, "0.00"), (1.0, "1.00"), (12.345, "12.3"), (0.012345, "0.0123"), (1e-5, "1.0e-5")] {
-            assert_eq!(brief(x), text);
-        }
-        assert_eq!(brief(123_456.0), "123456");
     }
 }

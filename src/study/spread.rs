@@ -17,12 +17,12 @@ pub(super) struct Bias {
 /// Root of the mean over pixels and channels of the unbiased variance between renders; `None` of fewer than two.
 pub(super) fn noise(frames: &[&Frame]) -> Option<f64> {
     let count = frames.len() as f64;
-    let values = frames.first()?.radiance.len() * 3;
+    let values = frames.first()?.radiance().len() * 3;
     if frames.len() < 2 || values == 0 {
         return None;
     }
     let variance = |i: usize| {
-        let of = |frame: &&Frame| f64::from(frame.radiance[i / 3][i % 3]);
+        let of = |frame: &&Frame| f64::from(frame.radiance()[i / 3][i % 3]);
         let mean = frames.iter().map(of).sum::<f64>() / count;
         frames.iter().map(|frame| (of(frame) - mean).powi(2)).sum::<f64>() / (count - 1.0)
     };
@@ -33,16 +33,16 @@ pub(super) fn noise(frames: &[&Frame]) -> Option<f64> {
 /// fewer than two renders, or of a picture without a pixel.
 pub(super) fn bias(frames: &[&Frame], reference: &Frame) -> Option<Bias> {
     let count = frames.len() as f64;
-    if frames.len() < 2 || reference.radiance.is_empty() {
+    if frames.len() < 2 || reference.radiance().is_empty() {
         return None;
     }
     let (width, height) = (reference.width as usize, reference.height as usize);
     let columns = width.div_ceil(BLOCK);
     let mut blocks = vec![(0.0, 0.0); columns * height.div_ceil(BLOCK)];
-    for (i, right) in reference.radiance.iter().enumerate() {
+    for (i, right) in reference.radiance().iter().enumerate() {
         let block = &mut blocks[i / width / BLOCK * columns + i % width / BLOCK];
         for (c, right) in right.iter().enumerate() {
-            let difference = |frame: &&Frame| f64::from(frame.radiance[i][c]) - f64::from(*right);
+            let difference = |frame: &&Frame| f64::from(frame.radiance()[i][c]) - f64::from(*right);
             let sum: f64 = frames.iter().map(difference).sum();
             let squares: f64 = frames.iter().map(|frame| difference(frame).powi(2)).sum();
             // The mean of the products over all pairs.
@@ -62,8 +62,8 @@ mod tests {
     use super::*;
 
     fn frame(side: u32, value: impl Fn(u32) -> f32) -> Frame {
-        let radiance = (0..side * side).map(|i| [value(i); 3]).collect();
-        Frame { width: side, height: side, radiance, ..Frame::default() }
+        let radiance: Vec<_> = (0..side * side).map(|i| [value(i); 3]).collect();
+        Frame::new(side, side, &radiance)
     }
 
     /// A number from -1 to 1 that looks random.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Plan, Results, Row, Verdict, claims::answers, sheet::brief};
+use super::{Plan, Results, Row, Verdict, claims::answers, numbers::brief};
 
 /// The table and the claims as text.
 #[must_use]

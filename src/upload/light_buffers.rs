@@ -9,7 +9,7 @@ use crate::{
         targets::{delta_targets, scene_target},
     },
     error::Result,
-    gpu::{Buffer, Gpu},
+    gpu::{Buffer, Gpu, Table},
     layout::{EnvironmentInfo, SceneSphere},
     scene::Scene,
     settings::LightSettings,
@@ -40,9 +40,9 @@ pub struct LightBuffers {
     targets: Buffer,
     scene_sphere: Buffer,
     environment_info: Buffer,
-    environment: Buffer,
-    environment_cells: Buffer,
-    environment_rows: Buffer,
+    environment: Table,
+    environment_cells: Table,
+    environment_rows: Table,
 }
 
 impl LightBuffers {
@@ -53,7 +53,8 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = delta_targets(scene);
-        let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, gpu.max_binding()));
+        let most = gpu.max_binding().min(gpu.max_table());
+        let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
         let probe = MediaProbe::new(scene, bvh);
         let buried = table.lights.iter_mut().map(|light| set_media(light, &probe)).filter(|fits| !fits).count();
@@ -84,21 +85,28 @@ impl LightBuffers {
             targets: gpu.storage_with("targets", &spheres)?,
             scene_sphere: gpu.uniform("scene sphere", &scene_sphere),
             environment_info: gpu.uniform("environment info", &environment_info),
-            environment: gpu.storage_with("environment", pixels)?,
-            environment_cells: gpu.storage_with("environment cells", cells)?,
-            environment_rows: gpu.storage_with("environment rows", rows)?,
+            environment: Table::new(gpu, "environment", pixels)?,
+            environment_cells: Table::new(gpu, "environment cells", cells)?,
+            environment_rows: Table::new(gpu, "environment rows", rows)?,
             table,
         })
     }
 
     /// The variables that all passes share; a pass binds its `choices` besides.
     #[must_use]
-    pub fn bindings(&self) -> [(&'static str, &Buffer); 7] {
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 4] {
         [
             ("lights", &self.lights),
             ("targets", &self.targets),
             ("scene_sphere", &self.scene_sphere),
             ("environment_info", &self.environment_info),
+        ]
+    }
+
+    /// The tables that all passes share.
+    #[must_use]
+    pub fn tables(&self) -> [(&'static str, &Table); 3] {
+        [
             ("environment", &self.environment),
             ("environment_cells", &self.environment_cells),
             ("environment_rows", &self.environment_rows),

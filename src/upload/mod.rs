@@ -3,4 +3,4 @@
 pub mod light_buffers;
 pub mod scene_buffers;
 
-pub use scene_buffers::SceneBuffers;
+pub use scene_buffers::{SceneBuffers, sampler_constant};

@@ -10,12 +10,12 @@ use crate::{
     emitters::light_table::{LightTable, emission_in},
     error::Result,
     gpu::{
-        Buffer, Gpu, Kernel,
+        Buffer, Gpu, Kernel, Table,
         shaders::{Shader, shader},
     },
     layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
     scene::{Material, MediaTable, Scene, Surface},
-    settings::{LightUnit, Sampler, Settings},
+    settings::{LightSettings, LightUnit, Sampler},
 };
 
 /// The scene's buffers.
@@ -23,16 +23,25 @@ use crate::{
 pub struct SceneBuffers {
     nodes: Buffer,
     primitives: Windows,
-    normals: Buffer,
-    materials: Buffer,
-    media: Buffer,
+    normals: Table,
+    materials: Table,
+    media: Table,
     has_spheres: bool,
     /// Children that a traversal can postpone.
     stack: usize,
-    sampler: Sampler,
     /// Some surface both reflects and transmits.
     pub has_dielectrics: bool,
     pub lights: LightBuffers,
+}
+
+/// The `override` constant that says where a kernel's numbers for sampling come from.
+#[must_use]
+pub fn sampler_constant(sampler: Sampler) -> (&'static str, f64) {
+    let number = match sampler {
+        Sampler::Sobol => layout::SAMPLER_SOBOL,
+        Sampler::Random => layout::SAMPLER_RANDOM,
+    };
+    ("SAMPLER", f64::from(number))
 }
 
 /// An array in one binding, or in two where it exceeds one.
@@ -48,24 +57,24 @@ impl SceneBuffers {
     /// Uploads the scene.
     ///
     /// # Errors
-    /// [`crate::Error::Limit`] if the primitives exceed two bindings, or the nodes or normals one; as [`LightBuffers::new`].
-    pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &Settings) -> Result<Self> {
+    /// [`crate::Error::Limit`] if the primitives exceed two bindings, the nodes one, or normals,
+    /// materials or media a table; as [`LightBuffers::new`].
+    pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         let media = MediaTable::new(&scene.materials);
-        let row = |(m, i)| material(m, media.of(i), settings.lights.unit);
+        let row = |(m, i)| material(m, media.of(i), settings.unit);
         let materials: Vec<_> = scene.materials.iter().zip(0..).map(row).collect();
         let media: Vec<_> = media.media.iter().map(|medium| layout::Medium { ior: medium.ior }).collect();
-        let lights = LightBuffers::new(gpu, scene, bvh, &settings.lights)?;
+        let lights = LightBuffers::new(gpu, scene, bvh, settings)?;
         Ok(Self {
             nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
             primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &lights.table))?,
-            normals: gpu.storage_with("normals", &bvh.normals)?,
-            materials: gpu.storage_with("materials", &materials)?,
-            media: gpu.storage_with("media", &media)?,
+            normals: Table::new(gpu, "normals", &bvh.normals)?,
+            materials: Table::new(gpu, "materials", &materials)?,
+            media: Table::new(gpu, "media", &media)?,
             has_dielectrics: scene.materials.iter().any(|m| m.surface.ior().is_some()),
             has_spheres: !scene.spheres.is_empty(),
             // In steps, so that few variants of a kernel are compiled.
-            stack: bvh.most_postponed().max(1).next_multiple_of(16),
-            sampler: settings.photons.sampler,
+            stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
             lights,
         })
     }
@@ -87,7 +96,6 @@ impl SceneBuffers {
     #[must_use]
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
-            ("SAMPLER", f64::from(self.sampler())),
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
@@ -95,14 +103,10 @@ impl SceneBuffers {
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
         ];
         overrides.extend_from_slice(others);
-        Kernel::of(gpu, shader, &overrides)
-    }
-
-    fn sampler(&self) -> u32 {
-        match self.sampler {
-            Sampler::Sobol => layout::SAMPLER_SOBOL,
-            Sampler::Random => layout::SAMPLER_RANDOM,
-        }
+        let [pixels, cells, rows] = self.lights.tables();
+        let own = [("normals", &self.normals), ("materials", &self.materials), ("media_table", &self.media)];
+        let tables = [&own[..], &[pixels, cells, rows]].concat();
+        Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }
 
     /// The scene's variables, followed by others.
@@ -112,9 +116,6 @@ impl SceneBuffers {
             ("nodes", &self.nodes),
             ("primitives", &self.primitives.low),
             ("primitives_high", &self.primitives.high),
-            ("normals", &self.normals),
-            ("materials", &self.materials),
-            ("media_table", &self.media),
         ];
         all.extend(self.lights.bindings());
         all.extend_from_slice(others);

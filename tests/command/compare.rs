@@ -88,7 +88,7 @@ fn a_comparison_leaves_all_files_and_a_table() {
     assert!(said.contains("compare: 100 %") && said.contains("device: "), "{said}");
     assert!(!said.contains(['\r', '\u{1b}']), "plain lines when piped: {said}");
     assert_eq!(names(&new), FILES.iter().map(ToString::to_string).collect());
-    let picture = |name: &str| read_exr(&new.join(name)).expect("an EXR").radiance;
+    let picture = |name: &str| read_exr(&new.join(name)).expect("an EXR").radiance().to_vec();
     let (grid, kdtree, difference) = (picture("grid.exr"), picture("kdtree.exr"), picture("difference.exr"));
     assert_eq!(difference[100][0], grid[100][0] - kdtree[100][0]);
     assert!(grid.iter().any(|p| p[0] > 0.0) && grid.len() == 32 * 24);
@@ -240,17 +240,19 @@ fn both_searches_agree_in_every_mode() {
 fn both_searches_make_the_same_picture() {
     let scene = Scene::load(Path::new(SCENE)).expect("the scene loads");
     let settings = small(Mode::Hybrid).with(|s| s.estimate.raw = true);
-    let session = Session::open(gpu(), &scene, &settings, &Silent).expect("the scene fits");
-    let maps = session.photon_maps(&settings, &Silent).expect("photons");
-    let picture = |settings: Settings| session.picture(&maps, &settings, &Silent).expect("a picture").frame;
+    let session = Session::open(gpu(), &scene, &settings.lights, &Silent).expect("the scene fits");
+    let maps = session.photon_maps(&settings.photons, &Silent).expect("photons");
+    let picture = |settings: Settings| {
+        session.picture(&maps, &settings.estimate, &settings.picture, &Silent).expect("a picture").frame
+    };
     let grid = picture(settings.clone());
     let worst = |other: &caustica::image::Frame| {
-        let pairs = grid.radiance.iter().flatten().zip(other.radiance.iter().flatten());
+        let pairs = grid.radiance().iter().flatten().zip(other.radiance().iter().flatten());
         pairs.map(|(a, b)| (a - b).abs() / a.max(*b).max(1e-12)).fold(0.0, f32::max)
     };
     let kdtree = picture(settings.clone().with(|s| s.estimate.search = Search::KdTree));
     assert!(worst(&kdtree) < 1e-5, "{}", worst(&kdtree));
-    assert!(kdtree.depth == grid.depth && kdtree.albedo == grid.albedo);
+    assert!(kdtree.depth() == grid.depth() && kdtree.albedo() == grid.albedo());
     let control = picture(settings.clone().with(|s| {
         s.estimate.search = Search::KdTree;
         s.estimate.neighbors += 1;
@@ -265,7 +267,7 @@ fn render_takes_the_search() {
         let out = folder.path().join(name);
         let line = format!("render {SCENE} -q --size 16x16 --photons 2k -k 10 --raw-estimate {words} -o");
         assert!(command(&line).arg(&out).status().expect("it starts").success());
-        read_exr(&out).expect("an EXR").radiance
+        read_exr(&out).expect("an EXR").radiance().to_vec()
     };
     let (grid, kdtree) = (render("a.exr", "--search grid"), render("b.exr", "--search kdtree"));
     let close = |a: &[[f32; 3]], b: &[[f32; 3]]| {

@@ -4,5 +4,6 @@ mod browser;
 mod cli;
 mod compare;
 mod compare_page;
+mod drivers;
 mod study;
 mod study_page;

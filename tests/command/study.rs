@@ -170,7 +170,7 @@ fn errors_are_those_of_the_measures() {
     let results = run(&plan(picture, &[Mode::Hybrid], 1), folder.path());
     let [same, apart] = [&results.rows[0], &results.rows[1]];
     assert_eq!((same.rel_mse, same.rmse, same.flip), (Some(0.0), Some(0.0), Some(0.0)));
-    let (a, b) = (&other.radiance, &reference.radiance);
+    let (a, b) = (&other.radiance(), &reference.radiance());
     assert_eq!(apart.rel_mse, Some(difference::rel_mse(a, b, None)));
     assert!((apart.rmse.expect("measured") - difference::rmse(a, b, None)).abs() < 1e-12);
     let look = Look::default();
@@ -181,7 +181,7 @@ fn errors_are_those_of_the_measures() {
 #[test]
 fn a_reference_of_another_size_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let frame = Frame { width: 4, height: 4, radiance: vec![[0.0; 3]; 16], ..Frame::default() };
+    let frame = Frame::new(4, 4, &[[0.0; 3]; 16]);
     let picture = Reference::Picture { name: "right.exr".to_string(), frame: Box::new(frame) };
     let plan = plan(picture, &[Mode::Hybrid], 1);
     let error = study::run(gpu(), &plan, folder.path(), &Silent).expect_err("the sizes differ").to_string();

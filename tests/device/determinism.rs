@@ -75,7 +75,7 @@ fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampl
     scene.lights.push(Light { kind, ..point_light(Vec3::ZERO, 1.0) });
     let bvh = Bvh::build(&scene);
     let settings = Settings::default().with(|s| s.photons.sampler = sampler);
-    let buffers = SceneBuffers::new(gpu, &scene, &bvh, &settings).expect("the scene fits");
+    let buffers = SceneBuffers::new(gpu, &scene, &bvh, &settings.lights).expect("the scene fits");
     let emit = buffers.kernel(gpu, "emit_photons");
     let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns, target_count: 1, ..Default::default() };
     let batch = batch.starting_at(first);

@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 
 use caustica::{
     bvh::Bvh,
-    scene::{Environment, LEAST_FALLOFF, Light, LightKind, Scene},
+    scene::{Environment, Light, LightKind, MIN_FALLOFF, Scene},
     settings::{LightSampling, Settings},
     upload::{SceneBuffers, light_buffers::ChoiceBuffer},
 };
@@ -25,7 +25,7 @@ use super::{
 };
 pub fn upload(scene: &Scene, sampling: LightSampling) -> SceneBuffers {
     let settings = Settings::default().with(|s| s.lights.sampling = sampling);
-    SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &settings).expect("the scene fits")
+    SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &settings.lights).expect("the scene fits")
 }
 
 /// Rows of a probe over the scene, its lights chosen by power.
@@ -135,7 +135,7 @@ fn surfaces_send_by_the_cosine() {
 /// 0 on.
 fn falloff(inner: f64, outer: f64, height: f64) -> (f64, f64) {
     let edge = 1.0 - outer.cos();
-    let width = (inner.cos() - outer.cos()).max(LEAST_FALLOFF.into());
+    let width = (inner.cos() - outer.cos()).max(MIN_FALLOFF.into());
     let rest = |height: f64| {
         let t = ((edge - height) / width).clamp(0.0, 1.0);
         // What lies farther out than the height: linear within the inner cone, a cube outside of

@@ -132,9 +132,9 @@ fn a_finished_map_keeps_48_bytes_a_photon() {
     let (scene, gpu) = (room(8), Gpu::open(None).expect("tests need an adapter"));
     for photons in [20_000, 500_000] {
         let settings = settings(Mode::Photons, photons, 16);
-        let session = Session::open(&gpu, &scene, &settings, &Silent).expect("the scene fits");
+        let session = Session::open(&gpu, &scene, &settings.lights, &Silent).expect("the scene fits");
         let before = gpu.memory.now();
-        let maps = session.photon_maps(&settings, &Silent).expect("photons");
+        let maps = session.photon_maps(&settings.photons, &Silent).expect("photons");
         let (kept, stored) = (gpu.memory.now() - before, maps.maps().iter().map(|m| u64::from(m.count())).sum::<u64>());
         assert!(stored >= u64::from(photons) * 9 / 10, "{stored} photons stored");
         assert!(kept <= 48 * stored + 1024, "{kept} bytes for {stored} photons");

@@ -6,8 +6,8 @@ use caustica::{
     layout::{Gathered, Photon, PhotonFlux, PhotonPlace, VisiblePoint},
     passes::{
         estimate::gather::{Gather, GatherOptions, GatherSettings, GatherStats, gathered_buffer},
-        maps::photon_map::{MapKernels, PhotonMap, PhotonStore},
         maps::radix_sort::RadixSort,
+        maps::{MapKernels, PhotonMap, PhotonStore},
     },
     progress::Silent,
     reference::{Found, brute_force, estimate, usable},

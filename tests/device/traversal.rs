@@ -3,7 +3,7 @@
 use caustica::{
     bvh::Bvh,
     scene::{Scene, Sphere, Triangle},
-    settings::Settings,
+    settings::LightSettings,
     upload::SceneBuffers,
 };
 use glam::{DVec3, Vec3};
@@ -60,7 +60,7 @@ fn rays(middle: Vec3) -> Vec<Row> {
 
 /// Distance of the nearest hit of each ray on the device; infinite if there is none.
 fn on_device(scene: &Scene, bvh: &Bvh, rays: &[Row]) -> Vec<f64> {
-    let buffers = SceneBuffers::new(gpu(), scene, bvh, &Settings::default()).expect("the scene fits");
+    let buffers = SceneBuffers::new(gpu(), scene, bvh, &LightSettings::default()).expect("the scene fits");
     let found = Probe::of_scene("trace_rays", &buffers, &buffers.lights.direct).run(rays);
     found.into_iter().map(|[t, .., primitive]| if primitive < 0.0 { f64::INFINITY } else { t.into() }).collect()
 }
@@ -121,7 +121,7 @@ fn finds_what_brute_force_finds() {
     ] {
         let scene = shapes(triangles, spheres, size, middle);
         let bvh = Bvh::build(&scene);
-        if bvh.most_postponed() <= 16 {
+        if bvh.max_stack_depth() <= 16 {
             short += 1
         } else {
             long += 1

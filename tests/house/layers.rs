@@ -58,7 +58,7 @@ fn starts_a_path(tokens: &[String], name: &str) -> bool {
     })
 }
 
-fn is_name(token: &str) -> bool {
+pub(super) fn is_name(token: &str) -> bool {
     token.starts_with(|c: char| c.is_alphabetic() || c == '_')
 }
 
@@ -109,7 +109,7 @@ fn follow(tokens: &[String], mut at: usize, base: &[&str], used: &mut Vec<String
 }
 
 /// Names, `::` and single signs of the code; no comments, no literals.
-fn tokens(source: &str) -> Vec<String> {
+pub(super) fn tokens(source: &str) -> Vec<String> {
     let chars: Vec<char> = source.chars().collect();
     let at = |i: usize| chars.get(i).copied().unwrap_or('\0');
     let (mut tokens, mut i) = (Vec::new(), 0);
@@ -178,7 +178,7 @@ fn raw_string_end(chars: &[char], start: usize) -> Option<usize> {
 }
 
 /// All Rust files below a folder, as paths relative to `root`.
-fn files(root: &Path, folder: &Path, found: &mut Vec<String>) {
+pub(super) fn files(root: &Path, folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("src/ can be listed") {
         let path = entry.expect("src/ can be listed").path();
         if path.is_dir() {

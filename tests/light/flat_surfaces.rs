@@ -25,7 +25,7 @@ fn rejection_and_correction_are_right_together_and_wrong_alone() {
 
 /// What is amiss with the light of a picture, if another one is right.
 fn amiss(found: &Render, right: &Render) -> Option<String> {
-    let largest = |r: &Render| r.frame.radiance.iter().flatten().copied().fold(0.0, f32::max);
+    let largest = |r: &Render| r.frame.radiance().iter().flatten().copied().fold(0.0, f32::max);
     let ratios = [mean(found) / mean(right), f64::from(largest(found) / largest(right))];
     let plausible = (ratios[0] - 1.0).abs() < 0.06 && ratios[1] < 1.5;
     (!plausible).then(|| format!("mean and largest pixel, over those of many photons: {ratios:.3?}"))

@@ -41,7 +41,7 @@ fn without_lamp(lamp: usize) -> Scene {
 fn largest_difference(render: &Render, sum: &[[f32; 3]]) -> f64 {
     let scale = mean(render);
     let difference =
-        render.frame.radiance.iter().flatten().zip(sum.iter().flatten()).map(|(a, b)| f64::from((a - b).abs()));
+        render.frame.radiance().iter().flatten().zip(sum.iter().flatten()).map(|(a, b)| f64::from((a - b).abs()));
     difference.fold(0.0, f64::max) / scale
 }
 
@@ -53,7 +53,7 @@ fn hybrid_is_direct_rays_plus_indirect_photons() {
             .map(|mode| render_scene(&scene, &settings(mode, 20_000, 48)));
     let sum = |a: &Render, b: &Render| -> Vec<[f32; 3]> {
         let add = |(a, b): (&[f32; 3], &[f32; 3])| (Vec3::from(*a) + Vec3::from(*b)).to_array();
-        a.frame.radiance.iter().zip(&b.frame.radiance).map(add).collect()
+        a.frame.radiance().iter().zip(b.frame.radiance()).map(add).collect()
     };
     let right = largest_difference(&hybrid, &sum(&direct, &indirect));
     let wrong = largest_difference(&hybrid, &sum(&direct, &other));
@@ -149,7 +149,7 @@ fn modes_agree_on_a_smooth_shaded_ball() {
     let blocks = |render: &Render| -> Vec<f64> {
         let block = |b: usize| {
             let pixels = (0..16).map(|i| ((b / 10) * 4 + i / 4) * 40 + (b % 10) * 4 + i % 4);
-            pixels.map(|p| f64::from(render.frame.radiance[p][0])).sum::<f64>() / 16.0
+            pixels.map(|p| f64::from(render.frame.radiance()[p][0])).sum::<f64>() / 16.0
         };
         (0..100).map(block).collect()
     };

@@ -18,14 +18,14 @@ use std::path::Path;
 use caustica::{
     Error,
     bvh::Bvh,
-    image::{PlaceInWhole, difference::rel_mse, read_exr},
+    image::{DataWindow, difference::rel_mse, read_exr},
     layout::VisiblePoint,
     passes::CameraTracer,
     pixel_filter::PixelFilter,
     progress::Silent,
     renderer::{Session, render},
     scene::{Camera, Projection, Scene},
-    settings::{Crop, Mode, Sampler, Settings},
+    settings::{Crop, Mode, PictureSettings, Sampler, Settings},
     upload::SceneBuffers,
 };
 use glam::{DVec2, Vec3, vec3};
@@ -46,9 +46,17 @@ fn parallel_camera(ymag: f32) -> Camera {
 
 /// Pixel and position of what the samples of a picture of `size` see.
 fn visible(scene: &Scene, camera: &Camera, size: u32, settings: &Settings) -> Vec<((u32, u32), Vec3)> {
-    let buffers = SceneBuffers::new(gpu(), scene, &Bvh::build(scene), settings).expect("the scene fits");
-    let tracer =
-        CameraTracer::new(gpu(), &buffers, camera, [0; 4], (size, size), settings).expect("the camera is right");
+    let buffers = SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &settings.lights).expect("the scene fits");
+    let tracer = CameraTracer::new(
+        gpu(),
+        &buffers,
+        (camera, [0; 4]),
+        (size, size),
+        &settings.photons,
+        &settings.picture,
+        settings.estimate.share_reach > 0.0,
+    )
+    .expect("the camera is right");
     let mut found = Vec::new();
     for tile in tracer.tiles() {
         tracer.trace(gpu(), &buffers, &tile).expect("the tile is traced");
@@ -229,8 +237,8 @@ fn wider_filters_soften_edges_and_keep_the_mean() {
             s.picture.spp = 256;
         });
         let frame = render_scene(&half, &settings).frame;
-        let mean = frame.alpha.iter().sum::<f32>() / 256.0;
-        (frame.alpha[16 * 8 + 7], mean)
+        let mean = frame.alpha().iter().sum::<f32>() / 256.0;
+        (frame.alpha()[16 * 8 + 7], mean)
     };
     let (sharp, soft) = (alpha(PixelFilter::Box), alpha(PixelFilter::Gaussian));
     assert!(sharp.0 == 1.0 && (soft.0 - 0.841).abs() < 0.02, "{sharp:?} {soft:?}");
@@ -302,20 +310,22 @@ fn a_crop_has_the_bits_of_the_whole() {
     let scene = room();
     // Two tiles and more: 20 samples with 4 branches leave 512 pixels to a tile.
     let base = settings(Mode::Hybrid, 3000, 40).with(|s| s.picture.spp = 20);
-    let session = Session::open(gpu(), &scene, &base, &Silent).expect("the scene fits");
-    let maps = session.photon_maps(&base, &Silent).expect("photons");
-    let picture =
-        |crop| session.picture(&maps, &base.clone().with(|s| s.picture.crop = crop), &Silent).map(|r| r.frame);
+    let session = Session::open(gpu(), &scene, &base.lights, &Silent).expect("the scene fits");
+    let maps = session.photon_maps(&base.photons, &Silent).expect("photons");
+    let picture = |crop| {
+        let picture = PictureSettings { crop, ..base.picture.clone() };
+        session.picture(&maps, &base.estimate, &picture, &Silent).map(|r| r.frame)
+    };
     let whole = picture(None).expect("a picture");
     let part = Crop { column: 5, row: 19, width: 11, height: 9 };
     let cropped = picture(Some(part)).expect("a part");
     assert_eq!((cropped.width, cropped.height), (11, 9));
-    assert_eq!(cropped.place, Some(PlaceInWhole { whole: (40, 40), column: 5, row: 19 }));
+    assert_eq!(cropped.window, Some(DataWindow { whole: (40, 40), column: 5, row: 19 }));
     let same = |column: u32| {
         (0..99).all(|i: u32| {
             let there = ((19 + i / 11) * 40 + column + i % 11) as usize;
             let i = i as usize;
-            cropped.radiance[i] == whole.radiance[there] && cropped.depth[i] == whole.depth[there]
+            cropped.radiance()[i] == whole.radiance()[there] && cropped.depth()[i] == whole.depth()[there]
         })
     };
     assert!(same(5), "the part differs from the whole");
@@ -330,16 +340,21 @@ fn a_crop_has_the_bits_of_the_whole() {
 fn shared_estimates_err_like_those_of_every_sample() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let scene = Scene::load(&folder.join("S2.glb")).expect("the scene loads");
-    let reference = read_exr(&folder.join("S2_128.exr")).expect("the reference reads").radiance;
+    let reference = read_exr(&folder.join("S2_128.exr")).expect("the reference reads").radiance().to_vec();
     let base = settings(Mode::Hybrid, 60_000, 128).with(|s| {
         s.estimate.raw = true;
         s.picture.spp = 2;
     });
-    let session = Session::open(gpu(), &scene, &base, &Silent).expect("the scene fits");
+    let session = Session::open(gpu(), &scene, &base.lights, &Silent).expect("the scene fits");
     let picture = |settings: &Settings, share_reach: f32| {
-        let maps = session.photon_maps(settings, &Silent).expect("photons");
+        let maps = session.photon_maps(&settings.photons, &Silent).expect("photons");
         let settings = settings.clone().with(|s| s.estimate.share_reach = share_reach);
-        session.picture(&maps, &settings, &Silent).expect("a picture").frame.radiance
+        session
+            .picture(&maps, &settings.estimate, &settings.picture, &Silent)
+            .expect("a picture")
+            .frame
+            .radiance()
+            .to_vec()
     };
     let (shared, own) = (picture(&base, base.estimate.share_reach), picture(&base, 0.0));
     let error = |picture: &[[f32; 3]]| rel_mse(picture, &reference, None);
@@ -372,11 +387,11 @@ fn shared_estimates_go_on_across_the_borders_of_tiles() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/diffuse.gltf");
     let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
     let asked = settings(Mode::IndirectPhotons, 20_000, 256).with(|s| s.picture.spp = 4);
-    let mut radiance = render_scene(&scene, &asked).frame.radiance;
+    let mut radiance = render_scene(&scene, &asked).frame.radiance().to_vec();
     let step = step_at_borders(&radiance, 256, 128);
     assert!(step < 2.0, "light changes {step} times as much where tiles meet as elsewhere");
     // Control: tiles that do not share with each other, for their photons are not the same.
-    let other = render_scene(&scene, &asked.clone().with(|s| s.photons.seed = 1)).frame.radiance;
+    let other = render_scene(&scene, &asked.clone().with(|s| s.photons.seed = 1)).frame.radiance().to_vec();
     for (row, other) in radiance.chunks_mut(256).zip(other.chunks(256)) {
         row[128..].copy_from_slice(&other[128..]);
     }

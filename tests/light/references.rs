@@ -12,7 +12,7 @@ use caustica::{
     progress::Silent,
     renderer::Session,
     scene::Scene,
-    settings::Mode,
+    settings::{EstimateSettings, Mode},
 };
 use support::*;
 
@@ -21,10 +21,13 @@ fn errors(name: &str, other: &str, size: u32, most: f64) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let suffix = if size == 256 { "" } else { "_128" };
     let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
-    let picture =
-        render_scene(&scene, &settings(Mode::Hybrid, 200_000, size).with(|s| s.picture.spp = 4)).frame.radiance;
-    let reference =
-        |name: &str| read_exr(&folder.join(format!("{name}{suffix}.exr"))).expect("the reference reads").radiance;
+    let picture = render_scene(&scene, &settings(Mode::Hybrid, 200_000, size).with(|s| s.picture.spp = 4))
+        .frame
+        .radiance()
+        .to_vec();
+    let reference = |name: &str| {
+        read_exr(&folder.join(format!("{name}{suffix}.exr"))).expect("the reference reads").radiance().to_vec()
+    };
     let right = rel_mse(&picture, &reference(name), None);
     assert!(right < most, "{name}: relMSE {right}");
     let wrong = rel_mse(&picture, &reference(other), None);
@@ -40,18 +43,19 @@ fn means(name: &str) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let sum = |image: &[[f32; 3]]| image.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
     let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
-    let reference = sum(&read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance);
+    let reference = sum(&read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance());
     let mut ratios = [0.0; 2];
     for seed in 0..4 {
         let settings = settings(Mode::Hybrid, 200_000, 128).with(|s| {
             s.photons.seed = seed;
             s.picture.spp = 2;
         });
-        let session = Session::open(gpu(), &scene, &settings, &Silent).expect("the scene fits");
-        let maps = session.photon_maps(&settings, &Silent).expect("photons");
+        let session = Session::open(gpu(), &scene, &settings.lights, &Silent).expect("the scene fits");
+        let maps = session.photon_maps(&settings.photons, &Silent).expect("photons");
         for (ratio, neighbors) in ratios.iter_mut().zip([100, 10]) {
-            let picture = session.picture(&maps, &settings.clone().with(|s| s.estimate.neighbors = neighbors), &Silent);
-            *ratio += sum(&picture.expect("a picture").frame.radiance) / reference / 4.0;
+            let estimate = EstimateSettings { neighbors, ..settings.estimate.clone() };
+            let picture = session.picture(&maps, &estimate, &settings.picture, &Silent);
+            *ratio += sum(&picture.expect("a picture").frame.radiance()) / reference / 4.0;
         }
     }
     for (ratio, neighbors) in ratios.into_iter().zip([100, 10]) {
@@ -61,7 +65,7 @@ fn means(name: &str) {
         s.photons.max_bounces = 6;
         s.estimate.neighbors = 10;
     });
-    let ratio = sum(&render_scene(&scene, &short).frame.radiance) / reference;
+    let ratio = sum(&render_scene(&scene, &short).frame.radiance()) / reference;
     assert!((ratio - 1.0).abs() > 0.005, "control: {name} with at most 6 bounces has the mean {ratio}");
 }
 

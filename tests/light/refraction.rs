@@ -40,7 +40,7 @@ fn edge_scene(slab: Option<Surface>) -> Scene {
 fn edge_height(scene: &Scene) -> f64 {
     let settings = settings(Mode::DirectRays, 1000, 128).with(|s| s.picture.spp = 16);
     let frame = render_scene(scene, &settings).frame;
-    let column: Vec<f32> = frame.radiance.iter().skip(64).step_by(128).map(|p| p[0]).collect();
+    let column: Vec<f32> = frame.radiance().iter().skip(64).step_by(128).map(|p| p[0]).collect();
     // The white part has about 1; stray reflections in the glass brighten the black one a little.
     let dark = 0.2;
     column.iter().filter(|p| **p < dark).count() as f64 / 128.0

@@ -1,16 +1,22 @@
 //! The camera pass: the picture's samples, tile by tile: camera rays to their visible points, direct light, and the
 //! sum over each pixel's samples. Memory depends on the size of a tile alone.
 
-use super::direct_light::DirectLighting;
+use super::{
+    direct_light::DirectLighting,
+    tile::{StepCount, Tile},
+};
 use crate::{
     bvh::Media,
     error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CameraTile, Counters, FirstHit, Gathered, MARGIN_CELL, MARGIN_SAMPLES, Path, TilePixel, VisiblePoint},
-    passes::estimate::SharedPoints,
+    layout::{CameraTile, Counters, FirstHit, Gathered, MARGIN_CELL, MARGIN_SAMPLES, PixelSums, VisiblePoint},
+    passes::{
+        estimate::SharedPoints,
+        wavefront::{Step, Wavefront},
+    },
     scene::{Camera, Projection},
-    settings::{Crop, Settings},
-    upload::SceneBuffers,
+    settings::{Crop, PhotonSettings, PictureSettings},
+    upload::{SceneBuffers, sampler_constant},
 };
 
 /// Visible points that a tile has room for, without its margin.
@@ -21,29 +27,13 @@ const BRANCHES: u32 = 4;
 const PIXEL_SAMPLES: u32 = 256;
 /// Dispatches of direct light whose shadow rays are counted together: with one ray of each point they stay far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
-/// Bounces handed to the device at once.
-const BOUNCES_PER_SUBMISSION: u32 = 32;
 /// Pixels of a tile at least.
 const MIN_TILE_PIXELS: u32 = 64;
-
-/// A part of the picture's samples.
-#[derive(Clone, Copy, Debug)]
-pub struct Tile {
-    /// Pixels, a power of 2, in Morton order; some of them may lie outside the picture.
-    pub pixels: u32,
-    /// Pixel of the upper left corner.
-    pub first_column: u32,
-    pub first_row: u32,
-    pub first_sample: u32,
-    /// Samples of each pixel.
-    pub samples: u32,
-}
 
 /// Kernels of the camera pass.
 #[derive(Debug)]
 pub struct CameraKernels {
     start: Kernel,
-    advance: Kernel,
     trace: Kernel,
     direct: DirectLighting,
     resolve: Kernel,
@@ -51,15 +41,20 @@ pub struct CameraKernels {
 
 impl CameraKernels {
     #[must_use]
-    pub fn new(gpu: &Gpu, scene: &SceneBuffers, settings: &Settings) -> Self {
-        let sees_lights = f64::from(u8::from(settings.photons.mode.sees_lights()));
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, photons: &PhotonSettings, light_samples: u32) -> Self {
+        let sampler = sampler_constant(photons.sampler);
+        let sees_lights = ("SEES_LIGHTS", f64::from(u8::from(photons.mode.sees_lights())));
         Self {
-            start: scene.kernel(gpu, "start_camera"),
-            advance: Kernel::new(gpu, "advance_queue", &[]),
-            trace: scene.kernel_with(gpu, "trace_camera", &[("SEES_LIGHTS", sees_lights)]),
-            direct: DirectLighting::new(gpu, scene, settings.picture.light_samples),
+            start: scene.kernel_with(gpu, "start_camera", &[sampler]),
+            trace: scene.kernel_with(gpu, "trace_camera", &[sampler, sees_lights]),
+            direct: DirectLighting::new(gpu, scene, photons.sampler, light_samples),
             resolve: Kernel::new(gpu, "resolve", &[]),
         }
+    }
+
+    /// Has them compiled ahead of their use.
+    pub fn prefetch(gpu: &Gpu, scene: &SceneBuffers, photons: &PhotonSettings, light_samples: u32) {
+        let _ = Self::new(gpu, scene, photons, light_samples);
     }
 }
 
@@ -67,10 +62,7 @@ impl CameraKernels {
 #[derive(Debug)]
 pub struct CameraTracer {
     kernels: CameraKernels,
-    paths: Buffer,
-    queues: [Buffer; 2],
-    counters: Buffer,
-    dispatch_arguments: Buffer,
+    wavefront: Wavefront,
     /// A [`VisiblePoint`] per place for a path, some of them not valid.
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
@@ -78,58 +70,50 @@ pub struct CameraTracer {
     /// What the last gather found at each visible point, [`Gathered`].
     pub gathered: Buffer,
     first_hits: Buffer,
-    pixels: Buffer,
+    /// Sums over the samples of each pixel, [`LAYER_ROWS`] + 1 rows a pixel.
+    pixel_rows: Buffer,
     filter_table: Buffer,
     view: CameraTile,
     window: Crop,
 }
 
-/// What one step did, for the statistics.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StepCount {
-    pub rays: u64,
-    pub media_overflows: u64,
-    pub unfinished: u64,
-    pub non_finite: u64,
-}
-
 impl CameraTracer {
-    /// All rays start inside of `media`, those around the middle of the camera.
+    /// All rays start inside of `media`, those around the middle of the camera. `shares`: estimates are
+    /// shared among points, for which a tile needs a margin.
     ///
     /// # Errors
     /// Limits of the adapter; a lens before an orthographic camera.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
-        camera: &Camera,
-        media: Media,
+        (camera, media): (&Camera, Media),
         size: (u32, u32),
-        settings: &Settings,
+        photons: &PhotonSettings,
+        picture: &PictureSettings,
+        shares: bool,
     ) -> Result<Self> {
         let branches = if scene.has_dielectrics { BRANCHES } else { 1 };
-        let offsets = settings.picture.pixel_filter_offsets();
-        let view =
-            CameraTile { branches, filter_steps: offsets.len() as u32 - 1, media, ..view(camera, size, settings)? };
-        let has_margin = settings.estimate.share_reach > 0.0 && settings.photons.mode.traces_photons();
-        // Estimates that are shared need the cells around a tile.
-        let margin = if has_margin { margin_cells(tile_sides(&view)) * MARGIN_SAMPLES } else { 0 };
+        let offsets = picture.pixel_filter_offsets();
+        let view = CameraTile {
+            branches,
+            filter_steps: offsets.len() as u32 - 1,
+            media,
+            ..view(camera, size, photons, picture)?
+        };
+        let margin = if shares { margin_cells(tile_sides(&view)) * MARGIN_SAMPLES } else { 0 };
         let samples = TILE_POINTS / u64::from(branches) + u64::from(margin);
         let places = samples * u64::from(branches);
-        let queue = || gpu.storage::<u32>("camera queue", places);
         Ok(Self {
-            kernels: CameraKernels::new(gpu, scene, settings),
-            paths: gpu.storage::<Path>("camera paths", places)?,
-            queues: [queue()?, queue()?],
-            counters: gpu.storage::<Counters>("camera counters", 1)?,
-            dispatch_arguments: gpu.storage::<[u32; 3]>("camera dispatch arguments", 1)?,
+            kernels: CameraKernels::new(gpu, scene, photons, picture.light_samples),
+            wavefront: Wavefront::new(gpu, "camera", places)?,
             points: gpu.storage::<VisiblePoint>("visible points", places)?,
             radiance: gpu.storage::<[f32; 4]>("radiance", places)?,
             gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
             first_hits: gpu.storage::<FirstHit>("first hits", samples)?,
-            pixels: gpu.storage::<TilePixel>("tile pixels", TILE_POINTS / u64::from(branches))?,
+            pixel_rows: gpu.storage::<PixelSums>("sums of pixels", TILE_POINTS / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
             view: CameraTile { margin, ..view },
-            window: settings.picture.window(size),
+            window: picture.window(size),
         })
     }
 
@@ -197,58 +181,31 @@ impl CameraTracer {
     pub fn trace(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
         let own = [("tile", &uniform), ("points", &self.points), ("filter_table", &self.filter_table)];
-        self.follow(
-            gpu,
-            scene,
-            (&self.kernels.start, &own, tile.pixels * tile.samples + self.view.margin),
-            (&self.kernels.trace, &own),
-        )
+        let start = Step { kernel: &self.kernels.start, buffers: &own };
+        let trace = Step { kernel: &self.kernels.trace, buffers: &own };
+        self.follow(gpu, scene, (&start, tile.pixels * tile.samples + self.view.margin), &trace)
     }
 
-    /// Runs `start` in that many invocations and follows the paths that it starts with `trace`, each with its own buffers besides
-    /// the paths'.
-    pub(crate) fn follow<'b>(
-        &'b self,
+    /// Starts paths by `start` in that many invocations and follows them by `trace`, each with its own
+    /// buffers besides the wavefront's and the tile's.
+    pub(super) fn follow(
+        &self,
         gpu: &Gpu,
-        scene: &'b SceneBuffers,
-        (start, started, invocations): (&Kernel, &[(&'b str, &'b Buffer)], u32),
-        (trace, followed): (&Kernel, &[(&'b str, &'b Buffer)]),
+        scene: &SceneBuffers,
+        (start, invocations): (&Step, u32),
+        trace: &Step,
     ) -> Result<StepCount> {
-        let named = |input: usize, own: &[(&'b str, &'b Buffer)]| {
-            let shared = [
-                ("paths", &self.paths),
-                ("queue_in", &self.queues[input]),
-                ("queue_out", &self.queues[1 - input]),
-                ("counters", &self.counters),
-                ("dispatch_arguments", &self.dispatch_arguments),
-                ("first_hits", &self.first_hits),
-                ("radiance", &self.radiance),
-            ];
-            scene.with(&[&shared, own].concat())
-        };
-        let advance = self.kernels.advance.bind(gpu, &named(0, &[]));
-        let bindings = [0, 1].map(|input| trace.bind(gpu, &named(input, followed)));
-        let mut encoder = gpu.encoder();
-        encoder.clear_buffer(&self.counters, 0, None);
-        start.dispatch(&mut encoder, &start.bind(gpu, &named(1, started)), invocations.into());
-        let most = (u64::from(invocations) * u64::from(self.view.branches))
+        let most_paths = (u64::from(invocations) * u64::from(self.view.branches))
             .min(TILE_POINTS + u64::from(self.view.margin * self.view.branches));
-        // The surface that ends the chain comes after max_bounces delta surfaces.
-        let mut surfaces = 0;
-        loop {
-            for _ in 0..BOUNCES_PER_SUBMISSION.min(self.view.max_bounces + 1 - surfaces) {
-                self.kernels.advance.dispatch(&mut encoder, &advance, 1);
-                let bindings = &bindings[(surfaces % 2) as usize];
-                trace.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most);
-                surfaces += 1;
-            }
-            gpu.submit(encoder);
-            let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
-            if counters.next == 0 || surfaces > self.view.max_bounces {
-                return Ok(StepCount::from(counters));
-            }
-            encoder = gpu.encoder();
-        }
+        let tile = [("first_hits", &self.first_hits), ("radiance", &self.radiance)];
+        let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
+        let start = Step { kernel: start.kernel, buffers: &started };
+        let trace = Step { kernel: trace.kernel, buffers: &followed };
+        // The surface that ends the chain comes after max_bounces specular surfaces.
+        let most_surfaces = self.view.max_bounces + 1;
+        let counters =
+            self.wavefront.run(gpu, scene, (&start, invocations.into()), &trace, most_paths, most_surfaces)?;
+        Ok(StepCount::from(counters))
     }
 
     /// Adds the light that reaches the tile's visible points straight from the lights.
@@ -257,19 +214,23 @@ impl CameraTracer {
     /// Faults of the driver.
     pub fn light_directly(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
-        let buffers =
-            [("tile", &uniform), ("points", &self.points), ("radiance", &self.radiance), ("counters", &self.counters)];
+        let buffers = [
+            ("tile", &uniform),
+            ("points", &self.points),
+            ("radiance", &self.radiance),
+            ("counters", &self.wavefront.counters),
+        ];
         let (steps, points) = (self.kernels.direct.steps(scene), self.point_count(tile));
         let mut count = StepCount::default();
         for first in (0..steps).step_by(DIRECT_STEPS_PER_READ as usize) {
             let mut encoder = gpu.encoder();
-            encoder.clear_buffer(&self.counters, 0, None);
+            encoder.clear_buffer(&self.wavefront.counters, 0, None);
             for step in first..steps.min(first + DIRECT_STEPS_PER_READ) {
                 self.kernels.direct.add(gpu, scene, &mut encoder, (step, points), &buffers);
             }
             gpu.submit(encoder);
-            let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
-            count += StepCount { rays: u64::from(counters.next), ..StepCount::from(counters) };
+            let counters: Counters = gpu.read(&self.wavefront.counters, 0, 1)?[0];
+            count += StepCount { rays: u64::from(counters.shadow_rays), ..StepCount::from(counters) };
         }
         Ok(count)
     }
@@ -278,21 +239,21 @@ impl CameraTracer {
     ///
     /// # Errors
     /// Faults of the driver.
-    pub fn resolve(&self, gpu: &Gpu, tile: &Tile) -> Result<Vec<TilePixel>> {
+    pub fn resolve(&self, gpu: &Gpu, tile: &Tile) -> Result<Vec<PixelSums>> {
         let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
         let bindings = self.kernels.resolve.bind(
             gpu,
             &[
                 ("tile", &uniform),
                 ("radiance", &self.radiance),
-                ("first_hits", &self.first_hits),
-                ("pixels", &self.pixels),
+                ("sample_rows", &self.first_hits),
+                ("pixel_rows", &self.pixel_rows),
             ],
         );
         let mut encoder = gpu.encoder();
         self.kernels.resolve.dispatch(&mut encoder, &bindings, u64::from(tile.pixels));
         gpu.submit(encoder);
-        gpu.read(&self.pixels, 0, u64::from(tile.pixels))
+        gpu.read(&self.pixel_rows, 0, u64::from(tile.pixels))
     }
 
     pub(crate) fn tile_view(&self, tile: &Tile) -> CameraTile {
@@ -303,26 +264,6 @@ impl CameraTracer {
             first_sample: tile.first_sample,
             samples: tile.samples,
             ..self.view
-        }
-    }
-}
-
-impl std::ops::AddAssign for StepCount {
-    fn add_assign(&mut self, other: Self) {
-        self.rays += other.rays;
-        self.media_overflows += other.media_overflows;
-        self.unfinished += other.unfinished;
-        self.non_finite += other.non_finite;
-    }
-}
-
-impl From<Counters> for StepCount {
-    fn from(counters: Counters) -> Self {
-        Self {
-            rays: counters.all_rays(),
-            media_overflows: u64::from(counters.media_overflows),
-            unfinished: u64::from(counters.unfinished),
-            non_finite: u64::from(counters.non_finite),
         }
     }
 }
@@ -342,27 +283,32 @@ fn margin_cells((width, height): (u32, u32)) -> u32 {
 }
 
 /// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows from the aspect.
-fn view(camera: &Camera, (width, height): (u32, u32), settings: &Settings) -> Result<CameraTile> {
+fn view(
+    camera: &Camera,
+    (width, height): (u32, u32),
+    photons: &PhotonSettings,
+    picture: &PictureSettings,
+) -> Result<CameraTile> {
     let parallel = matches!(camera.projection, Projection::Orthographic { .. });
-    if parallel && settings.picture.aperture > 0.0 {
+    if parallel && picture.aperture > 0.0 {
         let problem = "needs a perspective camera; this one is orthographic".to_owned();
-        return Err(Error::Setting { name: "aperture", value: settings.picture.aperture.to_string(), problem });
+        return Err(Error::Setting { name: "aperture", value: picture.aperture.to_string(), problem });
     }
     let half_height = camera.half_height_at(1.0, (width, height));
     let half_width = half_height * width as f32 / height as f32;
     Ok(CameraTile {
         position: camera.position.to_array(),
-        seed: settings.photons.seed,
+        seed: photons.seed,
         right: (camera.right * half_width).to_array(),
         width,
         up: (camera.up * half_height).to_array(),
         height,
         forward: camera.forward.to_array(),
-        spp: settings.picture.spp,
-        max_bounces: settings.photons.bounce_limit(),
+        spp: picture.spp,
+        max_bounces: photons.bounce_limit(),
         parallel: u32::from(parallel),
-        lens_radius: 0.5 * settings.picture.aperture,
-        focus: settings.picture.focus.unwrap_or(1.0),
+        lens_radius: 0.5 * picture.aperture,
+        focus: picture.focus.unwrap_or(1.0),
         ..Default::default()
     })
 }

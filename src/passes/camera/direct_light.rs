@@ -4,7 +4,8 @@
 use crate::{
     gpu::{Buffer, Commands, Gpu, Kernel},
     layout::{DirectLight, EmitterSample},
-    upload::SceneBuffers,
+    settings::Sampler,
+    upload::{SceneBuffers, sampler_constant},
 };
 
 /// Kernels of direct light.
@@ -17,8 +18,9 @@ pub struct DirectLighting {
 
 impl DirectLighting {
     /// Compiles what the scene's lights need; `samples` of each point for those with an extent.
-    pub fn new(gpu: &Gpu, scene: &SceneBuffers, samples: u32) -> Self {
-        let emitters = scene.lights.table.has_extent().then(|| (scene.kernel(gpu, "sample_emitters"), samples));
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, sampler: Sampler, samples: u32) -> Self {
+        let sample = || scene.kernel_with(gpu, "sample_emitters", &[sampler_constant(sampler)]);
+        let emitters = scene.lights.table.has_extent().then(|| (sample(), samples));
         Self { punctual: scene.kernel(gpu, "light_directly"), emitters }
     }
 

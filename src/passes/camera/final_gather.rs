@@ -1,13 +1,18 @@
 //! Final gathering: light that visible points get from what rays of theirs see (Jensen 2001, "Realistic Image Synthesis Using
 //! Photon Mapping", section 8.2). Kernels: `start_final_gather`, `trace_camera`.
 
-use super::camera_tracer::{CameraTracer, StepCount, Tile};
+use super::{
+    camera_tracer::CameraTracer,
+    tile::{StepCount, Tile},
+};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
     layout::{CameraTile, FinalStep, VisiblePoint},
+    passes::wavefront::Step,
     reference::mix,
-    upload::SceneBuffers,
+    settings::Sampler,
+    upload::{SceneBuffers, sampler_constant},
 };
 
 /// Kernels, and room for what one ray of each visible point sees: memory does not grow with the rays.
@@ -25,11 +30,12 @@ impl FinalGather {
     ///
     /// # Errors
     /// Limits of the adapter.
-    pub fn new(gpu: &Gpu, scene: &SceneBuffers, tracer: &CameraTracer, rays: u32) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, tracer: &CameraTracer, sampler: Sampler, rays: u32) -> Result<Self> {
+        let sampler = sampler_constant(sampler);
         Ok(Self {
-            start: scene.kernel(gpu, "start_final_gather"),
+            start: scene.kernel_with(gpu, "start_final_gather", &[sampler]),
             // What shines straight into a visible point is direct light, which it has already.
-            trace: scene.kernel_with(gpu, "trace_camera", &[("SEES_LIGHTS", 0.0)]),
+            trace: scene.kernel_with(gpu, "trace_camera", &[sampler, ("SEES_LIGHTS", 0.0)]),
             rays,
             seen: gpu.storage::<VisiblePoint>("points seen in final gathering", tracer.room())?,
         })
@@ -70,6 +76,7 @@ impl FinalGather {
         );
         let started = [("tile", &camera), ("final_step", &step), ("points", &tracer.points), ("seen", &self.seen)];
         let followed = [("tile", &own), ("points", &self.seen)];
-        tracer.follow(gpu, scene, (&self.start, &started, points), (&self.trace, &followed))
+        let start = Step { kernel: &self.start, buffers: &started };
+        tracer.follow(gpu, scene, (&start, points), &Step { kernel: &self.trace, buffers: &followed })
     }
 }

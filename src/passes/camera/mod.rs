@@ -3,6 +3,8 @@
 pub mod camera_tracer;
 mod direct_light;
 pub mod final_gather;
+pub mod tile;
 
-pub use camera_tracer::{CameraKernels, CameraTracer, StepCount, Tile};
+pub use camera_tracer::{CameraKernels, CameraTracer};
 pub use final_gather::FinalGather;
+pub use tile::{StepCount, Tile};

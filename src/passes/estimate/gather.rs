@@ -5,7 +5,7 @@ use crate::{
     density::Density,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{DISC_BYTES, GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
+    layout::{self, GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
     passes::maps::{
         photon_map::PhotonMap,
         radix_sort::{RadixSort, scan_levels},
@@ -17,18 +17,20 @@ use crate::{
 
 /// Points that are searched together; more go in several batches.
 const BATCH: u32 = 32_768;
-/// Bits of a point's key: its place on the curve.
-const POINT_KEY_BITS: u32 = 30;
+/// Bits of a point's key: the upper word of its Hilbert key.
+const POINT_KEY_BITS: u32 = 3 * layout::KEY_BITS;
 /// By how many of them, the highest, up to so many points are sorted: few points have few blocks of packets to be dealt to, and lie
 /// in the order of pixels, which near ones keep. More are sorted by all.
 const FEW_SORTED_BITS: [(u32, u32); 2] = [(4096, 8), (16_384, 16)];
-/// Queries of one invocation.
-const PACKET: u32 = 4;
 /// Packets that are searched or wait together.
-const BLOCK: u64 = 8;
+const BLOCK: u64 = layout::PACKET_BLOCK as u64;
+/// Queries of one invocation.
+const PACKET: u32 = layout::QUERY_BLOCK / layout::PACKET_BLOCK;
+// The shaders hold them in the components of vectors.
+const _: () = assert!(PACKET == 4);
 /// Of how many blocks of packets one is searched in each dispatch of the search: pilots first, the others start from the radii of
-/// these. Twins of those in `shaders/lib/gather/budget.wesl`.
-const STRIDES: [u32; 3] = [64, 8, 1];
+/// these.
+const STRIDES: [u32; 3] = [layout::FIRST_PILOT_STRIDE, layout::PILOT_STRIDE, 1];
 
 /// The radiance estimate that is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +59,9 @@ impl From<&EstimateSettings> for GatherSettings {
 /// Rays that measure the area of a disc of which some is missing.
 const SURVEY_SAMPLES: usize = 24;
 /// Nodes and primitives that one of them visits at most; together they stay within what software Vulkan can loop.
-const SURVEY_TRACE_BUDGET: f64 = 230.0;
+const SURVEY_TRACE_BUDGET: u32 = 230;
+// Software Vulkan ends all loops of a subgroup after 65,535 iterations in total.
+const _: () = assert!(layout::MOST_RAYS * (SURVEY_TRACE_BUDGET + 1) < 65_535);
 
 /// How the kernels are compiled; for tests and benchmarks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,7 +151,6 @@ struct Scratch {
     entries: [Buffer; 2],
     states: Buffer,
     sums: Buffer,
-    discs: Buffer,
     open: Buffer,
 }
 
@@ -171,7 +174,7 @@ impl<'s> Gather<'s> {
     }
 
     /// Has the kernels compiled for maps of one window, while others run.
-    pub fn compile_ahead(&mut self, gpu: &Gpu, settings: &GatherSettings) {
+    pub fn prefetch(&mut self, gpu: &Gpu, settings: &GatherSettings) {
         self.compile(gpu, Variant::of(settings, 1));
     }
 
@@ -213,7 +216,7 @@ impl<'s> Gather<'s> {
         let polynomial = settings.density.polynomial();
         let compiled = self.compile(gpu, Variant::of(settings, map.windows()));
         if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
-            self.scratch = Some(Scratch::new(gpu, count.min(BATCH), self.options.surveys())?);
+            self.scratch = Some(Scratch::new(gpu, count.min(BATCH))?);
         }
         let [first_four @ .., fifth] = polynomial.from_rim().map(|c| c as f32);
         let quantile = |i| polynomial.quantile((i as f64 + 0.5) / SURVEY_SAMPLES as f64) as f32;
@@ -267,7 +270,6 @@ impl<'s> Gather<'s> {
             ("states", &scratch.states),
             ("open_count", &scratch.open),
             ("sums_left", &scratch.sums),
-            ("discs", &scratch.discs),
             ("radii", radii),
             ("radiance", radiance),
             ("gathered", gathered),
@@ -287,7 +289,6 @@ impl<'s> Gather<'s> {
             if dispatches == 0 {
                 encoder.clear_buffer(&scratch.states, 0, None);
                 encoder.clear_buffer(&scratch.sums, 0, None);
-                encoder.clear_buffer(&scratch.discs, 0, None);
             }
             encoder.clear_buffer(&scratch.open, 0, None);
             for (bindings, stride) in search_bindings.iter().zip(STRIDES) {
@@ -355,7 +356,7 @@ impl<'s> Gather<'s> {
             ("CORRECTS", f64::from(u8::from(self.options.corrects))),
         ];
         let kernel = |stem| Kernel::new(gpu, stem, &overrides);
-        let with_budget = [overrides.as_slice(), &[("TRACE_BUDGET", SURVEY_TRACE_BUDGET)]].concat();
+        let with_budget = [overrides.as_slice(), &[("TRACE_BUDGET", SURVEY_TRACE_BUDGET.into())]].concat();
         let survey = |scene: &SceneBuffers| scene.kernel_with(gpu, "survey_surface", &with_budget);
         let compiled = Compiled {
             search: kernel("search_radius"),
@@ -369,7 +370,7 @@ impl<'s> Gather<'s> {
 }
 
 impl Scratch {
-    fn new(gpu: &Gpu, capacity: u32, surveys: bool) -> Result<Self> {
+    fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
         let packets = u64::from(capacity.div_ceil(PACKET));
         Ok(Self {
             capacity,
@@ -379,7 +380,6 @@ impl Scratch {
             ],
             states: gpu.storage::<[u8; SEARCH_STATE_BYTES]>("search states", packets * u64::from(PACKET))?,
             sums: gpu.storage::<[u8; GATHER_STATE_BYTES]>("unfinished sums", packets)?,
-            discs: gpu.storage::<[u8; DISC_BYTES]>("discs", if surveys { u64::from(capacity) + 3 } else { 1 })?,
             open: gpu.storage::<u32>("open packets", 1)?,
         })
     }

@@ -5,4 +5,4 @@ pub mod gather;
 pub mod share_estimates;
 
 pub use gather::{Gather, GatherOptions, GatherSettings};
-pub use share_estimates::{Asked, EstimateSharing, SharedPoints};
+pub use share_estimates::{EstimateRequest, EstimateSharing, SharedPoints};

@@ -34,18 +34,19 @@ pub struct SharedPoints<'a> {
 
 /// Points at which estimates are asked for.
 #[derive(Debug)]
-pub struct Asked<'a> {
+pub struct EstimateRequest<'a> {
     /// [`VisiblePoint`]s, of which those take part that wait for the turn.
     pub points: &'a Buffer,
     pub count: u32,
     pub turn: u32,
-    /// What the estimates are added to, `vec4f` with the squared radius of the last in w, and what is said of them, [`Gathered`](crate::layout::Gathered).
+    /// What the estimates are added to, `vec4f`, and what is said of them,
+    /// [`Gathered`](crate::layout::Gathered).
     pub radiance: &'a Buffer,
     pub gathered: &'a Buffer,
 }
 
 /// Makes the estimates over one map.
-pub type Estimates<'a> = dyn FnMut(&Asked) -> Result<()> + 'a;
+pub type Estimates<'a> = dyn FnMut(&EstimateRequest) -> Result<()> + 'a;
 
 /// The kernels, and room for queries.
 #[derive(Debug)]
@@ -70,6 +71,11 @@ impl EstimateSharing {
     pub fn new(gpu: &Gpu, reach: f32) -> Self {
         let kernel = |stem| Kernel::new(gpu, stem, &[]);
         Self { choose: kernel("choose_queries"), share: kernel("share_estimates"), reach, scratch: None }
+    }
+
+    /// Has the kernels compiled ahead of their use.
+    pub fn prefetch(gpu: &Gpu) {
+        let _ = Self::new(gpu, 0.0);
     }
 
     /// Adds the light of a map's photons to the radiance of the tile's points: by queries in large cells of pixels, then in
@@ -98,7 +104,13 @@ impl EstimateSharing {
             };
             self.run_round(gpu, &round, tile, estimates)?;
         }
-        estimates(&Asked { points: tile.points, count, turn, radiance: tile.radiance, gathered: tile.gathered })
+        estimates(&EstimateRequest {
+            points: tile.points,
+            count,
+            turn,
+            radiance: tile.radiance,
+            gathered: tile.gathered,
+        })
     }
 
     fn run_round(
@@ -121,13 +133,14 @@ impl EstimateSharing {
             ("query_rows", &scratch.queries),
             ("irradiance", &scratch.irradiance),
             ("radiance", tile.radiance),
+            ("gathered", tile.gathered),
         ];
         let mut encoder = gpu.encoder();
         self.choose.dispatch(&mut encoder, &self.choose.bind(gpu, &buffers), queries.into());
         gpu.submit(encoder);
         // There are fewer queries than points.
         let (radiance, gathered) = (&scratch.irradiance, tile.gathered);
-        estimates(&Asked { points: &scratch.queries, count: queries, turn: 1, radiance, gathered })?;
+        estimates(&EstimateRequest { points: &scratch.queries, count: queries, turn: 1, radiance, gathered })?;
         let mut encoder = gpu.encoder();
         self.share.dispatch(&mut encoder, &self.share.bind(gpu, &buffers), round.points.into());
         gpu.submit(encoder);

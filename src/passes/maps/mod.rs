@@ -2,7 +2,9 @@
 
 pub mod build_grid;
 pub mod photon_map;
+pub mod photon_store;
 pub mod radix_sort;
 pub mod sort_photons;
 
-pub use photon_map::{MapKernels, PhotonMap, PhotonStore};
+pub use photon_map::{MapKernels, PhotonMap};
+pub use photon_store::PhotonStore;

@@ -1,6 +1,6 @@
 //! Orders photons along a Hilbert curve. Kernels: `bound_photons`, `merge_bounds`, `key_photons`, `sort_photons`.
 
-use super::{photon_map::PhotonStore, radix_sort::RadixSort};
+use super::{photon_store::PhotonStore, radix_sort::RadixSort};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},

@@ -12,12 +12,14 @@ use crate::{
     error::Result,
     gpu::Gpu,
     layout::{self, PhotonBatch},
+    map_kind::{ByKind, MapKind},
     progress::{Progress, Stage},
-    settings::{Emission, Settings},
+    settings::{Emission, PhotonSettings, Sampler},
     upload::{SceneBuffers, light_buffers::ChoiceBuffer},
 };
 
-/// Paths of one batch at least and at most: the device must be busy, and a staged photon knows its path by its key.
+/// Minimum and maximum number of paths of one batch: the device must be busy, and the key of a staged
+/// photon holds its path.
 const MIN_BATCH: u64 = 1 << 16;
 const MAX_BATCH: u64 = layout::PATH_MASK as u64 + 1;
 /// Paths over which the growth of a map is watched, at least; a map's capacity if that is more.
@@ -28,8 +30,7 @@ const LOST_UNIT: f64 = 1.0 / 4096.0;
 /// What the photon pass leaves.
 #[derive(Debug)]
 pub struct TracedPhotons {
-    pub global: RawMap,
-    pub caustic: RawMap,
+    pub maps: ByKind<RawMap>,
     /// Photons stored of each group of lights.
     pub of_lights: Vec<u32>,
     /// Flux that the bounce limit took, W, mean of the channels; of the general paths.
@@ -57,14 +58,18 @@ struct EmissionPlan<'a> {
     target_count: u32,
     /// [`layout::AIM`], [`layout::CAUSTICS_APART`], and what of the modes' rules holds for these paths.
     rules: u32,
-    fills_global: bool,
-    fills_caustic: bool,
+    fills: &'static [MapKind],
 }
 
 impl PhotonTracer {
     #[must_use]
-    pub fn new(gpu: &Gpu, scene: &SceneBuffers) -> Self {
-        Self { kernels: PhotonKernels::new(gpu, scene) }
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, sampler: Sampler) -> Self {
+        Self { kernels: PhotonKernels::new(gpu, scene, sampler) }
+    }
+
+    /// Has the kernels compiled ahead of their use.
+    pub fn prefetch(gpu: &Gpu, scene: &SceneBuffers, sampler: Sampler) {
+        let _ = Self::new(gpu, scene, sampler);
     }
 
     /// Traces photons until both maps are full, hardly grow, or all paths have been emitted. `caustics`: the scene has
@@ -76,14 +81,16 @@ impl PhotonTracer {
         &self,
         gpu: &Gpu,
         scene: &SceneBuffers,
-        settings: &Settings,
+        settings: &PhotonSettings,
         caustics: bool,
         progress: &dyn Progress,
     ) -> Result<TracedPhotons> {
-        let wants_global = settings.photons.stores_direct() || settings.photons.mode.follows_diffuse();
+        let wants_global = settings.stores_direct() || settings.mode.follows_diffuse();
         let mut traced = TracedPhotons {
-            global: RawMap::new(gpu, settings.photons.global, wants_global)?,
-            caustic: RawMap::new(gpu, settings.photons.caustic, caustics)?,
+            maps: ByKind {
+                global: RawMap::new(gpu, settings.global, wants_global)?,
+                caustic: RawMap::new(gpu, settings.caustic, caustics)?,
+            },
             of_lights: Vec::new(),
             lost: 0.0,
             rays: 0,
@@ -92,8 +99,8 @@ impl PhotonTracer {
             non_finite: 0,
             warnings: Vec::new(),
         };
-        let largest = u64::from(settings.photons.global.max(settings.photons.caustic));
-        let max_paths = settings.photons.max_paths.unwrap_or(100 * largest);
+        let largest = u64::from(settings.global.max(settings.caustic));
+        let max_paths = settings.max_paths.unwrap_or(100 * largest);
         let batch_limit = (largest / 4).clamp(MIN_BATCH, MAX_BATCH).min(max_paths.max(1));
         let groups = scene.lights.table.groups.len();
         let buffers = BatchBuffers::new(gpu, batch_limit, groups)?;
@@ -111,17 +118,18 @@ impl PhotonTracer {
         gpu: &Gpu,
         scene: &SceneBuffers,
         plan: &EmissionPlan,
-        settings: &Settings,
+        settings: &PhotonSettings,
         (buffers, mut batch_limit, max_paths): (&BatchBuffers, u64, u64),
         traced: &mut TracedPhotons,
         progress: &dyn Progress,
     ) -> Result<()> {
-        let growth_window = GROWTH_WINDOW.max(plan.maps(traced).map(|(_, map)| map.capacity).max().unwrap_or(0));
+        let capacities = plan.fills.iter().map(|kind| traced.maps[*kind].capacity);
+        let growth_window = GROWTH_WINDOW.max(capacities.max().unwrap_or(0));
         let (mut first_path, mut lost_units) = (0, 0);
-        while first_path < max_paths && plan.maps(traced).any(|(_, map)| map.open) {
+        while first_path < max_paths && plan.fills.iter().any(|kind| traced.maps[*kind].open) {
             progress.check()?;
             let until_check = growth_window - first_path % growth_window;
-            let wanted = plan.maps(traced).map(|(_, map)| map.paths_wanted(first_path)).max().unwrap_or(0);
+            let wanted = plan.fills.iter().map(|kind| traced.maps[*kind].paths_wanted(first_path)).max().unwrap_or(0);
             let paths = wanted.min(batch_limit).min(max_paths - first_path).min(until_check);
             let batch = PhotonBatch {
                 paths: paths as u32,
@@ -135,9 +143,9 @@ impl PhotonTracer {
                 batch_limit = (paths * buffers.staging_capacity * 9 / (staged * 10)).max(1);
                 continue;
             }
-            let TracedPhotons { global, caustic, .. } = traced;
-            let maps = [plan.fills_global.then_some(global), plan.fills_caustic.then_some(caustic)];
-            self.kernels.store(gpu, buffers, maps, &result, first_path)?;
+            for &kind in plan.fills {
+                self.kernels.store(gpu, buffers, (kind, &mut traced.maps[kind]), &result, first_path)?;
+            }
             first_path += paths;
             traced.rays += result.counters.all_rays();
             traced.media_overflows += u64::from(result.counters.media_overflows);
@@ -145,14 +153,14 @@ impl PhotonTracer {
             traced.non_finite += u64::from(result.counters.non_finite);
             lost_units += result.counters.all_lost();
             if first_path.is_multiple_of(growth_window) {
-                let idle = plan.maps(traced).filter_map(|(name, map)| map.close_if_idle(name, growth_window));
-                let idle: Vec<String> = idle.collect();
-                traced.warnings.extend(idle);
+                for &kind in plan.fills {
+                    traced.warnings.extend(traced.maps[kind].close_if_idle(kind.name(), growth_window));
+                }
             }
-            let (global, caustic) = (&traced.global, &traced.caustic);
+            let ByKind { global, caustic } = &traced.maps;
             progress.report(Stage::Photons, global.stored + caustic.stored, global.expected() + caustic.expected());
         }
-        if plan.fills_global {
+        if plan.fills.contains(&MapKind::Global) {
             let flux = LOST_UNIT * scene.lights.table.power();
             traced.lost = lost_units as f64 * flux / first_path.max(1) as f64;
         }
@@ -161,10 +169,10 @@ impl PhotonTracer {
 }
 
 /// The emissions that fill the maps; none of lights that are all dark.
-fn plans<'a>(scene: &'a SceneBuffers, settings: &Settings, caustics: bool) -> Vec<EmissionPlan<'a>> {
+fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool) -> Vec<EmissionPlan<'a>> {
     let lights = &scene.lights;
     let rule = |holds: bool, bit: u32| if holds { bit } else { 0 };
-    let aimed = settings.photons.emission == Emission::Aimed;
+    let aimed = settings.emission == Emission::Aimed;
     let general = EmissionPlan {
         choices: &lights.photons,
         stream: layout::STREAM_PHOTON,
@@ -172,11 +180,10 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &Settings, caustics: bool) -> Ve
         target_count: 1,
         // Rays of final gathering see what was scattered before it came through glass.
         rules: rule(aimed, layout::AIM)
-            | rule(aimed || settings.photons.final_gather > 0, layout::CAUSTICS_APART)
-            | rule(settings.photons.stores_direct(), layout::STORE_DIRECT)
-            | rule(settings.photons.mode.follows_diffuse(), layout::FOLLOW_DIFFUSE),
-        fills_global: true,
-        fills_caustic: !aimed,
+            | rule(aimed || settings.final_gather > 0, layout::CAUSTICS_APART)
+            | rule(settings.stores_direct(), layout::STORE_DIRECT)
+            | rule(settings.mode.follows_diffuse(), layout::FOLLOW_DIFFUSE),
+        fills: if aimed { &[MapKind::Global] } else { &MapKind::ALL },
     };
     let caustic = EmissionPlan {
         choices: &lights.aimed,
@@ -184,34 +191,26 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &Settings, caustics: bool) -> Ve
         first_target: 1,
         target_count: lights.delta_targets,
         rules: layout::AIM | layout::CAUSTICS_APART,
-        fills_global: false,
-        fills_caustic: true,
+        fills: &[MapKind::Caustic],
     };
     let wanted = [Some(general), (aimed && caustics).then_some(caustic)];
     wanted.into_iter().flatten().filter(|plan| plan.choices.turns > 0).collect()
 }
 
 impl EmissionPlan<'_> {
-    /// The maps that it fills, by name.
-    fn maps<'t>(
-        &self,
-        traced: &'t mut TracedPhotons,
-    ) -> impl Iterator<Item = (&'static str, &'t mut RawMap)> + use<'t> {
-        let global = self.fills_global.then_some(("global", &mut traced.global));
-        global.into_iter().chain(self.fills_caustic.then_some(("caustic", &mut traced.caustic)))
-    }
-
     /// What the batches of it share, and what follows from the maps that are still open.
-    fn batch(&self, scene: &SceneBuffers, settings: &Settings, traced: &TracedPhotons) -> PhotonBatch {
-        let rule = |holds: bool, bit: u32| if holds { bit } else { 0 };
+    fn batch(&self, scene: &SceneBuffers, settings: &PhotonSettings, traced: &TracedPhotons) -> PhotonBatch {
+        let open = |kind: MapKind, bit: u32| {
+            if self.fills.contains(&kind) && traced.maps[kind].open { bit } else { 0 }
+        };
         PhotonBatch {
-            seed: settings.photons.seed,
+            seed: settings.seed,
             light_count: scene.lights.table.lights.len() as u32,
             turns: self.choices.turns,
-            max_bounces: settings.photons.bounce_limit(),
+            max_bounces: settings.bounce_limit(),
             rules: self.rules
-                | rule(self.fills_global && traced.global.open, layout::STORE_GLOBAL)
-                | rule(self.fills_caustic && traced.caustic.open, layout::STORE_CAUSTIC),
+                | open(MapKind::Global, layout::STORE_GLOBAL)
+                | open(MapKind::Caustic, layout::STORE_CAUSTIC),
             lost_scale: (1.0 / (LOST_UNIT * scene.lights.table.power())) as f32,
             stream: self.stream,
             first_target: self.first_target,

@@ -4,7 +4,7 @@ use crate::{
     error::Result,
     gpu::Gpu,
     layout::Photon,
-    passes::maps::photon_map::{PhotonStore, check_capacity},
+    passes::maps::photon_store::{PhotonStore, check_capacity},
 };
 
 /// A map that gains less than this fraction of its capacity while a window of paths is traced is idle.

@@ -6,9 +6,9 @@ use base64::engine::{DecodePaddingMode, Engine as _, GeneralPurpose, GeneralPurp
 use gltf::json;
 use sha2::{Digest as _, Sha256};
 
+use super::extensions::is_fallback;
 use super::fault::{Read, fault};
 use super::files::Resources;
-use super::meshopt;
 
 /// Bytes of each buffer, exactly `byteLength` of them; `None` where the file gives no data.
 pub(super) type Buffers<'a> = Vec<Option<Cow<'a, [u8]>>>;
@@ -24,7 +24,7 @@ pub(super) fn read<'a>(root: &json::Root, resources: &Resources<'a>, hash: &mut 
         let length = buffer.byte_length.0;
         let bytes = match &buffer.uri {
             None if i == 0 && resources.bin.is_some() => resources.bin.map(Cow::Borrowed),
-            None if meshopt::is_fallback(buffer) => None,
+            None if is_fallback(buffer) => None,
             None => return fault(place, NO_DATA),
             Some(uri) if uri.starts_with("data:") => Some(Cow::Owned(decode_data_uri(uri, &place)?)),
             Some(uri) => {

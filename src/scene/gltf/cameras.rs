@@ -8,11 +8,11 @@ use json::camera::Type;
 use json::validation::Checked;
 
 use super::fault::{Read, fault};
-use super::nodes::Placed;
+use super::nodes::PlacedNode;
 use crate::scene::{Camera, Projection};
 
 /// The camera that a node carries, with its number in the file and its place in the world.
-pub(super) fn read(root: &json::Root, placed: &Placed) -> Read<Option<(usize, DVec3, Camera)>> {
+pub(super) fn read(root: &json::Root, placed: &PlacedNode) -> Read<Option<(usize, DVec3, Camera)>> {
     let node = &root.nodes[placed.node];
     let Some(index) = node.camera.map(|camera| camera.value()) else { return Ok(None) };
     let camera = &root.cameras[index];

@@ -9,8 +9,9 @@ use json::mesh::{Mode, Primitive};
 use json::validation::Checked;
 use serde::Deserialize;
 
-use super::accessor::{Document, Format, MAX_ZEROS, Unpacked};
+use super::accessor::Document;
 use super::fault::{Read, fault};
+use super::format::{Format, MAX_ZEROS, Unpacked};
 
 const NAME: &str = "KHR_draco_mesh_compression";
 
@@ -32,7 +33,7 @@ struct Compressed {
 const MAX_RATIO: u64 = 64;
 
 /// A primitive to decode.
-struct Packed<'a> {
+struct CompressedPrimitive<'a> {
     primitive: &'a Primitive,
     compressed: Compressed,
     place: String,
@@ -62,7 +63,11 @@ pub(super) fn decode(document: &Document<'_>) -> Read<HashMap<usize, Unpacked>> 
 }
 
 /// What a primitive says of its stream; none where it is not compressed, or comes uncompressed as well.
-fn packed<'a>(document: &Document<'a>, primitive: &'a Primitive, place: String) -> Read<Option<Packed<'a>>> {
+fn packed<'a>(
+    document: &Document<'a>,
+    primitive: &'a Primitive,
+    place: String,
+) -> Read<Option<CompressedPrimitive<'a>>> {
     let extensions = primitive.extensions.as_ref();
     let Some(extension) = extensions.and_then(|extensions| extensions.others.get(NAME)) else { return Ok(None) };
     let place = format!("{place}.extensions.{NAME}");
@@ -76,10 +81,10 @@ fn packed<'a>(document: &Document<'a>, primitive: &'a Primitive, place: String) 
     if primitive.mode != Checked::Valid(Mode::Triangles) || primitive.indices.is_none() {
         return fault(place, "is read for lists of indexed triangles only");
     }
-    Ok(Some(Packed { primitive, compressed, place }))
+    Ok(Some(CompressedPrimitive { primitive, compressed, place }))
 }
 
-impl Packed<'_> {
+impl CompressedPrimitive<'_> {
     fn decode(&self, document: &Document<'_>, left: &mut u64, unpacked: &mut HashMap<usize, Unpacked>) -> Read<()> {
         let Some(indices) = self.primitive.indices.map(|indices| indices.value()) else { return Ok(()) };
         let place = &self.place;

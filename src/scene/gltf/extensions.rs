@@ -2,12 +2,17 @@
 
 use std::collections::HashSet;
 
+use gltf::json;
+
 use super::fault::{Notes, Read, fault};
+
+/// Compressed bufferViews.
+pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
 
 /// Extensions that are read, or that change nothing which is read.
 const SUPPORTED: [&str; 13] = [
     "EXT_mesh_gpu_instancing",
-    "EXT_meshopt_compression",
+    MESHOPT,
     "KHR_draco_mesh_compression",
     "KHR_implicit_shapes",
     "KHR_lights_punctual",
@@ -36,4 +41,9 @@ pub(super) fn check(used: &[String], required: &[String], ignored: &[String], no
         notes.add(format!("extension {name} is not read"));
     }
     Ok(())
+}
+
+/// A buffer has no bytes of its own because all views of it are compressed.
+pub(super) fn is_fallback(buffer: &json::Buffer) -> bool {
+    buffer.extensions.as_ref().is_some_and(|extensions| extensions.others.contains_key(MESHOPT))
 }

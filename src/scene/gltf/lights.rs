@@ -9,14 +9,14 @@ use json::validation::Checked;
 use punctual::{Spot, Type};
 
 use super::fault::{Notes, Read, fault};
-use super::nodes::{self, Placed};
+use super::nodes::{self, PlacedNode};
 use crate::scene::{Light, LightKind};
 
 /// A light and its place in the world; a directional one has none.
 pub(super) type PlacedLight = (Option<DVec3>, Light);
 
 /// The light that a node carries, unless it is dark.
-pub(super) fn read(root: &json::Root, placed: &Placed, notes: &mut Notes) -> Read<Option<PlacedLight>> {
+pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) -> Read<Option<PlacedLight>> {
     let node = &root.nodes[placed.node];
     let Some(reference) = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref())
     else {

@@ -11,7 +11,7 @@ use super::topology::corners;
 
 /// Triangles that share vertices and a material.
 #[derive(Debug, Default)]
-pub(super) struct Part {
+pub(super) struct MeshPrimitive {
     /// Those that a corner is at; all finite.
     pub(super) positions: Vec<Vec3>,
     /// One for each position, of any length; `None` where the file has none.
@@ -37,7 +37,7 @@ pub(super) struct Influence {
 
 /// What a node makes of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Shaping<'a> {
+pub(super) struct Deformation<'a> {
     /// A factor for each morph target; all 0 if empty.
     pub(super) weights: &'a [f32],
     /// Number of joints, where a skin moves it.
@@ -76,29 +76,35 @@ pub(super) fn read(
     document: &Document<'_>,
     mesh: usize,
     shapes: &[Option<Shape>],
-    shaping: Shaping<'_>,
-) -> Read<Vec<Part>> {
-    let mut parts = Vec::new();
+    deformation: Deformation<'_>,
+) -> Read<Vec<MeshPrimitive>> {
+    let mut primitives = Vec::new();
     for (j, (primitive, shape)) in document.root.meshes[mesh].primitives.iter().zip(shapes).enumerate() {
         if let Some(shape) = shape {
-            parts.push(read_part(document, primitive, *shape, shaping, &format!("meshes[{mesh}].primitives[{j}]"))?);
+            primitives.push(read_part(
+                document,
+                primitive,
+                *shape,
+                deformation,
+                &format!("meshes[{mesh}].primitives[{j}]"),
+            )?);
         }
     }
-    Ok(parts)
+    Ok(primitives)
 }
 
 fn read_part(
     document: &Document<'_>,
     primitive: &Primitive,
     shape: Shape,
-    shaping: Shaping<'_>,
+    deformation: Deformation<'_>,
     place: &str,
-) -> Read<Part> {
+) -> Read<MeshPrimitive> {
     let column = |accessor: Option<usize>| accessor.map(|accessor| document.column(accessor, place)).transpose();
     let material = primitive.material.map(|material| material.value());
-    let nothing = Part { claimed: shape.triangles, material, ..Part::default() };
+    let nothing = MeshPrimitive { claimed: shape.triangles, material, ..MeshPrimitive::default() };
     let Some(positions) = column(attribute(primitive, Semantic::Positions))? else { return Ok(nothing) };
-    let morphs = morphs(document, primitive, shaping.weights, place)?;
+    let morphs = morphs(document, primitive, deformation.weights, place)?;
     let indices = column(primitive.indices.map(|indices| indices.value()))?;
     let still = positions.is_zero() && morphs.is_empty();
     if still || indices.is_some_and(|indices| indices.is_zero()) {
@@ -124,7 +130,7 @@ fn read_part(
         let normal = |vertex: &u32| morphed(&normals, &morphs, *vertex, |morph| morph.normals.as_ref());
         vertices.used.iter().map(normal).collect()
     });
-    if let Some(joints) = shaping.joints {
+    if let Some(joints) = deformation.joints {
         part.influences = influences(document, primitive, &vertices.used, joints, place)?;
     }
     Ok(part)

@@ -21,17 +21,18 @@ mod draco;
 mod extensions;
 mod fault;
 mod files;
+mod format;
 mod instances;
 mod lights;
 mod materials;
 mod memory;
+mod mesh_cache;
 mod meshes;
 mod meshopt;
 mod nodes;
 mod placing;
 mod primitives;
 mod root;
-mod shown;
 mod skins;
 mod spheres;
 mod strict_json;
@@ -41,8 +42,8 @@ use accessor::Document;
 use fault::{Notes, Read, fault};
 use files::Resources;
 use lights::PlacedLight;
+use mesh_cache::{MeshCache, MeshInstance};
 use placing::{TOO_FAR, WorldBounds};
-use shown::{Gallery, Shown};
 use spheres::PlacedSphere;
 
 /// Reads a file into a scene.
@@ -86,37 +87,37 @@ fn assemble(
     mut hash: Sha256,
     mut notes: Notes,
 ) -> Read<Scene> {
-    let document = Document::new(root, buffers::read(root, resources, &mut hash)?)?;
+    let document = Document::new(root, buffers::read(root, resources, &mut hash)?)?.with_primitives(draco::decode)?;
     document.check()?;
     skins::check(&document)?;
     let shapes = meshes::check(&document, &mut notes)?;
 
     let worlds = nodes::worlds(root)?;
     let placed = nodes::flatten(root, chosen, &worlds)?;
-    let gallery = Gallery::read(&document, &placed, &shapes, &worlds, &mut notes)?;
-    let shown = gallery.shown();
-    let carried = Carried::read(root, &placed, &mut notes)?;
+    let cache = MeshCache::read(&document, &placed, &shapes, &worlds, &mut notes)?;
+    let instances = cache.instances();
+    let contents = NodeContents::read(root, &placed, &mut notes)?;
     let mut bounds = WorldBounds::EMPTY;
-    placing::measure(&shown, &mut bounds)?;
-    carried.spheres.iter().for_each(|sphere| bounds.add(sphere.center, sphere.radius));
+    placing::measure(&instances, &mut bounds)?;
+    contents.spheres.iter().for_each(|sphere| bounds.add(sphere.center, sphere.radius));
     let center = bounds.center();
     let mut reach = bounds;
-    carried
+    contents
         .lights
         .iter()
         .filter_map(|(at, _)| at.as_ref())
-        .chain(carried.cameras.iter().map(|(_, at, _)| at))
+        .chain(contents.cameras.iter().map(|(_, at, _)| at))
         .for_each(|at| reach.add(*at, 0.0));
     if !reach.fits() {
         return fault("scene", format!("a sphere, light or camera {TOO_FAR}"));
     }
 
     let mut scene = Scene { center, mesh_count: root.meshes.len(), ..Scene::default() };
-    let slots = read_materials(root, &shown, &carried.spheres, &mut scene, &mut notes)?;
+    let slots = read_materials(root, &instances, &contents.spheres, &mut scene, &mut notes)?;
     let slot = |material: Option<usize>| slots[material.unwrap_or(root.materials.len())];
-    scene.triangles = placing::place(&shown, center, slot, &mut notes)?;
-    scene.spheres = carried.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
-    carried.finish(&mut scene, &mut notes);
+    scene.triangles = placing::place(&instances, center, slot, &mut notes)?;
+    scene.spheres = contents.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
+    contents.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     scene.warnings = notes.into_lines();
     Ok(scene)
@@ -126,15 +127,15 @@ fn assemble(
 /// index in the scene.
 fn read_materials(
     root: &json::Root,
-    shown: &[Shown<'_>],
+    instances: &[MeshInstance<'_>],
     spheres: &[PlacedSphere],
     scene: &mut Scene,
     notes: &mut Notes,
 ) -> Read<Vec<u32>> {
     let default = root.materials.len();
     let mut used = vec![false; default + 1];
-    let parts = shown.iter().flat_map(|shown| shown.parts).map(|part| part.material);
-    parts.chain(spheres.iter().map(|sphere| sphere.material)).for_each(|i| used[i.unwrap_or(default)] = true);
+    let of_meshes = instances.iter().flat_map(|instance| instance.primitives).map(|primitive| primitive.material);
+    of_meshes.chain(spheres.iter().map(|sphere| sphere.material)).for_each(|i| used[i.unwrap_or(default)] = true);
     let mut slots = vec![0; default + 1];
     for (i, _) in used.iter().enumerate().filter(|(_, used)| **used) {
         slots[i] = scene.materials.len() as u32;
@@ -147,25 +148,25 @@ fn read_materials(
     Ok(slots)
 }
 
-/// What the nodes carry besides meshes, in the world.
+/// Lights, cameras and spheres of the nodes, in world space.
 #[derive(Default)]
-struct Carried {
+struct NodeContents {
     lights: Vec<PlacedLight>,
     /// With the number in the file, which decides their order.
     cameras: Vec<(usize, DVec3, Camera)>,
     spheres: Vec<PlacedSphere>,
 }
 
-impl Carried {
-    fn read(root: &json::Root, placed: &[nodes::Placed], notes: &mut Notes) -> Read<Self> {
-        let mut carried = Self::default();
+impl NodeContents {
+    fn read(root: &json::Root, placed: &[nodes::PlacedNode], notes: &mut Notes) -> Read<Self> {
+        let mut contents = Self::default();
         for placed in placed {
-            carried.lights.extend(lights::read(root, placed, notes)?);
-            carried.cameras.extend(cameras::read(root, placed)?);
-            carried.spheres.extend(spheres::read(root, placed, notes)?);
+            contents.lights.extend(lights::read(root, placed, notes)?);
+            contents.cameras.extend(cameras::read(root, placed)?);
+            contents.spheres.extend(spheres::read(root, placed, notes)?);
         }
-        carried.cameras.sort_by_key(|(index, ..)| *index);
-        Ok(carried)
+        contents.cameras.sort_by_key(|(index, ..)| *index);
+        Ok(contents)
     }
 
     /// Moves lights and cameras into the scene; a framing camera stands in where there is none.

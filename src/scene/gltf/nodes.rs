@@ -9,7 +9,7 @@ use crate::{Error, Result};
 
 /// A node with its place in the world.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Placed {
+pub(super) struct PlacedNode {
     pub(super) node: usize,
     pub(super) world: DMat4,
 }
@@ -96,7 +96,7 @@ fn roots(root: &json::Root) -> Vec<usize> {
 }
 
 /// Nodes of a scene (all of them where the file has no scenes) that carry something, parents first. Needs [`check`].
-pub(super) fn flatten(root: &json::Root, scene: usize, worlds: &[DMat4]) -> Read<Vec<Placed>> {
+pub(super) fn flatten(root: &json::Root, scene: usize, worlds: &[DMat4]) -> Read<Vec<PlacedNode>> {
     let mut open: Vec<usize> = match root.scenes.get(scene) {
         Some(scene) => scene.nodes.iter().rev().map(|node| node.value()).collect(),
         None => roots(root).into_iter().rev().collect(),
@@ -112,7 +112,7 @@ pub(super) fn flatten(root: &json::Root, scene: usize, worlds: &[DMat4]) -> Read
             return fault(format!("nodes[{index}]"), "its transform in the world is not finite");
         }
         if node.mesh.is_some() || node.camera.is_some() || node.extensions.is_some() {
-            placed.push(Placed { node: index, world });
+            placed.push(PlacedNode { node: index, world });
         }
         open.extend(node.children.iter().flatten().rev().map(|child| child.value()));
     }

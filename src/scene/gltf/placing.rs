@@ -3,8 +3,8 @@
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::fault::{Notes, Read, fault};
-use super::meshes::Part;
-use super::shown::Shown;
+use super::mesh_cache::MeshInstance;
+use super::meshes::MeshPrimitive;
 use crate::scene::Triangle;
 
 /// Size that a scene may have, metres.
@@ -42,17 +42,20 @@ impl WorldBounds {
 }
 
 /// Adds the vertices of all shown triangles to `bounds`.
-pub(super) fn measure(shown: &[Shown<'_>], bounds: &mut WorldBounds) -> Read<()> {
-    for shown in shown {
-        for i in 0..shown.copies() {
-            let to_world = shown.world(i)?;
-            for part in shown.parts {
-                (0..part.positions.len()).for_each(|v| {
-                    bounds.add(shown.matrix(part, v, to_world).transform_point3(part.positions[v].as_dvec3()), 0.0)
+pub(super) fn measure(instances: &[MeshInstance<'_>], bounds: &mut WorldBounds) -> Read<()> {
+    for instance in instances {
+        for i in 0..instance.copies() {
+            let to_world = instance.world(i)?;
+            for primitive in instance.primitives {
+                (0..primitive.positions.len()).for_each(|v| {
+                    bounds.add(
+                        instance.matrix(primitive, v, to_world).transform_point3(primitive.positions[v].as_dvec3()),
+                        0.0,
+                    )
                 });
             }
             if !bounds.fits() {
-                return fault(format!("nodes[{}]", shown.node), TOO_FAR);
+                return fault(format!("nodes[{}]", instance.node), TOO_FAR);
             }
         }
     }
@@ -61,23 +64,29 @@ pub(super) fn measure(shown: &[Shown<'_>], bounds: &mut WorldBounds) -> Read<()>
 
 /// All shown triangles relative to `center`. `material` maps the file's materials to the scene's.
 pub(super) fn place(
-    shown: &[Shown<'_>],
+    instances: &[MeshInstance<'_>],
     center: DVec3,
     material: impl Fn(Option<usize>) -> u32,
     notes: &mut Notes,
 ) -> Read<Vec<Triangle>> {
-    let claimed: usize = shown.iter().map(|shown| shown.copies() * total(shown.parts, |part| part.claimed)).sum();
-    let kept = shown.iter().map(|shown| shown.copies() * total(shown.parts, |part| part.corners.len())).sum();
+    let claimed: usize = instances
+        .iter()
+        .map(|instance| instance.copies() * total(instance.primitives, |primitive| primitive.claimed))
+        .sum();
+    let kept = instances
+        .iter()
+        .map(|instance| instance.copies() * total(instance.primitives, |primitive| primitive.corners.len()))
+        .sum();
     let mut triangles = Vec::with_capacity(kept);
-    for shown in shown {
-        for i in 0..shown.copies() {
-            let to_scene = DMat4::from_translation(-center) * shown.world(i)?;
-            for part in shown.parts {
-                let material = material(part.material);
-                if part.influences.is_empty() {
-                    place_part(part, to_scene, material, &mut triangles);
+    for instance in instances {
+        for i in 0..instance.copies() {
+            let to_scene = DMat4::from_translation(-center) * instance.world(i)?;
+            for primitive in instance.primitives {
+                let material = material(primitive.material);
+                if primitive.influences.is_empty() {
+                    place_rigid(primitive, to_scene, material, &mut triangles);
                 } else {
-                    place_skinned(shown, part, center, material, &mut triangles);
+                    place_skinned(instance, primitive, center, material, &mut triangles);
                 }
             }
         }
@@ -89,54 +98,60 @@ pub(super) fn place(
     Ok(triangles)
 }
 
-fn total(parts: &[Part], of: impl Fn(&Part) -> usize) -> usize {
-    parts.iter().map(of).sum()
+fn total(primitives: &[MeshPrimitive], of: impl Fn(&MeshPrimitive) -> usize) -> usize {
+    primitives.iter().map(of).sum()
 }
 
-/// The triangles of one part that have an area.
-fn place_part(part: &Part, to_scene: DMat4, material: u32, triangles: &mut Vec<Triangle>) {
+/// The triangles of one primitive that have an area.
+fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, material: u32, triangles: &mut Vec<Triangle>) {
     let linear = DMat3::from_mat4(to_scene);
     let mirrored = linear.determinant() < 0.0;
     let to_normal = cofactors(linear, mirrored);
     let positions: Vec<Vec3> =
-        part.positions.iter().map(|position| to_scene.transform_point3(position.as_dvec3()).as_vec3()).collect();
-    let normals: Option<Vec<Vec3>> = part.normals.as_ref().map(|normals| {
+        primitive.positions.iter().map(|position| to_scene.transform_point3(position.as_dvec3()).as_vec3()).collect();
+    let normals: Option<Vec<Vec3>> = primitive.normals.as_ref().map(|normals| {
         normals.iter().map(|normal| (to_normal * normal.as_dvec3()).normalize_or_zero().as_vec3()).collect()
     });
     let of = |corners: [usize; 3]| {
         let normals = normals.as_ref();
         (corners.map(|corner| positions[corner]), normals.map(|normals| corners.map(|corner| normals[corner])))
     };
-    add_triangles(part, |_| mirrored, of, material, triangles);
+    add_triangles(primitive, |_| mirrored, of, material, triangles);
 }
 
 /// The same where joints move each vertex in its own way.
-fn place_skinned(shown: &Shown<'_>, part: &Part, center: DVec3, material: u32, triangles: &mut Vec<Triangle>) {
-    let vertices = 0..part.positions.len();
+fn place_skinned(
+    instance: &MeshInstance<'_>,
+    primitive: &MeshPrimitive,
+    center: DVec3,
+    material: u32,
+    triangles: &mut Vec<Triangle>,
+) {
+    let vertices = 0..primitive.positions.len();
     let moves: Vec<DMat4> =
-        vertices.map(|v| DMat4::from_translation(-center) * shown.matrix(part, v, DMat4::IDENTITY)).collect();
+        vertices.map(|v| DMat4::from_translation(-center) * instance.matrix(primitive, v, DMat4::IDENTITY)).collect();
     let mirrored = |v: usize| DMat3::from_mat4(moves[v]).determinant() < 0.0;
-    let position = |v: usize| moves[v].transform_point3(part.positions[v].as_dvec3()).as_vec3();
+    let position = |v: usize| moves[v].transform_point3(primitive.positions[v].as_dvec3()).as_vec3();
     let normal = |normals: &[Vec3], v: usize| {
         let to_normal = cofactors(DMat3::from_mat4(moves[v]), mirrored(v));
         (to_normal * normals[v].as_dvec3()).normalize_or_zero().as_vec3()
     };
     let of = |corners: [usize; 3]| {
-        let normals = part.normals.as_deref();
+        let normals = primitive.normals.as_deref();
         (corners.map(position), normals.map(|normals| corners.map(|v| normal(normals, v))))
     };
-    add_triangles(part, mirrored, of, material, triangles);
+    add_triangles(primitive, mirrored, of, material, triangles);
 }
 
-/// Adds the triangles of a part that have an area. `of` gives their corners' positions and normals.
+/// Adds the triangles of a primitive that have an area. `of` gives their corners' positions and normals.
 fn add_triangles(
-    part: &Part,
+    primitive: &MeshPrimitive,
     mirrored: impl Fn(usize) -> bool,
     of: impl Fn([usize; 3]) -> ([Vec3; 3], Option<[Vec3; 3]>),
     material: u32,
     triangles: &mut Vec<Triangle>,
 ) {
-    for &[a, b, c] in &part.corners {
+    for &[a, b, c] in &primitive.corners {
         // A mirroring transform turns the winding round; swapping two corners keeps the outside outside.
         let corners = if mirrored(a as usize) { [a, c, b] } else { [a, b, c] }.map(|corner| corner as usize);
         let (positions, normals) = of(corners);

@@ -7,8 +7,9 @@ use json::accessor::{ComponentType, Type};
 use json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use json::validation::Checked;
 
-use super::accessor::{Column, Document, Format};
+use super::accessor::{Column, Document};
 use super::fault::{Notes, Read, fault};
+use super::format::Format;
 use super::topology::triangle_count;
 
 /// Sets of four joints that a vertex may have.

@@ -4,8 +4,9 @@ use glam::DMat4;
 use gltf::json;
 use json::accessor::{ComponentType, Type};
 
-use super::accessor::{Document, Format};
+use super::accessor::Document;
 use super::fault::{Read, fault};
+use super::format::Format;
 
 /// Checks what all skins refer to.
 pub(super) fn check(document: &Document<'_>) -> Read<()> {

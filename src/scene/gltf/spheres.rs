@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::fault::{Notes, Read, fault};
-use super::nodes::Placed;
+use super::nodes::PlacedNode;
 
 /// Largest relative difference of a transform's axes that still counts as a uniform scale.
 const UNIFORM: f64 = 1e-4;
@@ -51,7 +51,7 @@ struct Extras {
 }
 
 /// The exact sphere that a node carries (draft extension KHR_implicit_shapes).
-pub(super) fn read(root: &json::Root, placed: &Placed, notes: &mut Notes) -> Read<Option<PlacedSphere>> {
+pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) -> Read<Option<PlacedSphere>> {
     const NAME: &str = "KHR_implicit_shapes";
     let node = &root.nodes[placed.node];
     let Some(extension) = node.extensions.as_ref().and_then(|extensions| extensions.others.get(NAME)) else {

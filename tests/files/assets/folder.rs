@@ -79,7 +79,7 @@ fn render(path: &Path) -> Result<(), String> {
     let settings = support::settings(Mode::Hybrid, 500, 16).with(|s| s.estimate.neighbors = 10);
     let silent = caustica::progress::Silent;
     let render = caustica::renderer::render(support::gpu(), &scene, &settings, &silent).map_err(|e| e.to_string())?;
-    let pixels = render.frame.radiance.as_flattened();
+    let pixels = render.frame.radiance().as_flattened();
     if !pixels.iter().all(|x| x.is_finite() && *x >= 0.0) {
         return Err("a pixel is no finite number".to_owned());
     }

@@ -76,7 +76,7 @@ fn a_quad_shows_no_diagonal() {
             scene.lights.push(point_light(turn * Vec3::Z, 1.0));
             scene.cameras.push(camera(turn * (middle + Vec3::Z), turn * middle, 0.02));
             let frame = render_scene(&scene, &settings(Mode::DirectRays, 1000, 48)).frame;
-            alpha += frame.alpha.iter().sum::<f32>() / (2.0 * 48.0 * 48.0);
+            alpha += frame.alpha().iter().sum::<f32>() / (2.0 * 48.0 * 48.0);
         }
         alpha
     };
@@ -112,7 +112,7 @@ fn degenerate_triangles_leave_no_trace() {
         }
         let render = render_scene(&scene, &quick(mode));
         assert!(is_finite(&render) && render.stats.non_finite == NonFinite::default());
-        render.frame.radiance
+        render.frame.radiance().to_vec()
     };
     let (x, y) = (Vec3::X * 0.3, Vec3::Y * 0.3);
     let degenerate = [
@@ -142,7 +142,7 @@ fn of_coincident_quads_always_one_is_seen() {
         scene.lights.push(point_light(vec3(0.0, 2.0, 0.0), 1.0));
         scene.cameras.push(camera(eye, Vec3::splat(0.1), 20.0));
         let frame = render_scene(&scene, &settings(Mode::DirectRays, 1000, 24)).frame;
-        frame.albedo.iter().map(|albedo| albedo[0]).collect::<Vec<_>>()
+        frame.albedo().iter().map(|albedo| albedo[0]).collect::<Vec<_>>()
     };
     // From anywhere each half of the quad is of one colour: at most the diagonal parts two.
     for eye in [vec3(0.3, 2.0, 0.4), vec3(-1.0, 1.5, 1.0), vec3(0.2, 3.0, -0.4)] {
@@ -178,7 +178,7 @@ fn glass_on_a_floor_does_not_leak() {
         });
         let render = render_scene(&scene, &quick(Mode::Photons).with(|s| s.photons.max_paths = Some(60_000)));
         assert!(is_finite(&render) && render.stats.non_finite == NonFinite::default());
-        let least = render.frame.radiance.iter().map(|p| p[0]).fold(f32::INFINITY, f32::min);
+        let least = render.frame.radiance().iter().map(|p| p[0]).fold(f32::INFINITY, f32::min);
         f64::from(least) / mean(&render).max(1e-9)
     };
     let lit = least(true);
@@ -213,7 +213,7 @@ fn lights_on_surfaces_and_along_walls_are_harmless() {
         for mode in [Mode::DirectRays, Mode::Photons] {
             let render = render_scene(&scene, &quick(mode).with(|s| s.estimate.raw = true));
             assert!(is_finite(&render) && render.stats.non_finite == NonFinite::default(), "{kind:?} in {mode:?}");
-            let most = render.frame.radiance.iter().map(|p| f64::from(p[0])).fold(0.0, f64::max);
+            let most = render.frame.radiance().iter().map(|p| f64::from(p[0])).fold(0.0, f64::max);
             // Photons that a light leaves where it stands would be a spot without end.
             assert!(
                 (mean(&render) > 1e-4 || mode == Mode::DirectRays) && most < 100.0 * mean(&render).max(1e-4),
@@ -236,10 +236,10 @@ fn scaled(factor: f32, light: f32) -> Scene {
 #[test]
 fn size_does_not_matter() {
     let raw = quick(Mode::Hybrid).with(|s| s.estimate.raw = true);
-    let one = render_scene(&room(), &raw).frame.radiance;
+    let one = render_scene(&room(), &raw).frame.radiance().to_vec();
     for exponent in [-7, 13] {
         let factor = 2.0_f32.powi(exponent);
-        let other = render_scene(&scaled(factor, factor * factor), &raw).frame.radiance;
+        let other = render_scene(&scaled(factor, factor * factor), &raw).frame.radiance().to_vec();
         assert!(other == one, "another picture at 2^{exponent}");
     }
     // 7 mm and 10 km wide; what is drawn by chance around each estimate depends on the places' bits.
@@ -260,7 +260,7 @@ fn a_thousand_kilometres_away_all_looks_the_same() {
     let picture = |file: &serde_json::Value| {
         let mut scene = gltf::load(file).expect("the file is right");
         scene.cameras[0].aspect = Some(1.0);
-        (render_scene(&scene, &settings(Mode::DirectRays, 1000, 16)).frame.radiance, scene)
+        (render_scene(&scene, &settings(Mode::DirectRays, 1000, 16)).frame.radiance().to_vec(), scene)
     };
     let (right, _) = picture(&near);
     let moved = |nodes: serde_json::Value, by: [f32; 3]| {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use caustica::{
     bvh::Bvh,
     scene::{Environment, Material, Scene, Surface},
-    settings::{Mode, Settings},
+    settings::{LightSettings, Mode},
     upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
@@ -55,7 +55,7 @@ fn bright_dark_and_wrong_pixels(ior: f64) -> [usize; 3] {
     // In a uniform field radiance over n² is the same everywhere: all that is not trapped brings n² L.
     let (inside, outside) = (WATER * WATER * 2.0, 0.0);
     let (mut bright, mut dark, mut wrong) = (0, 0, 0);
-    for (i, pixel) in render.frame.radiance.iter().enumerate() {
+    for (i, pixel) in render.frame.radiance().iter().enumerate() {
         let at = |i: usize| (2.0 * (i as f32 + 0.5) / SIZE as f32 - 1.0) * half;
         let direction = (view.forward + at(i % SIZE) * view.right - at(i / SIZE) * view.up).normalize();
         let sine = f64::from(direction.cross(Vec3::X).length());
@@ -82,7 +82,7 @@ fn a_light_in_nested_glass_sends_out_what_is_not_trapped() {
         });
         let traced = traced(&scene, &settings);
         assert_eq!((traced.non_finite, traced.unfinished), (0, 0));
-        flux(&traced.caustic)
+        flux(&traced.maps.caustic)
     };
     let right = 4.0 * PI * (1.0 - (1.0 - critical_sine().powi(2)).sqrt());
     assert!(within(leaving(ASIDE), right, 0.04), "{} W instead of {right}", leaving(ASIDE));
@@ -104,7 +104,8 @@ fn emitters_start_in_what_is_around_them() {
     // On the outside of the box's left face, a triangle's own rounding away from it: glass behind it, air before it.
     add_quad(&mut scene, vec3(-1.0, -0.2, -0.2), Vec3::Z * 0.4, Vec3::Y * 0.4, panel);
     scene.lights.push(point_light(vec3(0.4, 0.3, 0.0), 1.0));
-    let buffers = SceneBuffers::new(gpu(), &scene, &Bvh::build(&scene), &Settings::default()).expect("the scene fits");
+    let buffers =
+        SceneBuffers::new(gpu(), &scene, &Bvh::build(&scene), &LightSettings::default()).expect("the scene fits");
     let lights = &buffers.lights.table.lights;
     let found: Vec<_> = lights.iter().map(|light| (light.media, light.back_media)).collect();
     let (none, water, glow) = ([0; 4], [1, 2, 0, 0], [1, glowing + 1, 0, 0]);

@@ -35,9 +35,9 @@ use support::gpu;
 
 /// The first pass alone.
 fn traced(scene: &Scene, settings: &Settings) -> TracedPhotons {
-    let buffers = SceneBuffers::new(gpu(), scene, &Bvh::build(scene), settings).expect("the scene fits");
-    let tracer = PhotonTracer::new(gpu(), &buffers);
-    tracer.trace(gpu(), &buffers, settings, scene.has_delta(), &Silent).expect("photons trace")
+    let buffers = SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &settings.lights).expect("the scene fits");
+    let tracer = PhotonTracer::new(gpu(), &buffers, settings.photons.sampler);
+    tracer.trace(gpu(), &buffers, &settings.photons, scene.has_delta(), &Silent).expect("photons trace")
 }
 
 /// Flux of a map's photons, W in the first channel.
@@ -49,6 +49,6 @@ fn flux(map: &RawMap) -> f64 {
 /// All numbers of the picture are finite.
 fn is_finite(render: &Render) -> bool {
     let frame = &render.frame;
-    let mut triples = frame.radiance.iter().chain(&frame.normal).chain(&frame.albedo).flatten();
-    triples.all(|x| x.is_finite()) && frame.alpha.iter().chain(&frame.depth).all(|x| x.is_finite())
+    let mut triples = frame.radiance().iter().chain(frame.normal()).chain(frame.albedo()).flatten();
+    triples.all(|x| x.is_finite()) && frame.alpha().iter().chain(frame.depth()).all(|x| x.is_finite())
 }

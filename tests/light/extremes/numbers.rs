@@ -58,7 +58,7 @@ fn the_strength_of_light_is_a_factor() {
         let other = picture(&room(factor, 2.0 * factor), 0);
         assert_eq!(other.stats.non_finite, NonFinite::default());
         let same = |render: &Render| {
-            one.frame.radiance.iter().zip(&render.frame.radiance).all(|(a, b)| a.map(|x| x * factor) == *b)
+            one.frame.radiance().iter().zip(render.frame.radiance()).all(|(a, b)| a.map(|x| x * factor) == *b)
         };
         assert!(same(&other), "2^{exponent} gives another picture");
         assert!(exponent > 0 || !same(&picture(&room(factor, 2.0 * factor), 1)), "control: another seed");
@@ -88,13 +88,13 @@ fn black_and_white_rooms_end() {
         traced(&closed_box(albedo), &settings)
     };
     let white = limited(1.0, 30, 1000);
-    assert!(within(flux(&white.global), 30.0 * power, 1e-4), "{} W", flux(&white.global));
+    assert!(within(flux(&white.maps.global), 30.0 * power, 1e-4), "{} W", flux(&white.maps.global));
     assert!(within(white.lost, power, 1e-3), "{} W were lost", white.lost);
     let grey = limited(0.9, 30, 1000);
-    assert!(!within(flux(&grey.global), 30.0 * power, 0.3) && grey.lost < 0.2 * power, "control");
+    assert!(!within(flux(&grey.maps.global), 30.0 * power, 0.3) && grey.lost < 0.2 * power, "control");
     // Without a limit the ceiling ends them.
     let endless = limited(1.0, 0, 2);
-    assert_eq!((endless.global.stored, endless.non_finite), (2 * 4095, 0));
+    assert_eq!((endless.maps.global.stored, endless.non_finite), (2 * 4095, 0));
 }
 
 #[test]

@@ -82,7 +82,7 @@ fn caustic_flux(scene: &Scene, emission: Emission) -> [(f64, f64); 3] {
         s.photons.caustic = 100_000;
         s.photons.max_paths = Some(150_000);
     });
-    let map = traced(scene, &settings).caustic;
+    let map = traced(scene, &settings).maps.caustic;
     let photons: Vec<Photon> = map.read(gpu()).expect("photons read back");
     let part = |wanted: &dyn Fn(f32) -> bool| {
         let part: Vec<_> = photons.iter().filter(|p| wanted(p.position[0])).collect();
@@ -115,7 +115,7 @@ fn aimed_paths_bring_the_flux_of_unaimed_ones() {
 
 /// Radiance of the first channel.
 fn reds(render: &Render) -> Vec<f64> {
-    render.frame.radiance.iter().map(|p| f64::from(p[0])).collect()
+    render.frame.radiance().iter().map(|p| f64::from(p[0])).collect()
 }
 
 /// Means over blocks of 8 x 8 pixels of a picture 32 wide.

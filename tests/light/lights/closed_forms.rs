@@ -194,12 +194,12 @@ fn balls_vanish_in_a_furnace() {
             s.photons.max_paths = Some(300_000);
         });
         let render = render_scene(&scene, &settings);
-        assert!(render.frame.alpha.contains(&0.0), "the furnace itself has no coverage");
+        assert!(render.frame.alpha().contains(&0.0), "the furnace itself has no coverage");
         render
     };
     for surface in [glass(), Surface::Mirror { tint: Vec3::ONE }] {
         let render = furnace(surface, Mode::DirectRays);
-        let worst = render.frame.radiance.iter().flatten().map(|x| (x - 1.0).abs()).fold(0.0, f32::max);
+        let worst = render.frame.radiance().iter().flatten().map(|x| (x - 1.0).abs()).fold(0.0, f32::max);
         assert!(worst < 0.01, "{surface:?} can be told from the furnace by {worst}");
     }
     for mode in [Mode::Hybrid, Mode::Photons] {
@@ -276,10 +276,10 @@ fn a_bright_pixel_lights_and_is_seen_where_it_is() {
         looked_up(map, d.as_dvec3().normalize())
     };
     let worst = |map: &Environment| {
-        let difference = |i: usize| (f64::from(seen.radiance[i][0]) - expected(map, i)).abs();
+        let difference = |i: usize| (f64::from(seen.radiance()[i][0]) - expected(map, i)).abs();
         (0..48 * 48).map(difference).fold(0.0, f64::max)
     };
-    assert!(seen.radiance.iter().any(|p| p[0] > 300.0), "the bright pixel is in the picture");
+    assert!(seen.radiance().iter().any(|p| p[0] > 300.0), "the bright pixel is in the picture");
     assert!(worst(&map) < 2.0, "pixels differ from the map by up to {} of 900", worst(&map));
     assert!(worst(&turned) > 100.0, "control: the map turned");
 }

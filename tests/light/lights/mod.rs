@@ -31,9 +31,9 @@ fn spot(position: Vec3, direction: Vec3, intensity: f32, inner: f32, outer: f32)
 /// The first pass alone.
 fn traced(scene: &Scene, settings: &Settings) -> TracedPhotons {
     let gpu = gpu();
-    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), settings).expect("the scene fits");
-    let tracer = PhotonTracer::new(gpu, &buffers);
-    tracer.trace(gpu, &buffers, settings, scene.has_delta(), &Silent).expect("photons trace")
+    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &settings.lights).expect("the scene fits");
+    let tracer = PhotonTracer::new(gpu, &buffers, settings.photons.sampler);
+    tracer.trace(gpu, &buffers, &settings.photons, scene.has_delta(), &Silent).expect("photons trace")
 }
 
 /// Sum of the flux of photons, W in the first channel, of so many paths.
@@ -43,6 +43,6 @@ fn flux<'a>(photons: impl IntoIterator<Item = &'a Photon>, emitted: u64) -> f64 
 
 /// Flux of the photons that come straight from the lights, W in the first channel.
 fn direct_flux(scene: &Scene, photons: u32) -> f64 {
-    let map = traced(scene, &settings(Mode::DirectPhotons, photons, 1)).global;
+    let map = traced(scene, &settings(Mode::DirectPhotons, photons, 1)).maps.global;
     flux(&map.read(gpu()).expect("photons read back"), map.emitted)
 }

@@ -103,8 +103,8 @@ fn hybrid_is_direct_rays_plus_indirect_photons_where_lights_are_seen() {
         .map(|mode| render_scene(&scene, &settings(mode, 10_000, 32)));
     let [hybrid, direct, indirect, other] = &pictures;
     let largest = |a: &Render, b: &Render| {
-        let sum = a.frame.radiance.iter().flatten().zip(b.frame.radiance.iter().flatten()).map(|(a, b)| a + b);
-        hybrid.frame.radiance.iter().flatten().zip(sum).map(|(h, s)| f64::from((h - s).abs())).fold(0.0, f64::max)
+        let sum = a.frame.radiance().iter().flatten().zip(b.frame.radiance().iter().flatten()).map(|(a, b)| a + b);
+        hybrid.frame.radiance().iter().flatten().zip(sum).map(|(h, s)| f64::from((h - s).abs())).fold(0.0, f64::max)
     };
     let (right, wrong) = (largest(direct, indirect), largest(direct, other));
     assert!(right < 1e-4 * mean(hybrid), "modes 2 and 4 differ from mode 0 by {right}");
@@ -208,7 +208,7 @@ fn photons_go_to_lights_as_asked() {
         pair.lights = [(apart, 1.0), (-apart, 0.1)].map(|(at, intensity)| point_light(at, intensity)).into();
         pair.triangles.clear();
         let in_turn = settings(Mode::DirectPhotons, 40_000, 8).with(|s| s.lights.sampling = LightSampling::Uniform);
-        let map = traced(&pair, &in_turn).global;
+        let map = traced(&pair, &in_turn).maps.global;
         let photons = map.read(gpu()).expect("photons read back");
         [0, 1, 2].map(|axis| flux(photons.iter().filter(|p| p.position[axis] > 0.0), map.emitted))
     };

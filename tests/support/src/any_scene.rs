@@ -66,7 +66,7 @@ fn sound(scene: &Scene) {
     assert!(bounds.0.is_finite() && bounds.1.is_finite(), "{bounds:?}");
     let _ = scene.check_renderable();
     if scene.triangles.len() <= MAX_BUILT && scene.spheres.len() <= MAX_BUILT {
-        let _ = Bvh::build(scene).most_postponed();
+        let _ = Bvh::build(scene).max_stack_depth();
     }
 }
 

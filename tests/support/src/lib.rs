@@ -116,8 +116,8 @@ pub fn render_scene(scene: &Scene, settings: &Settings) -> Render {
 
 /// Mean of all pixels and channels.
 pub fn mean(render: &Render) -> f64 {
-    let sum: f64 = render.frame.radiance.iter().flatten().map(|&x| f64::from(x)).sum();
-    sum / (3 * render.frame.radiance.len()) as f64
+    let sum: f64 = render.frame.radiance().iter().flatten().map(|&x| f64::from(x)).sum();
+    sum / (3 * render.frame.radiance().len()) as f64
 }
 
 /// Mean of independent numbers, and its standard error.

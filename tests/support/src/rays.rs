@@ -4,7 +4,7 @@ use caustica::{
     bvh::Bvh,
     layout::{CameraTile, Counters, FirstHit, Path, VisiblePoint},
     scene::Scene,
-    settings::Settings,
+    settings::LightSettings,
     upload::SceneBuffers,
 };
 use glam::Vec3;
@@ -16,7 +16,7 @@ use crate::gpu;
 pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) -> (Counters, Vec<FirstHit>) {
     let gpu = gpu();
     let count = rays.len() as u64;
-    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &Settings::default()).expect("the scene fits");
+    let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &LightSettings::default()).expect("the scene fits");
     let kernel = buffers.kernel_with(gpu, "trace_camera", constants);
     let path = |&(origin, direction): &(Vec3, Vec3)| Path {
         origin: origin.to_array(),

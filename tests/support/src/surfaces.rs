@@ -64,9 +64,10 @@ pub fn estimates(gpu: &Gpu, place: &Place, seeds: u32) -> [Vec<f64>; 4] {
             s.estimate.neighbors = place.neighbors;
             s.photons.seed = seed;
         });
-        let buffers = SceneBuffers::new(gpu, &place.scene, &Bvh::build(&place.scene), &settings).expect("it fits");
-        let tracer = PhotonTracer::new(gpu, &buffers);
-        let traced = tracer.trace(gpu, &buffers, &settings, false, &Silent).expect("photons").global;
+        let buffers =
+            SceneBuffers::new(gpu, &place.scene, &Bvh::build(&place.scene), &settings.lights).expect("it fits");
+        let tracer = PhotonTracer::new(gpu, &buffers, settings.photons.sampler);
+        let traced = tracer.trace(gpu, &buffers, &settings.photons, false, &Silent).expect("photons").maps.global;
         let kernels = MapKernels::new(gpu);
         let map = PhotonMap::build(gpu, &kernels, traced.photons, traced.stored as u32, traced.emitted).expect("a map");
         let count = place.points.len() as u32;

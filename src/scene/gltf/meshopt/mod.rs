@@ -5,13 +5,12 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::buffers::{Buffers, slice};
+use super::extensions::MESHOPT;
 use super::fault::{Read, fault};
 
 mod filters;
 mod indices;
 mod vertices;
-
-const NAME: &str = "EXT_meshopt_compression";
 
 /// Bytes that all views of a file may take together whatever their buffers hold, and per byte of these.
 const MAX_BYTES: u64 = 1 << 26;
@@ -31,19 +30,14 @@ struct Compressed {
     filter: Option<String>,
 }
 
-/// A buffer has no bytes of its own because all views of it are compressed.
-pub(super) fn is_fallback(buffer: &json::Buffer) -> bool {
-    buffer.extensions.as_ref().is_some_and(|extensions| extensions.others.contains_key(NAME))
-}
-
 /// The decoded bytes of each view; none for those that are not compressed.
 pub(super) fn decode(root: &json::Root, buffers: &Buffers<'_>) -> Read<Vec<Option<Vec<u8>>>> {
     let held: usize = buffers.iter().flatten().map(|bytes| bytes.len()).sum();
     let mut left = MAX_BYTES.max(MAX_RATIO * held as u64);
     let mut views = Vec::with_capacity(root.buffer_views.len());
     for (i, view) in root.buffer_views.iter().enumerate() {
-        let extension = view.extensions.as_ref().and_then(|extensions| extensions.others.get(NAME));
-        let place = format!("bufferViews[{i}].extensions.{NAME}");
+        let extension = view.extensions.as_ref().and_then(|extensions| extensions.others.get(MESHOPT));
+        let place = format!("bufferViews[{i}].extensions.{MESHOPT}");
         views.push(extension.map(|extension| decode_view(view, extension, buffers, &mut left, &place)).transpose()?);
     }
     Ok(views)

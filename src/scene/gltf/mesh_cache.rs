@@ -8,23 +8,23 @@ use super::accessor::Document;
 use super::fault::{Notes, Read};
 use super::instances::{self, Instances};
 use super::memory;
-use super::meshes::{self, Part, Shaping};
-use super::nodes::Placed;
+use super::meshes::{self, Deformation, MeshPrimitive};
+use super::nodes::PlacedNode;
 use super::primitives::Shape;
 use super::skins;
 
-/// A mesh shown by a node.
+/// A mesh as a node shows it.
 #[derive(Debug)]
-pub(super) struct Shown<'a> {
+pub(super) struct MeshInstance<'a> {
     pub(super) node: usize,
-    pub(super) parts: &'a [Part],
+    pub(super) primitives: &'a [MeshPrimitive],
     world: DMat4,
     instances: Option<&'a Instances<'a>>,
     /// For each joint of the node's skin the transform from the mesh to the world.
     pose: &'a [DMat4],
 }
 
-impl Shown<'_> {
+impl MeshInstance<'_> {
     /// How many times the mesh is there.
     pub(super) fn copies(&self) -> usize {
         self.instances.map_or(1, |instances| instances.count)
@@ -35,24 +35,24 @@ impl Shown<'_> {
         self.instances.map_or(Ok(self.world), |instances| Ok(self.world * instances.local(i)?))
     }
 
-    /// The transform of a vertex of a part into the world: `otherwise` where no skin moves it.
-    pub(super) fn matrix(&self, part: &Part, vertex: usize, otherwise: DMat4) -> DMat4 {
-        let Some(influences) = part.influences.get(vertex) else { return otherwise };
+    /// The transform of a vertex of a primitive into the world: `otherwise` where no skin moves it.
+    pub(super) fn matrix(&self, primitive: &MeshPrimitive, vertex: usize, otherwise: DMat4) -> DMat4 {
+        let Some(influences) = primitive.influences.get(vertex) else { return otherwise };
         influences.iter().fold(DMat4::ZERO, |sum, held| sum + self.pose[held.joint as usize] * held.weight)
     }
 }
 
-/// What all nodes of a scene show.
+/// Meshes, instances and skin poses of all nodes of a scene; a mesh that several nodes deform alike is read once.
 #[derive(Debug, Default)]
-pub(super) struct Gallery<'d> {
+pub(super) struct MeshCache<'d> {
     entries: Vec<Entry<'d>>,
-    meshes: Vec<Vec<Part>>,
+    meshes: Vec<Vec<MeshPrimitive>>,
     poses: HashMap<usize, Vec<DMat4>>,
 }
 
 #[derive(Debug)]
 struct Entry<'d> {
-    placed: Placed,
+    placed: PlacedNode,
     /// Index into the meshes.
     mesh: usize,
     instances: Option<Instances<'d>>,
@@ -60,20 +60,20 @@ struct Entry<'d> {
 }
 
 /// How a mesh is read: its number, the node whose own weights it has, and the joints of its skin.
-type Reading = (usize, Option<usize>, Option<usize>);
+type MeshKey = (usize, Option<usize>, Option<usize>);
 
-impl<'d> Gallery<'d> {
+impl<'d> MeshCache<'d> {
     /// Reads the meshes of the nodes. Needs [`meshes::check`], whose `shapes` these are, and [`skins::check`].
     pub(super) fn read(
         document: &'d Document<'_>,
-        placed: &[Placed],
+        placed: &[PlacedNode],
         shapes: &[Vec<Option<Shape>>],
         worlds: &[DMat4],
         notes: &mut Notes,
     ) -> Read<Self> {
-        let mut gallery = Self::default();
-        let mut known: HashMap<Reading, usize> = HashMap::new();
-        let mut readings: Vec<Reading> = Vec::new();
+        let mut cache = Self::default();
+        let mut known: HashMap<MeshKey, usize> = HashMap::new();
+        let mut keys: Vec<MeshKey> = Vec::new();
         let mut triangles = 0_usize;
         for placed in placed {
             let node = &document.root.nodes[placed.node];
@@ -93,39 +93,39 @@ impl<'d> Gallery<'d> {
                 continue;
             }
             let joints = skin.map(|skin| document.root.skins[skin].joints.len());
-            let reading = (mesh, node.weights.as_ref().map(|_| placed.node), joints);
-            let mesh = *known.entry(reading).or_insert_with(|| {
-                readings.push(reading);
-                readings.len() - 1
+            let key = (mesh, node.weights.as_ref().map(|_| placed.node), joints);
+            let mesh = *known.entry(key).or_insert_with(|| {
+                keys.push(key);
+                keys.len() - 1
             });
-            gallery.entries.push(Entry { placed: *placed, mesh, instances, skin });
+            cache.entries.push(Entry { placed: *placed, mesh, instances, skin });
         }
         memory::check(triangles)?;
-        for (mesh, weighted, joints) in readings {
+        for (mesh, weighted, joints) in keys {
             let weights = match weighted {
                 Some(node) => document.root.nodes[node].weights.as_deref(),
                 None => document.root.meshes[mesh].weights.as_deref(),
             };
-            let shaping = Shaping { weights: weights.unwrap_or_default(), joints };
-            gallery.meshes.push(meshes::read(document, mesh, &shapes[mesh], shaping)?);
+            let deformation = Deformation { weights: weights.unwrap_or_default(), joints };
+            cache.meshes.push(meshes::read(document, mesh, &shapes[mesh], deformation)?);
         }
-        for skin in gallery.entries.iter().filter_map(|entry| entry.skin) {
-            if let Vacant(place) = gallery.poses.entry(skin) {
+        for skin in cache.entries.iter().filter_map(|entry| entry.skin) {
+            if let Vacant(place) = cache.poses.entry(skin) {
                 place.insert(skins::pose(document, skin, worlds)?);
             }
         }
-        Ok(gallery)
+        Ok(cache)
     }
 
-    /// All that is shown, in the order of the nodes.
-    pub(super) fn shown(&self) -> Vec<Shown<'_>> {
-        let shown = self.entries.iter().map(|entry| Shown {
+    /// All mesh instances, in the order of the nodes.
+    pub(super) fn instances(&self) -> Vec<MeshInstance<'_>> {
+        let instances = self.entries.iter().map(|entry| MeshInstance {
             node: entry.placed.node,
-            parts: &self.meshes[entry.mesh],
+            primitives: &self.meshes[entry.mesh],
             world: entry.placed.world,
             instances: entry.instances.as_ref(),
             pose: entry.skin.and_then(|skin| self.poses.get(&skin)).map_or(&[], Vec::as_slice),
         });
-        shown.collect()
+        instances.collect()
     }
 }

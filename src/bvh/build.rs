@@ -1,0 +1,132 @@
+//! Building: primitives, the binary tree and its conversion.
+
+use glam::Vec3;
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ploc::{PlocSearchDistance, SortPrecision};
+
+use super::node::MAX_LEAF;
+use super::{convert, widen};
+use crate::layout::{BVH_STACK, BvhNode, Normals, Primitive, SPHERE_BIT, octahedral};
+use crate::scene::{Bounds, Scene, Sphere, Triangle};
+
+/// [`Primitive::id`] of a padding triangle.
+pub const FILLER: u32 = u32::MAX;
+
+/// Nodes and primitives in device layout.
+#[derive(Clone, Debug, Default)]
+pub struct Bvh {
+    /// Interior nodes, parents before children. Node 0 is the root.
+    pub nodes: Vec<BvhNode>,
+    /// Primitives in leaf order.
+    pub primitives: Vec<Primitive>,
+    /// Normals of each primitive, parallel to `primitives`.
+    pub normals: Vec<Normals>,
+}
+
+impl Bvh {
+    /// Builds the tree over all triangles and spheres: PLOC with reinsertion (Meister and Bittner
+    /// 2018, 2021). Equal scenes give equal trees on any number of threads.
+    ///
+    /// # Panics
+    /// If there are 2^28 triangles and spheres or more. The loader refuses such files earlier.
+    #[must_use]
+    pub fn build(scene: &Scene) -> Self {
+        let mut primitives: Vec<Primitive> = Vec::with_capacity(scene.triangles.len() + scene.spheres.len());
+        primitives.extend(scene.triangles.iter().map(triangle_primitive));
+        primitives.extend(scene.spheres.iter().map(sphere_primitive));
+        for (id, primitive) in primitives.iter_mut().enumerate() {
+            primitive.id = id as u32;
+        }
+        primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
+        let bounds: Vec<Bounds> = primitives.iter().map(bounds).collect();
+        let binary = convert::convert(&build_binary(&bounds), &bounds);
+        let (nodes, order) = widen::widen(&binary);
+        let normals = |primitive: &Primitive| {
+            scene.triangles.get(primitive.id as usize).map_or(Normals::default(), corner_normals)
+        };
+        let primitives: Vec<Primitive> = order.iter().map(|i| primitives[*i as usize]).collect();
+        Self { normals: primitives.iter().map(normals).collect(), nodes, primitives }
+    }
+
+    /// Maximum number of children that a traversal holds on its stack.
+    #[must_use]
+    pub fn max_stack_depth(&self) -> usize {
+        // Deferred children on the stack when the traversal enters each node.
+        let mut deferred = vec![0_usize; self.nodes.len()];
+        let mut most = 0;
+        for (i, node) in self.nodes.iter().enumerate() {
+            let here = deferred[i] + node.children().count() - 1;
+            node.children().filter(|child| child.count == 0).for_each(|child| deferred[child.first as usize] = here);
+            most = most.max(here);
+        }
+        debug_assert!(most <= BVH_STACK);
+        most
+    }
+}
+
+fn triangle_primitive(triangle: &Triangle) -> Primitive {
+    let [a, b, c] = triangle.positions;
+    Primitive {
+        v0: a.to_array(),
+        material: triangle.material,
+        e1: (b - a).to_array(),
+        e2: (c - a).to_array(),
+        ..Primitive::default()
+    }
+}
+
+fn sphere_primitive(sphere: &Sphere) -> Primitive {
+    Primitive {
+        v0: sphere.center.to_array(),
+        material: sphere.material | SPHERE_BIT,
+        e1: [sphere.radius, 0.0, 0.0],
+        ..Primitive::default()
+    }
+}
+
+/// Bounding box of a primitive as the shaders see it.
+pub(super) fn bounds(primitive: &Primitive) -> Bounds {
+    let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(Vec3::from_array);
+    if primitive.material & SPHERE_BIT != 0 {
+        return Bounds { min: v0 - e1.x, max: v0 + e1.x };
+    }
+    let (v1, v2) = (v0 + e1, v0 + e2);
+    Bounds { min: v0.min(v1).min(v2), max: v0.max(v1).max(v2) }
+}
+
+/// Largest length of (corner normal − geometric normal) that still counts as flat: below the
+/// precision of the encoding.
+const FLAT_TOLERANCE: f32 = 1e-4;
+
+fn corner_normals(triangle: &Triangle) -> Normals {
+    let flat = triangle.geometric_normal();
+    let [n0, n1, n2] = triangle.normals.map(octahedral);
+    let flat_shaded = u32::from(triangle.normals.iter().all(|normal| (*normal - flat).length() < FLAT_TOLERANCE));
+    Normals { n0, n1, n2, flat_shaded }
+}
+
+/// Builds the tree before conversion. Runs on one thread: the parallel sorts do not promise an
+/// order of equal keys.
+pub(super) fn build_binary(bounds: &[Bounds]) -> Bvh2 {
+    let boxes: Vec<Aabb> = bounds.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
+    let parameters = BvhBuildParams {
+        pre_split: false,
+        ploc_search_distance: PlocSearchDistance::Medium,
+        search_depth_threshold: 3,
+        reinsertion_batch_ratio: 0.05,
+        post_collapse_reinsertion_batch_ratio_multiplier: 2.0,
+        sort_precision: SortPrecision::U64,
+        max_prims_per_leaf: MAX_LEAF,
+        // Cost of one level of the binary tree, in primitive tests.
+        collapse_traversal_cost: 1.5,
+    };
+    let build = || build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
+    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+        Ok(pool) => pool.install(build),
+        // Falls back to the pool of this thread if no thread can be started.
+        Err(_) => build(),
+    }
+}

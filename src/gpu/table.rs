@@ -1,0 +1,102 @@
+//! Read-only arrays in textures: a kernel may bind few storage buffers, and 16 textures besides.
+
+use std::sync::Arc;
+
+use super::{Gpu, buffer::MemoryCount};
+use crate::{
+    error::{Error, Result},
+    layout::TABLE_COLUMNS,
+};
+
+/// An array that kernels read with `textureLoad`: texel `i` lies in column `i % TABLE_COLUMNS` of row `i / TABLE_COLUMNS`.
+/// Clones share the texture.
+#[derive(Clone, Debug)]
+pub struct Table(Arc<Texture>);
+
+#[derive(Debug)]
+struct Texture {
+    view: wgpu::TextureView,
+    bytes: u64,
+    memory: Arc<MemoryCount>,
+}
+
+impl Drop for Texture {
+    fn drop(&mut self) {
+        self.memory.subtract(self.bytes);
+    }
+}
+
+impl Table {
+    /// A table of `data`, whose elements have 4 bytes, one texel each, or a multiple of 16, a texel for each 16.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] if a texture cannot hold it, [`Error::Memory`] if none is left.
+    pub fn new<T: bytemuck::Pod>(gpu: &Gpu, label: &str, data: &[T]) -> Result<Self> {
+        let (format, texel) = match size_of::<T>() {
+            4 => (wgpu::TextureFormat::R32Uint, 4),
+            _ => (wgpu::TextureFormat::Rgba32Uint, 16),
+        };
+        assert_eq!(size_of::<T>() % texel, 0, "{label}: elements of a table fill texels");
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let texels = (bytes.len() / texel) as u64;
+        let most = most_texels(&gpu.limits);
+        if texels > most {
+            return Err(Error::Limit {
+                what: label.to_string(),
+                needed: texels,
+                unit: "texels",
+                limit: "maxImageDimension2D",
+                adapter: gpu.name.clone(),
+                allowed: most,
+                advice: "ask for less or use another --device".to_string(),
+            });
+        }
+        let columns = (texels as u32).clamp(1, TABLE_COLUMNS);
+        let size = wgpu::Extent3d {
+            width: columns,
+            height: (texels as u32).div_ceil(columns).max(1),
+            depth_or_array_layers: 1,
+        };
+        let allotted = u64::from(size.width) * u64::from(size.height) * texel as u64;
+        let texture = gpu.allot(label, allotted, || {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size,
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+                view_formats: &[],
+            })
+        })?;
+        write(gpu, &texture, bytes, columns, texel as u32);
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Ok(Self(Arc::new(Texture { view, bytes: allotted, memory: Arc::clone(&gpu.memory) })))
+    }
+
+    pub(super) fn view(&self) -> &wgpu::TextureView {
+        &self.0.view
+    }
+}
+
+/// Texels of the largest table.
+pub(super) fn most_texels(limits: &wgpu::Limits) -> u64 {
+    u64::from(TABLE_COLUMNS.min(limits.max_texture_dimension_2d)) * u64::from(limits.max_texture_dimension_2d)
+}
+
+/// Fills whole rows, then what is left in the last one.
+fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8], columns: u32, texel: u32) {
+    let row = (columns * texel) as usize;
+    let (whole, rest) = bytes.split_at(bytes.len() / row * row);
+    let rows = (whole.len() / row) as u32;
+    for (data, y, width, height) in [(whole, 0, columns, rows), (rest, rows, rest.len() as u32 / texel, 1)] {
+        if data.is_empty() {
+            continue;
+        }
+        let target = wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x: 0, y, z: 0 }, ..texture.as_image_copy() };
+        let layout =
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(width * texel), rows_per_image: None };
+        gpu.queue.write_texture(target, data, layout, wgpu::Extent3d { width, height, depth_or_array_layers: 1 });
+    }
+}

@@ -1,0 +1,45 @@
+//! Tiles: parts of a picture's samples, and what one step did to them.
+
+use crate::layout::Counters;
+
+/// A part of the picture's samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Tile {
+    /// Pixels, a power of 2, in Morton order; some of them may lie outside the picture.
+    pub pixels: u32,
+    /// Pixel of the upper left corner.
+    pub first_column: u32,
+    pub first_row: u32,
+    pub first_sample: u32,
+    /// Samples of each pixel.
+    pub samples: u32,
+}
+
+/// What one step did, for the statistics.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepCount {
+    pub rays: u64,
+    pub media_overflows: u64,
+    pub unfinished: u64,
+    pub non_finite: u64,
+}
+
+impl std::ops::AddAssign for StepCount {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.media_overflows += other.media_overflows;
+        self.unfinished += other.unfinished;
+        self.non_finite += other.non_finite;
+    }
+}
+
+impl From<Counters> for StepCount {
+    fn from(counters: Counters) -> Self {
+        Self {
+            rays: counters.all_rays(),
+            media_overflows: u64::from(counters.media_overflows),
+            unfinished: u64::from(counters.unfinished),
+            non_finite: u64::from(counters.non_finite),
+        }
+    }
+}

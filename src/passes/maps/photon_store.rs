@@ -1,0 +1,140 @@
+//! Unsorted photons on the device, and how many a map may hold there.
+
+use crate::{
+    error::{Error, Result},
+    gpu::{Buffer, Gpu},
+    layout::{Photon, PhotonPlace},
+};
+
+/// Most windows of a sorted map; `shaders/bindings/photon_map.wesl` binds that many.
+pub(super) const MAX_WINDOWS: usize = 2;
+
+/// Unsorted photons in windows that one binding can hold.
+#[derive(Debug)]
+pub struct PhotonStore {
+    windows: Vec<Buffer>,
+    window_photons: u32,
+}
+
+impl PhotonStore {
+    /// Room for `capacity` photons, zeroed.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] if the device refuses a window.
+    pub fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
+        Self::windowed(gpu, capacity, window_elements::<Photon>(gpu))
+    }
+
+    /// As [`Self::new`], in windows of `window_photons`, a power of two ≥ 64.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn windowed(gpu: &Gpu, capacity: u32, window_photons: u32) -> Result<Self> {
+        let windows = (0..capacity.div_ceil(window_photons).max(1))
+            .map(|w| {
+                gpu.storage::<Photon>("unsorted photons", u64::from(window_photons.min(capacity - w * window_photons)))
+            })
+            .collect::<Result<_>>()?;
+        Ok(Self { windows, window_photons })
+    }
+
+    /// Holds a copy of `photons`.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with(gpu: &Gpu, photons: &[Photon]) -> Result<Self> {
+        let count = u32::try_from(photons.len()).map_err(|_| too_many(gpu, photons.len() as u64))?;
+        let store = Self::new(gpu, count)?;
+        store.write(gpu, photons);
+        Ok(store)
+    }
+
+    /// Writes `photons` from the first place on.
+    pub fn write(&self, gpu: &Gpu, photons: &[Photon]) {
+        for (window, part) in self.windows.iter().zip(photons.chunks(self.window_photons as usize)) {
+            gpu.write(window, 0, part);
+            // Written in pieces: the staging memory of a write is given back with its submission.
+            gpu.submit(gpu.encoder());
+        }
+    }
+
+    /// The buffers, `array<Photon>` each; photon `i` lies in window `i / window_photons`.
+    #[must_use]
+    pub fn windows(&self) -> &[Buffer] {
+        &self.windows
+    }
+
+    /// Photons per window, a power of two; the last window may be shorter.
+    #[must_use]
+    pub fn window_photons(&self) -> u32 {
+        self.window_photons
+    }
+
+    /// Photons of `count` in all that lie in each window: its first index and their number.
+    pub(crate) fn parts(&self, count: u32) -> impl Iterator<Item = (&Buffer, u32, u32)> {
+        self.windows.iter().zip(0..).filter_map(move |(buffer, w)| {
+            let first = w * self.window_photons;
+            (first < count).then(|| (buffer, first, self.window_photons.min(count - first)))
+        })
+    }
+}
+
+/// Elements of a window: the largest power of two that one binding holds.
+pub(super) fn window_elements<T>(gpu: &Gpu) -> u32 {
+    elements_within::<T>(gpu.max_binding())
+}
+
+/// The same for bindings of that many bytes. Photons are counted in 31 bits: a window has no more than 2^29.
+fn elements_within<T>(binding: u64) -> u32 {
+    let most = (binding / size_of::<T>() as u64).clamp(64, 1 << 29);
+    1 << most.ilog2()
+}
+
+/// Photons of the largest map where bindings have that many bytes.
+fn most_photons(binding: u64) -> u64 {
+    MAX_WINDOWS as u64 * u64::from(elements_within::<PhotonPlace>(binding))
+}
+
+/// Finds out, before a photon is traced, whether a map of so many can be built.
+pub(crate) fn check_capacity(gpu: &Gpu, photons: u32) -> Result<()> {
+    if u64::from(photons) > most_photons(gpu.max_binding()) { Err(too_many(gpu, photons.into())) } else { Ok(()) }
+}
+
+pub(super) fn too_many(gpu: &Gpu, count: u64) -> Error {
+    Error::Limit {
+        what: "a photon map".to_string(),
+        needed: count,
+        unit: "photons",
+        limit: "maxStorageBufferRange",
+        adapter: gpu.name.clone(),
+        allowed: most_photons(gpu.max_binding()),
+        advice: "ask for fewer --photons or use another --device".to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::CELL_PHOTONS;
+
+    #[test]
+    fn a_hundred_million_photons_fit_the_bindings_of_a_gpu() {
+        for (binding, photons) in [
+            (64, 128),
+            (128 << 20, 1 << 24),
+            ((1 << 31) - 4, 1 << 27),
+            ((1 << 32) - 4, 1 << 28),
+            (1 << 34, 1 << 30),
+            (1 << 60, 1 << 30),
+        ] {
+            assert_eq!(most_photons(binding), photons, "bindings of {binding} bytes");
+            // All else that is made of a photon fits then as well: its key and place in two buffers of the sort, its part of the
+            // counts of digits, of the cells and of what a search reads.
+            assert!(photons * 8 <= binding.max(1024), "sort entries in {binding} bytes");
+            assert!(photons / u64::from(CELL_PHOTONS) * 37 <= binding.max(1024), "cells in {binding} bytes");
+            // A path that found no place is sent beyond 2^31.
+            assert!(photons < 1 << 31);
+        }
+        assert!(most_photons((1 << 31) - 4) > 100_000_000 && most_photons(128 << 20) < 100_000_000);
+    }
+}

@@ -1,0 +1,104 @@
+//! The wavefront: one dispatch moves every living path on by one surface, and the queue of living
+//! paths is compacted in between. Photons, camera paths and rays of final gathering go through it.
+//! Kernel: `advance_queue`.
+
+use crate::{
+    error::Result,
+    gpu::{Buffer, Gpu, Kernel},
+    layout::{Counters, Path},
+    upload::SceneBuffers,
+};
+
+/// Surfaces after which the host asks whether any path is left.
+const SURFACES_PER_SUBMISSION: u32 = 32;
+
+/// Paths under way, two queues of their indices, and what is counted of them.
+#[derive(Debug)]
+pub struct Wavefront {
+    advance: Kernel,
+    /// [`Path`] per slot.
+    pub paths: Buffer,
+    /// Slots of living paths: one queue is read by a step while the other is filled.
+    queues: [Buffer; 2],
+    /// One [`Counters`], cleared by each run.
+    pub counters: Buffer,
+    dispatch_arguments: Buffer,
+}
+
+/// A kernel and the buffers that it uses besides the scene and those of the wavefront, by name.
+#[derive(Debug)]
+pub struct Step<'b> {
+    pub kernel: &'b Kernel,
+    pub buffers: &'b [(&'b str, &'b Buffer)],
+}
+
+impl Wavefront {
+    /// Room for `slots` paths; `name` is in the labels of its buffers.
+    ///
+    /// # Errors
+    /// Limits of the adapter.
+    pub fn new(gpu: &Gpu, name: &str, slots: u64) -> Result<Self> {
+        let queue = || gpu.storage::<u32>(&format!("{name} queue"), slots);
+        Ok(Self {
+            advance: Kernel::new(gpu, "advance_queue", &[]),
+            paths: gpu.storage::<Path>(&format!("{name} paths"), slots)?,
+            queues: [queue()?, queue()?],
+            counters: gpu.storage::<Counters>(&format!("{name} counters"), 1)?,
+            dispatch_arguments: gpu.storage::<[u32; 3]>(&format!("{name} dispatch arguments"), 1)?,
+        })
+    }
+
+    /// Starts paths by `start` in that many invocations, then moves them on by `step` until none is
+    /// left or each has met `most_surfaces`. At most `most_paths` live at once.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        (start, invocations): (&Step, u64),
+        step: &Step,
+        most_paths: u64,
+        most_surfaces: u32,
+    ) -> Result<Counters> {
+        let bind = |bound: &Step, input: usize| bound.kernel.bind(gpu, &self.bindings(scene, bound.buffers, input));
+        let advance = self.advance.bind(gpu, &self.bindings(scene, &[], 0));
+        let steps = [0, 1].map(|input| bind(step, input));
+        let mut encoder = gpu.encoder();
+        encoder.clear_buffer(&self.counters, 0, None);
+        start.kernel.dispatch(&mut encoder, &bind(start, 1), invocations);
+        let mut surfaces = 0;
+        loop {
+            for _ in 0..SURFACES_PER_SUBMISSION.min(most_surfaces - surfaces) {
+                self.advance.dispatch(&mut encoder, &advance, 1);
+                let bindings = &steps[(surfaces % 2) as usize];
+                step.kernel.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most_paths);
+                surfaces += 1;
+            }
+            gpu.submit(encoder);
+            let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
+            if counters.next == 0 || surfaces >= most_surfaces {
+                return Ok(counters);
+            }
+            encoder = gpu.encoder();
+        }
+    }
+
+    /// Buffers by name, with the queue `input` to be read.
+    fn bindings<'a>(
+        &'a self,
+        scene: &'a SceneBuffers,
+        others: &[(&'a str, &'a Buffer)],
+        input: usize,
+    ) -> Vec<(&'a str, &'a Buffer)> {
+        let own = [
+            ("paths", &self.paths),
+            ("queue_in", &self.queues[input]),
+            ("queue_out", &self.queues[1 - input]),
+            ("counters", &self.counters),
+            ("dispatch_arguments", &self.dispatch_arguments),
+        ];
+        scene.with(&[&own, others].concat())
+    }
+}

@@ -1,0 +1,182 @@
+//! Who gathers photons for a picture: the grid on the device, or the kd-tree on the CPU in its place.
+
+use super::{
+    maps::PhotonMaps,
+    tally,
+    tiles::{CameraPass, Gatherer},
+};
+use crate::{
+    error::Result,
+    gpu::Gpu,
+    layout::{Gathered, VisiblePoint},
+    map_kind::MapKind,
+    passes::{EstimateRequest, EstimateSharing, Gather, GatherOptions, PhotonMap, StepCount, Tile},
+    progress::Progress,
+    reference::{Estimate, KdMap},
+    settings::{EstimateSettings, Search},
+    stats::{Stats, timed},
+    upload::SceneBuffers,
+};
+
+/// Sees what the estimates of a map found at the visible points of a tile.
+pub(crate) trait Observer {
+    fn observe(&mut self, kind: MapKind, gathered: &[Gathered]);
+}
+
+/// A search over the maps, ready to gather.
+pub(crate) struct MapGatherer<'a> {
+    maps: &'a PhotonMaps,
+    search: Searches<'a>,
+    sharing: EstimateSharing,
+    estimate: &'a EstimateSettings,
+    observer: Option<&'a mut dyn Observer>,
+}
+
+enum Searches<'a> {
+    Grid(Box<Gather<'a>>),
+    /// A tree of each map.
+    KdTree(Vec<KdMap>),
+}
+
+/// The gather of the estimate that the settings ask for.
+pub(super) fn gather_for<'a>(gpu: &Gpu, scene: &'a SceneBuffers, estimate: &EstimateSettings) -> Gather<'a> {
+    if estimate.raw {
+        return Gather::new(gpu, GatherOptions::default());
+    }
+    Gather::over(gpu, scene, GatherOptions::flat())
+}
+
+impl<'a> MapGatherer<'a> {
+    pub fn new(
+        gpu: &Gpu,
+        scene: &'a SceneBuffers,
+        maps: &'a PhotonMaps,
+        estimate: &'a EstimateSettings,
+        observer: Option<&'a mut dyn Observer>,
+    ) -> Result<Self> {
+        let search = match estimate.search {
+            Search::Grid | Search::Radius => Searches::Grid(Box::new(gather_for(gpu, scene, estimate))),
+            Search::KdTree => {
+                let trees = maps.maps().iter().map(|map| kd_map(gpu, map)).collect::<Result<_>>()?;
+                Searches::KdTree(trees)
+            }
+        };
+        Ok(Self { maps, search, sharing: EstimateSharing::new(gpu, estimate.share_reach), estimate, observer })
+    }
+
+    /// Adds the light of one map at the tile's points; `number`: which of the maps gathered, from 1.
+    fn gather_map(
+        &mut self,
+        pass: &CameraPass,
+        tile: &Tile,
+        (index, number): (usize, u32),
+        stats: &mut Stats,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let gathered = &pass.tracer.gathered;
+        if self.observer.is_some() {
+            // Slots without a valid point would keep what an older tile left there.
+            let mut encoder = pass.gpu.encoder();
+            encoder.clear_buffer(gathered, 0, None);
+            pass.gpu.submit(encoder);
+        }
+        let shared = pass.tracer.shared_points(tile);
+        let Self { maps, search, sharing, estimate, .. } = self;
+        let mut answer = |request: &EstimateRequest| search.answer(pass, maps, index, estimate, request, progress);
+        timed(&mut stats.seconds.gather, || sharing.run(pass.gpu, number, &shared, &mut answer))?;
+        if let Some(observer) = &mut self.observer {
+            let kind = self.maps.by_kind().nth(index).expect("one of the maps").0;
+            observer.observe(kind, &pass.gpu.read(gathered, 0, pass.tracer.point_count(tile).into())?);
+        }
+        Ok(())
+    }
+
+    /// Adds the light that rays of final gathering see in the maps, where they end.
+    fn gather_finally(&mut self, pass: &CameraPass, tile: &Tile, progress: &dyn Progress) -> Result<StepCount> {
+        let shared = pass.tracer.shared_points(tile);
+        let mut done = StepCount::default();
+        for ray in 0..pass.final_rays() {
+            progress.check()?;
+            let (points, step) = pass.trace_final(tile, ray)?;
+            done += step;
+            let (radiance, gathered, count) = (shared.radiance, shared.gathered, pass.tracer.point_count(tile));
+            for index in 0..self.maps.maps().len() {
+                let request = EstimateRequest { points, count, turn: 1, radiance, gathered };
+                self.search.answer(pass, self.maps, index, self.estimate, &request, progress)?;
+            }
+        }
+        Ok(done)
+    }
+}
+
+impl Gatherer for MapGatherer<'_> {
+    /// The light of all maps; with final gathering of the caustic map alone, and of all maps where the
+    /// rays end.
+    fn gather(&mut self, pass: &CameraPass, tile: &Tile, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
+        let final_gathering = pass.final_rays() > 0;
+        let gathered_here = |kind: MapKind| !final_gathering || kind == MapKind::Caustic;
+        let kinds: Vec<MapKind> = self.maps.by_kind().map(|(kind, _)| kind).collect();
+        let here = (0..kinds.len()).filter(|&index| gathered_here(kinds[index]));
+        for (index, number) in here.zip(1..) {
+            self.gather_map(pass, tile, (index, number), stats, progress)?;
+        }
+        let mut seconds = 0.0;
+        let count = timed(&mut seconds, || self.gather_finally(pass, tile, progress))?;
+        stats.seconds.gather += seconds;
+        stats.non_finite.gather += count.non_finite;
+        tally::add_step(stats, count);
+        Ok(())
+    }
+}
+
+impl Searches<'_> {
+    /// Makes the estimates of one map that are asked for.
+    fn answer(
+        &mut self,
+        pass: &CameraPass,
+        maps: &PhotonMaps,
+        index: usize,
+        estimate: &EstimateSettings,
+        request: &EstimateRequest,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        match self {
+            Self::Grid(gather) => {
+                let (points, results) = ((request.count, request.turn), (request.radiance, request.gathered));
+                let map = &maps.maps()[index];
+                gather.run_turn(pass.gpu, map, request.points, points, &pass.estimate, results, progress).map(drop)
+            }
+            Self::KdTree(trees) => kd_estimates(pass.gpu, &trees[index], estimate, request, progress),
+        }
+    }
+}
+
+/// What [`Gather::run_turn`] does, by a tree.
+fn kd_estimates(
+    gpu: &Gpu,
+    tree: &KdMap,
+    settings: &EstimateSettings,
+    request: &EstimateRequest,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let mut points: Vec<VisiblePoint> = gpu.read(request.points, 0, request.count.into())?;
+    points.iter_mut().filter(|p| p.valid > request.turn).for_each(|p| p.valid = 0);
+    let mut radiance: Vec<[f32; 4]> = gpu.read(request.radiance, 0, request.count.into())?;
+    let mut gathered: Vec<Gathered> = gpu.read(request.gathered, 0, request.count.into())?;
+    for (i, estimate) in tree.gather(&points, settings, progress)?.into_iter().enumerate() {
+        if points[i].valid != 0 {
+            (0..3).for_each(|c| radiance[i][c] += estimate.radiance[c] as f32);
+            let Estimate { radius_squared, count, fingerprint, .. } = estimate;
+            gathered[i] = Gathered { radius_squared, count, fingerprint };
+        }
+    }
+    gpu.write(request.radiance, 0, &radiance);
+    gpu.write(request.gathered, 0, &gathered);
+    Ok(())
+}
+
+/// The map's photons, read back, in a kd-tree.
+fn kd_map(gpu: &Gpu, map: &PhotonMap) -> Result<KdMap> {
+    let (places, fluxes) = map.read(gpu)?;
+    Ok(KdMap::new(places, fluxes, map.emitted()))
+}

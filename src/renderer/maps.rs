@@ -1,0 +1,87 @@
+//! First pass: photons leave the lights and are stored in maps, which remember what they were traced
+//! with.
+
+use super::tally;
+use crate::{
+    error::Result,
+    gpu::Gpu,
+    map_kind::MapKind,
+    passes::{MapKernels, PhotonMap, PhotonTracer},
+    progress::{Progress, Stage},
+    settings::PhotonSettings,
+    stats::{Stats, timed},
+    upload::SceneBuffers,
+};
+
+/// The photons of a first pass on the device: of each kind of map that holds a photon.
+#[derive(Debug)]
+pub struct PhotonMaps {
+    maps: Vec<PhotonMap>,
+    kinds: Vec<MapKind>,
+    /// What they were traced with.
+    pub(super) settings: PhotonSettings,
+    pub(super) stats: Stats,
+}
+
+impl PhotonMaps {
+    /// The maps, in the order of [`MapKind::ALL`]; none if no photon was traced or stored.
+    #[must_use]
+    pub fn maps(&self) -> &[PhotonMap] {
+        &self.maps
+    }
+
+    /// The maps with their kinds.
+    pub fn by_kind(&self) -> impl Iterator<Item = (MapKind, &PhotonMap)> {
+        self.kinds.iter().copied().zip(&self.maps)
+    }
+
+    /// What they were traced with; pictures made of them use the same mode, bounces, sampler, seed and
+    /// rays of final gathering.
+    #[must_use]
+    pub fn settings(&self) -> &PhotonSettings {
+        &self.settings
+    }
+
+    /// What happened up to here: the session's stages and the first pass.
+    #[must_use]
+    pub fn stats(&self) -> &Stats {
+        &self.stats
+    }
+}
+
+/// Traces the photons of a scene and sorts them into maps. `caustics`: the scene has a specular surface.
+pub(super) fn trace_maps(
+    gpu: &Gpu,
+    scene: &SceneBuffers,
+    settings: &PhotonSettings,
+    caustics: bool,
+    mut stats: Stats,
+    progress: &dyn Progress,
+) -> Result<PhotonMaps> {
+    let settings = settings.clone();
+    if !settings.mode.traces_photons() {
+        return Ok(PhotonMaps { maps: Vec::new(), kinds: Vec::new(), settings, stats });
+    }
+    let traced = timed(&mut stats.seconds.photons, || {
+        PhotonTracer::new(gpu, scene, settings.sampler).trace(gpu, scene, &settings, caustics, progress)
+    })?;
+    stats.rays += traced.rays;
+    stats.photons.global = tally::map_stats(&traced.maps.global);
+    stats.photons.caustic = tally::map_stats(&traced.maps.caustic);
+    stats.photons.lost_to_bounce_limit = traced.lost;
+    stats.photons.lights = tally::light_stats(scene, &traced.of_lights);
+    tally::count_faults(&mut stats, traced.media_overflows, traced.unfinished);
+    stats.non_finite.photons += traced.non_finite;
+    stats.warnings.extend(traced.warnings);
+    progress.report(Stage::Grid, 0, 1);
+    let (mut maps, mut kinds) = (Vec::new(), Vec::new());
+    timed(&mut stats.seconds.grid, || {
+        let kernels = MapKernels::new(gpu);
+        for (kind, map) in traced.maps.into_pairs().into_iter().filter(|(_, map)| map.stored > 0) {
+            maps.push(PhotonMap::build(gpu, &kernels, map.photons, map.stored as u32, map.emitted)?);
+            kinds.push(kind);
+        }
+        Result::Ok(())
+    })?;
+    Ok(PhotonMaps { maps, kinds, settings, stats })
+}

@@ -1,0 +1,155 @@
+//! A scene on the device, and the stages of a render one by one.
+
+use super::{
+    Render,
+    gatherer::{MapGatherer, Observer, gather_for},
+    maps::{PhotonMaps, trace_maps},
+    tally,
+    tiles::{CameraPass, Gatherer},
+};
+use crate::{
+    bvh::{Bvh, Media, MediaProbe, packed, too_deep},
+    error::Result,
+    gpu::Gpu,
+    image::Film,
+    passes::{CameraKernels, EstimateSharing, MapKernels, PhotonTracer},
+    progress::{Progress, Stage},
+    scene::Scene,
+    settings::{EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Search, Settings, check_samples},
+    stats::{DeviceStats, Stats, timed},
+    upload::SceneBuffers,
+};
+
+/// A scene on the device. Photons are traced once for each call of [`Self::photon_maps`]; any number
+/// of pictures can be made of the same maps.
+#[derive(Debug)]
+pub struct Session<'a> {
+    gpu: &'a Gpu,
+    scene: &'a Scene,
+    buffers: SceneBuffers,
+    /// What the scene's cameras are inside of.
+    camera_media: Vec<Media>,
+    stats: Stats,
+}
+
+impl<'a> Session<'a> {
+    /// Puts the scene on the device, its lights by these settings. The peak of device memory counts
+    /// from here.
+    ///
+    /// # Errors
+    /// As [`super::render`].
+    pub fn open(gpu: &'a Gpu, scene: &'a Scene, lights: &LightSettings, progress: &dyn Progress) -> Result<Self> {
+        lights.check()?;
+        scene.check_renderable()?;
+        let mut stats = Stats {
+            device: DeviceStats { name: gpu.name.clone(), driver: gpu.driver.clone() },
+            warnings: scene.warnings.clone(),
+            ..Stats::default()
+        };
+        gpu.memory.restart_peak();
+        progress.report(Stage::Bvh, 0, 1);
+        let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
+        let buffers = SceneBuffers::new(gpu, scene, &bvh, lights)?;
+        stats.warnings.extend(buffers.lights.warnings.iter().cloned());
+        let probe = MediaProbe::new(scene, &bvh);
+        let around = scene.cameras.iter().map(|camera| packed(&probe.at(camera.position.as_dvec3())));
+        let (camera_media, fits): (Vec<Media>, Vec<bool>) = around.unzip();
+        stats.warnings.extend(too_deep("cameras", fits.iter().filter(|fits| !**fits).count()));
+        Ok(Self { gpu, scene, buffers, camera_media, stats })
+    }
+
+    /// Has the kernels compiled that a picture by these settings needs, in their order, while the first
+    /// of them run. Those of final gathering, and any that were not asked for here, are compiled when
+    /// they are needed.
+    pub fn prefetch(&self, settings: &Settings) {
+        let (gpu, scene) = (self.gpu, &self.buffers);
+        let Settings { photons, estimate, picture, .. } = settings;
+        if photons.mode.traces_photons() {
+            PhotonTracer::prefetch(gpu, scene, photons.sampler);
+            MapKernels::prefetch(gpu);
+        }
+        CameraKernels::prefetch(gpu, scene, photons, picture.light_samples);
+        if photons.mode.traces_photons() && estimate.search != Search::KdTree {
+            EstimateSharing::prefetch(gpu);
+            gather_for(gpu, scene, estimate).prefetch(gpu, &estimate.into());
+        }
+    }
+
+    /// First pass: photons leave the lights and are stored in a global and a caustic map.
+    ///
+    /// # Errors
+    /// As [`super::render`].
+    pub fn photon_maps(&self, settings: &PhotonSettings, progress: &dyn Progress) -> Result<PhotonMaps> {
+        settings.check()?;
+        trace_maps(self.gpu, &self.buffers, settings, self.scene.has_delta(), self.stats.clone(), progress)
+    }
+
+    /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode, bounces,
+    /// sampler, seed and rays of final gathering are those that the maps were traced with. The
+    /// statistics are those of the maps and of this picture; `total` is their sum.
+    ///
+    /// # Errors
+    /// As [`super::render`].
+    pub fn picture(
+        &self,
+        maps: &PhotonMaps,
+        estimate: &EstimateSettings,
+        picture: &PictureSettings,
+        progress: &dyn Progress,
+    ) -> Result<Render> {
+        let (film, stats) = self.film(maps, estimate, picture, progress)?;
+        Ok(Render { frame: film.finish(), stats })
+    }
+
+    /// As [`Self::picture`], as a film that can be merged with those of other passes.
+    ///
+    /// # Errors
+    /// As [`super::render`].
+    pub fn film(
+        &self,
+        maps: &PhotonMaps,
+        estimate: &EstimateSettings,
+        picture: &PictureSettings,
+        progress: &dyn Progress,
+    ) -> Result<(Film, Stats)> {
+        self.observed_film(maps, estimate, picture, None, progress)
+    }
+
+    /// As [`Self::film`]; an observer sees what the estimates of each map and tile found.
+    pub(crate) fn observed_film<'b>(
+        &'b self,
+        maps: &'b PhotonMaps,
+        estimate: &'b EstimateSettings,
+        picture: &PictureSettings,
+        observer: Option<&'b mut dyn Observer>,
+        progress: &dyn Progress,
+    ) -> Result<(Film, Stats)> {
+        let mut seconds = 0.0;
+        let gatherer = || MapGatherer::new(self.gpu, &self.buffers, maps, estimate, observer);
+        let mut gatherer = timed(&mut seconds, gatherer)?;
+        let (mut films, mut stats) = self.films(maps, estimate, picture, (&mut gatherer, Stage::Camera), progress)?;
+        stats.seconds.grid += seconds;
+        tally::finish_stats(self.gpu, &mut stats);
+        Ok((films.pop().expect("one picture"), stats))
+    }
+
+    /// Renders the pictures of a gatherer; the caller finishes the statistics.
+    pub(crate) fn films(
+        &self,
+        maps: &PhotonMaps,
+        estimate: &EstimateSettings,
+        picture: &PictureSettings,
+        (gatherer, stage): (&mut dyn Gatherer, Stage),
+        progress: &dyn Progress,
+    ) -> Result<(Vec<Film>, Stats)> {
+        estimate.check()?;
+        picture.check()?;
+        check_samples(maps.settings(), picture)?;
+        let number = self.scene.camera_number(picture.camera.as_deref())?;
+        let camera = (&self.scene.cameras[number], self.camera_media[number]);
+        let pass = CameraPass::new(self.gpu, &self.buffers, camera, maps.settings(), estimate, picture)?;
+        let mut stats = maps.stats().clone();
+        let films = pass.render(gatherer, stage, &mut stats, progress)?;
+        Ok((films, stats))
+    }
+}

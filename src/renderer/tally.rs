@@ -1,0 +1,66 @@
+//! What is counted along the way, and what is said of it.
+
+use crate::{
+    emitters::LightGroup,
+    gpu::Gpu,
+    layout::MEDIA_DEPTH,
+    passes::{RawMap, StepCount},
+    stats::{LightStats, MapStats, NonFinite, Stats},
+    upload::SceneBuffers,
+};
+
+pub(super) fn map_stats(map: &RawMap) -> MapStats {
+    MapStats { emitted: map.emitted, stored: map.stored }
+}
+
+pub(super) fn light_stats(buffers: &SceneBuffers, photons: &[u32]) -> Vec<LightStats> {
+    let groups = buffers.lights.table.groups.iter().zip(photons);
+    let stats = |(group, photons): (&LightGroup, &u32)| LightStats {
+        name: group.name.clone(),
+        kind: group.kind.to_owned(),
+        power: group.power.to_array(),
+        photons: u64::from(*photons),
+    };
+    groups.map(stats).collect()
+}
+
+pub(super) fn count_faults(stats: &mut Stats, media_overflows: u64, unfinished: u64) {
+    stats.media_overflows += media_overflows;
+    stats.unfinished_rays += unfinished;
+}
+
+/// Says what was counted along the way and takes light from the picture.
+fn warn_of_faults(stats: &mut Stats) {
+    if stats.unfinished_rays > 0 {
+        stats
+            .warnings
+            .push(format!("{} rays were given up after their loop budget; their light is lost", stats.unfinished_rays));
+    }
+    if stats.non_finite.total() > 0 {
+        let NonFinite { photons, camera, direct, gather, film } = stats.non_finite;
+        stats.warnings.push(format!(
+            "numbers came out infinite or undefined and were left out: {photons} photon paths, {camera} camera paths, \
+             {direct} samples of direct light, {gather} rays of final gathering, {film} samples of the picture; lights \
+             or sizes are beyond the range of 32-bit numbers"
+        ));
+    }
+    if stats.media_overflows > 0 {
+        stats.warnings.push(format!(
+            "paths entered more than {} nested media {} times; the outer ones count there",
+            MEDIA_DEPTH, stats.media_overflows
+        ));
+    }
+}
+
+pub(super) fn add_step(stats: &mut Stats, count: StepCount) {
+    stats.rays += count.rays;
+    count_faults(stats, count.media_overflows, count.unfinished);
+}
+
+/// Completes the statistics of a finished picture: warnings of what was counted, peak and total.
+pub(crate) fn finish_stats(gpu: &Gpu, stats: &mut Stats) {
+    warn_of_faults(stats);
+    stats.peak_device_bytes = gpu.memory.peak();
+    let s = &mut stats.seconds;
+    s.total = s.bvh + s.photons + s.grid + s.camera + s.direct + s.gather;
+}

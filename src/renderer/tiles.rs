@@ -1,0 +1,153 @@
+//! Second pass: the one loop over the tiles of a picture.
+
+use super::{size::picture_size, tally};
+use crate::{
+    bvh::Media,
+    error::Result,
+    gpu::{Buffer, Gpu},
+    image::Film,
+    layout::VisiblePoint,
+    passes::{CameraTracer, FinalGather, GatherSettings, StepCount, Tile},
+    progress::{Progress, Stage},
+    scene::Camera,
+    settings::{Crop, EstimateSettings, PhotonSettings, PictureSettings},
+    stats::{Stats, timed},
+    upload::SceneBuffers,
+};
+
+/// Who adds the light of photons to the visible points of a tile.
+pub(crate) trait Gatherer {
+    /// Adds the light to the radiance of the tile's points.
+    fn gather(&mut self, pass: &CameraPass, tile: &Tile, stats: &mut Stats, progress: &dyn Progress) -> Result<()>;
+
+    /// Pictures that it makes of the same visible points.
+    fn pictures(&self) -> usize {
+        1
+    }
+
+    /// Makes the tile's radiance that of a picture, of several.
+    fn show(&mut self, _picture: usize, _pass: &CameraPass) {}
+}
+
+/// What a picture is made by on the device: camera paths, direct light, rays of final gathering.
+pub(crate) struct CameraPass<'a> {
+    pub gpu: &'a Gpu,
+    scene: &'a SceneBuffers,
+    /// Holds the visible points and the radiance of the tile that was traced last.
+    pub tracer: CameraTracer,
+    /// If the photons were traced for it.
+    final_gather: Option<FinalGather>,
+    /// The radiance estimate that the settings ask for.
+    pub estimate: GatherSettings,
+    size: (u32, u32),
+    window: Crop,
+    spp: u32,
+    /// Direct light comes from shadow rays.
+    direct: bool,
+}
+
+impl<'a> CameraPass<'a> {
+    /// Rays start inside of `media`, those around the middle of the camera.
+    pub fn new(
+        gpu: &'a Gpu,
+        scene: &'a SceneBuffers,
+        (camera, media): (&Camera, Media),
+        photons: &PhotonSettings,
+        estimate: &EstimateSettings,
+        picture: &PictureSettings,
+    ) -> Result<Self> {
+        let size = picture_size(camera, picture)?;
+        let shares = estimate.share_reach > 0.0 && photons.mode.traces_photons();
+        let tracer = CameraTracer::new(gpu, scene, (camera, media), size, photons, picture, shares)?;
+        let rays = Some(photons.final_gather).filter(|rays| *rays > 0);
+        let final_gather = rays.map(|rays| FinalGather::new(gpu, scene, &tracer, photons.sampler, rays));
+        Ok(Self {
+            gpu,
+            scene,
+            final_gather: final_gather.transpose()?,
+            tracer,
+            estimate: GatherSettings::from(estimate),
+            size,
+            window: picture.window(size),
+            spp: picture.spp,
+            direct: photons.mode.direct_by_rays(),
+        })
+    }
+
+    /// Renders tile by tile: camera rays to visible points, direct light, the light of photons, sums
+    /// over the samples of each pixel. One film for each of the gatherer's pictures.
+    pub fn render(
+        &self,
+        gatherer: &mut dyn Gatherer,
+        stage: Stage,
+        stats: &mut Stats,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Film>> {
+        let mut films = vec![Film::new(self.size, self.window, self.spp); gatherer.pictures()];
+        let tiles = self.tracer.tiles();
+        for (done, tile) in tiles.iter().enumerate() {
+            progress.check()?;
+            progress.report(stage, done as u64, tiles.len() as u64);
+            self.trace(tile, stats)?;
+            gatherer.gather(self, tile, stats, progress)?;
+            for (picture, film) in films.iter_mut().enumerate() {
+                gatherer.show(picture, self);
+                self.resolve(tile, film)?;
+            }
+        }
+        progress.report(stage, tiles.len() as u64, tiles.len() as u64);
+        stats.non_finite.film += films.iter().map(Film::non_finite).sum::<u64>();
+        Ok(films)
+    }
+
+    /// Camera rays to the tile's visible points, and direct light there if the mode takes it from
+    /// shadow rays.
+    fn trace(&self, tile: &Tile, stats: &mut Stats) -> Result<()> {
+        let (gpu, scene) = (self.gpu, self.scene);
+        let count = timed(&mut stats.seconds.camera, || self.tracer.trace(gpu, scene, tile))?;
+        stats.non_finite.camera += count.non_finite;
+        tally::add_step(stats, count);
+        if self.direct {
+            let count = timed(&mut stats.seconds.direct, || self.tracer.light_directly(gpu, scene, tile))?;
+            stats.non_finite.direct += count.non_finite;
+            tally::add_step(stats, count);
+        }
+        Ok(())
+    }
+
+    /// Sums the tile's radiance and layers into the film.
+    fn resolve(&self, tile: &Tile, film: &mut Film) -> Result<()> {
+        for (i, sums) in (0..).zip(&self.tracer.resolve(self.gpu, tile)?) {
+            if let Some(pixel) = self.tracer.pixel(tile, i) {
+                film.add(pixel, sums, tile.samples);
+            }
+        }
+        Ok(())
+    }
+
+    /// Rays of final gathering per visible point; 0 without.
+    pub fn final_rays(&self) -> u32 {
+        self.final_gather.as_ref().map_or(0, FinalGather::rays)
+    }
+
+    /// Traces one ray of final gathering from each of the tile's visible points; returns what they see.
+    pub fn trace_final(&self, tile: &Tile, ray: u32) -> Result<(&Buffer, StepCount)> {
+        let gather = self.final_gather.as_ref().expect("the settings ask for it");
+        Ok((&gather.seen, gather.trace(self.gpu, self.scene, &self.tracer, tile, ray)?))
+    }
+
+    /// The tile's visible points, some of them not valid.
+    pub fn points(&self, tile: &Tile) -> Result<Vec<VisiblePoint>> {
+        self.gpu.read(&self.tracer.points, 0, self.tracer.point_count(tile).into())
+    }
+
+    /// Radiance from each of them so far.
+    pub fn radiance(&self, tile: &Tile) -> Result<Vec<[f32; 4]>> {
+        self.gpu.read(&self.tracer.radiance, 0, self.tracer.point_count(tile).into())
+    }
+
+    /// Replaces it.
+    pub fn set_radiance(&self, radiance: &[[f32; 4]]) {
+        self.gpu.write(&self.tracer.radiance, 0, radiance);
+    }
+}
