@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 use caustica::{
     bvh::Bvh,
     scene::{Scene, Surface},
-    settings::Settings,
+    settings::LightSettings,
     upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
@@ -110,7 +110,7 @@ fn materials() -> Scene {
 
 fn run(stem: &str, rows: &[Row]) -> Vec<[f32; 4]> {
     let scene = materials();
-    let buffers = SceneBuffers::new(gpu(), &scene, &Bvh::build(&scene), &Settings::default()).expect("it fits");
+    let buffers = SceneBuffers::new(gpu(), &scene, &Bvh::build(&scene), &LightSettings::default()).expect("it fits");
     Probe::of_scene(stem, &buffers, &buffers.lights.photons).run(rows)
 }
 
