@@ -8,22 +8,41 @@ use std::path::PathBuf;
 pub enum Error {
     /// A file could not be read or written.
     #[error("{}: {source}", path.display())]
-    Io { path: PathBuf, source: std::io::Error },
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        source: std::io::Error,
+    },
     /// A scene file that cannot be rendered: `place` names the element, as a JSON path where there is one.
     #[error("{}: {place}: {problem}", path.display())]
-    Scene { path: PathBuf, place: String, problem: String },
+    Scene {
+        /// The file.
+        path: PathBuf,
+        /// JSON path of the element.
+        place: String,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// No usable adapter, or none of the asked name.
     #[error("{0}")]
     Device(String),
     /// Something is larger than the adapter allows.
     #[error("{what} needs {needed} {unit}, but {limit} of {adapter} allows {allowed}; {advice}")]
     Limit {
+        /// What does not fit.
         what: String,
+        /// Its size.
         needed: u64,
+        /// Unit of `needed` and `allowed`.
         unit: &'static str,
+        /// Name of the limit.
         limit: &'static str,
+        /// Name of the adapter.
         adapter: String,
+        /// The limit.
         allowed: u64,
+        /// What to do about it.
         advice: String,
     },
     /// No memory of the device is left for something.
@@ -34,9 +53,11 @@ pub enum Error {
         used >> 20
     )]
     Memory {
+        /// What does not fit.
         what: String,
         /// Bytes; `None` where only the driver knows.
         needed: Option<u64>,
+        /// Name of the adapter.
         adapter: String,
         /// Bytes of the buffers that were there.
         used: u64,
@@ -46,13 +67,25 @@ pub enum Error {
         "the device was lost: {adapter}: {why}; run it again, with fewer --photons or a smaller -k if work took too long, or \
         with another --device"
     )]
-    Lost { adapter: String, why: String },
+    Lost {
+        /// Name of the adapter.
+        adapter: String,
+        /// The driver's message.
+        why: String,
+    },
     /// The driver reported an error in the middle of the work.
     #[error("{0}")]
     Gpu(String),
     /// A setting outside its range.
     #[error("{name} {value}: {problem}")]
-    Setting { name: &'static str, value: String, problem: String },
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// The range, or what it conflicts with.
+        problem: String,
+    },
     /// What should be equal is not.
     #[error("{0}")]
     Differs(String),

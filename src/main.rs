@@ -1,5 +1,4 @@
 //! The `caustica` command.
-#![deny(unsafe_code)]
 
 mod cli;
 

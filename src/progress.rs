@@ -5,10 +5,13 @@ use crate::error::{Error, Result};
 /// Stage of the work, shown to the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// Reading the scene.
     Load,
+    /// Building the hierarchy and copying the scene to the device.
     Bvh,
     /// In units of photons stored, over all maps.
     Photons,
+    /// Sorting photons into the grid.
     Grid,
     /// In units of tiles of camera samples: camera rays, direct light and gather.
     Camera,

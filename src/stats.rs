@@ -7,13 +7,21 @@ use serde::{Deserialize, Serialize};
 /// Seconds by stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seconds {
+    /// Reading the scene.
     pub load: f64,
+    /// Building the hierarchy of the scene.
     pub bvh: f64,
+    /// Tracing photons.
     pub photons: f64,
+    /// Sorting photons into the grid.
     pub grid: f64,
+    /// Tracing camera rays.
     pub camera: f64,
+    /// Direct light by shadow rays.
     pub direct: f64,
+    /// Radiance estimates.
     pub gather: f64,
+    /// All of the above, and what lies between them where the caller measures it.
     pub total: f64,
 }
 
@@ -42,10 +50,13 @@ pub struct LightStats {
 /// Both maps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PhotonStats {
+    /// The map of light over at least one diffuse surface, or of all light where the mode says so.
     pub global: MapStats,
+    /// The map of light over mirrors and glass.
     pub caustic: MapStats,
     /// Flux in W that the bounce limit took, mean of the channels, over all emitted paths.
     pub lost_to_bounce_limit: f64,
+    /// Each light by itself.
     #[serde(default)]
     pub lights: Vec<LightStats>,
 }
@@ -76,15 +87,20 @@ impl NonFinite {
 /// Adapter and driver.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DeviceStats {
+    /// Name of the adapter.
     pub name: String,
+    /// Driver and its version.
     pub driver: String,
 }
 
 /// Everything that one render reports.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stats {
+    /// What the picture was made on.
     pub device: DeviceStats,
+    /// Time by stage.
     pub seconds: Seconds,
+    /// Photons of both maps.
     pub photons: PhotonStats,
     /// Rays traced: photon paths' segments, camera rays and shadow rays.
     pub rays: u64,
@@ -92,10 +108,12 @@ pub struct Stats {
     pub media_overflows: u64,
     /// Rays given up after the loop budget; their light is lost.
     pub unfinished_rays: u64,
+    /// Numbers that were left out.
     #[serde(default)]
     pub non_finite: NonFinite,
     /// The most device memory that buffers took at once, bytes.
     pub peak_device_bytes: u64,
+    /// What the user should know, one line each.
     pub warnings: Vec<String>,
 }
 

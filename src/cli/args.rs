@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use caustica::{compare::TOLERANCE, settings::Settings};
+use caustica::{
+    compare::TOLERANCE,
+    settings::{EstimateSettings, PhotonSettings, Settings},
+};
 use clap::{
     ArgAction, Parser, Subcommand,
     builder::{PathBufValueParser, TypedValueParser},
@@ -77,11 +80,14 @@ pub struct RenderArgs {
     pub radius: Option<f32>,
 
     /// Rays of final gathering per visible point: light over other surfaces is what these see of the global map; 0 is none
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = |text: &str| whole(text, 0, 65_536))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole(PhotonSettings::FINAL_GATHER))]
     #[arg(help_heading = "Estimate")]
     pub final_gather: u32,
 
-    /// Points on one surface share an estimate within this fraction of its radius, 0 to 2; 0 makes one for every sample
+    #[arg(help = format!(
+        "Points on one surface share an estimate within this fraction of its radius, {}; 0 makes one for every sample",
+        EstimateSettings::SHARE_REACH
+    ))]
     #[arg(long, value_name = "F", default_value_t = 2.0, value_parser = share_reach, help_heading = "Estimate")]
     pub share: f32,
 

@@ -10,21 +10,12 @@ use caustica::{
     scene::Scene,
 };
 
-use super::{
-    args::CompareArgs,
-    files::Files,
-    progress::Display,
-    render::{RAW_NOTE, log_library},
-    say::print,
-};
+use super::{args::CompareArgs, files::Files, progress::Display, render::RAW_NOTE, say::print};
 
 /// Compares, writes the files and says whether both sides agree.
 pub fn run(args: &CompareArgs) -> Result<()> {
     let started = Instant::now();
     let options = &args.options;
-    if options.shared.verbose {
-        log_library();
-    }
     let display = Display::new(options.shared.quiet, options.shared.verbose);
     display.report(Stage::Load, 0, 0);
     let mut scene = Scene::load_with(&args.scene, &options.shared.loading.options())?;

@@ -5,8 +5,8 @@ use caustica::{
     image::Tonemap,
     pixel_filter::PixelFilter,
     settings::{
-        Crop, Emission, EstimateSettings, LightSampling, LightSettings, LightUnit, MAX_BOUNCES, Mode, PhotonSettings,
-        PictureSettings, Sampler, Search, Settings,
+        Crop, Emission, EstimateSettings, LightSampling, LightSettings, LightUnit, Mode, PhotonSettings,
+        PictureSettings, Range, Sampler, Search, Settings,
     },
 };
 use clap::{
@@ -17,7 +17,12 @@ use clap::{
 
 use super::environment::EnvironmentOptions;
 use super::loading::LoadingOptions;
-use super::values::{aperture, cone_constant, count, crop, exposure, light_weight, photons, radius, size, whole};
+use super::values::{
+    aperture, cone_constant, count, crop, exposure, focus, light_weight, photons, radius, size, whole,
+};
+
+/// Range of `--seed`: all numbers.
+const SEED: Range<u32> = Range::at_least(0);
 
 /// Options of commands that make one picture.
 #[derive(Debug, clap::Args)]
@@ -38,9 +43,9 @@ pub struct RenderOptions {
     #[arg(long, value_name = "N", value_parser = photons, allow_hyphen_values = true, help_heading = "Photons")]
     pub caustic_photons: Option<u32>,
 
-    /// Neighbours in the radiance estimate, 1 to 1000
+    #[arg(help = format!("Neighbours in the radiance estimate, {}", EstimateSettings::NEIGHBORS))]
     #[arg(short = 'k', long, value_name = "K", default_value_t = 100, help_heading = "Estimate")]
-    #[arg(value_parser = |text: &str| whole(text, 1, 1000))]
+    #[arg(value_parser = whole(EstimateSettings::NEIGHBORS))]
     pub neighbors: u32,
 
     #[command(flatten)]
@@ -61,7 +66,7 @@ pub struct SharedOptions {
 
     /// Samples of the direct light of emissive surfaces and the environment per visible point
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Light")]
-    #[arg(value_parser = |text: &str| whole(text, 1, 4096))]
+    #[arg(value_parser = whole(PictureSettings::LIGHT_SAMPLES))]
     pub light_samples: u32,
 
     /// Where photon paths are sent
@@ -83,17 +88,20 @@ pub struct SharedOptions {
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true, help_heading = "Photons")]
     pub max_paths: Option<u64>,
 
-    /// Longest photon path, and longest chain of mirrors and glass on a camera path, in surfaces, up to 4095;
-    /// 0 leaves the end of paths to Russian roulette
+    #[arg(help = format!(
+        "Longest photon path, and longest chain of mirrors and glass on a camera path, in surfaces, up to {}; 0 leaves the \
+         end of paths to Russian roulette",
+        PhotonSettings::MAX_BOUNCES.most()
+    ))]
     #[arg(long, value_name = "B", default_value_t = 20, help_heading = "Photons")]
-    #[arg(value_parser = |text: &str| whole(text, 0, MAX_BOUNCES))]
+    #[arg(value_parser = whole(PhotonSettings::MAX_BOUNCES))]
     pub max_bounces: u32,
 
     /// Kernel that weighs the photons by their distance; each integrates to 1 over its disc
     #[arg(long, value_name = "KERNEL", value_enum, default_value = "cone", help_heading = "Estimate")]
     pub kernel: KernelArg,
 
-    /// Constant of the cone kernel, at least 1
+    #[arg(help = format!("Constant of the cone kernel, {}", EstimateSettings::CONE_CONSTANT))]
     #[arg(long, value_name = "C", default_value_t = 2.0, value_parser = cone_constant, help_heading = "Estimate")]
     pub cone_constant: f32,
 
@@ -106,7 +114,7 @@ pub struct SharedOptions {
     pub max_radius: Option<f32>,
 
     /// Camera samples per pixel, spread over the pixel filter; 1 is the pixel's centre [default: 4]
-    #[arg(long, value_name = "N", value_parser = |text: &str| whole(text, 1, u32::MAX), help_heading = "Picture")]
+    #[arg(long, value_name = "N", value_parser = whole(PictureSettings::SPP), help_heading = "Picture")]
     pub spp: Option<u32>,
 
     /// Size in pixels; the vertical angle of view stays [default: 512 high, as wide as the camera says or square]
@@ -130,7 +138,7 @@ pub struct SharedOptions {
     pub aperture: Option<f32>,
 
     /// Distance of the sharp plane along the camera's axis, in metres
-    #[arg(long, value_name = "DIST", value_parser = radius, requires = "aperture", help_heading = "Picture")]
+    #[arg(long, value_name = "DIST", value_parser = focus, requires = "aperture", help_heading = "Picture")]
     pub focus: Option<f32>,
 
     /// Brightens the PNG by this many stops
@@ -145,9 +153,9 @@ pub struct SharedOptions {
     #[arg(long, value_name = "HOW", value_enum, default_value = "sobol", help_heading = "Run")]
     pub sampler: SamplerArg,
 
-    /// One number that decides all randomness, 0 to 4294967295
+    #[arg(help = format!("One number that decides all randomness, {} to {}", SEED.least(), SEED.most()))]
     #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Run")]
-    #[arg(value_parser = |text: &str| whole(text, 0, u32::MAX))]
+    #[arg(value_parser = whole(SEED))]
     pub seed: u32,
 
     /// Adapter, by a part of its name or by the index that `caustica devices` shows [default: the best real GPU,
@@ -159,7 +167,7 @@ pub struct SharedOptions {
     #[arg(short, long, help_heading = "Run", conflicts_with = "verbose")]
     pub quiet: bool,
 
-    /// Print more: seconds by stage, photons and memory, and what the library logs
+    /// Print more: seconds by stage, photons and memory
     #[arg(short, long, help_heading = "Run")]
     pub verbose: bool,
 }

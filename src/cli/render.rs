@@ -37,9 +37,6 @@ pub fn check(args: &RenderArgs) -> std::result::Result<(), clap::Error> {
 pub fn render(args: &RenderArgs) -> Result<()> {
     let started = Instant::now();
     let options = &args.options;
-    if options.shared.verbose {
-        log_library();
-    }
     let display = Display::new(options.shared.quiet, options.shared.verbose);
     let mut files = Files::default();
     files.read(&args.scene, "the scene")?;
@@ -135,13 +132,4 @@ fn summary(stats: &Stats) -> String {
         stats.rays,
         stats.peak_device_bytes as f64 / f64::from(1 << 20),
     )
-}
-
-/// Sends what the library logs to stderr.
-pub(super) fn log_library() {
-    let _ = tracing_subscriber::fmt()
-        .with_writer(io::stderr)
-        .with_max_level(tracing_subscriber::filter::LevelFilter::DEBUG)
-        .without_time()
-        .try_init();
 }

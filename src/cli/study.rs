@@ -19,7 +19,6 @@ use caustica::{
 use super::{
     files::Files,
     progress::Display,
-    render::log_library,
     say::print,
     study_args::{PresetArg, ReferenceArg, StudyArgs},
     study_progress::StudyDisplay,
@@ -37,9 +36,6 @@ const PRESET_REPEATS: u32 = 2;
 pub fn run(args: &StudyArgs) -> Result<()> {
     let started = Instant::now();
     let options = &args.options;
-    if options.verbose {
-        log_library();
-    }
     let display = Display::new(options.quiet, options.verbose);
     let mut plan = plan(args)?;
     options.environment.light(plan.subjects.iter_mut().map(|subject| &mut subject.scene))?;

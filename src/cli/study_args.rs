@@ -2,12 +2,16 @@
 
 use std::path::PathBuf;
 
+use caustica::settings::{EstimateSettings, Range};
 use clap::ValueEnum;
 
 use super::{
     options::{ModeArg, ModeParser, SharedOptions},
     values::{photons, scale, whole},
 };
+
+/// Range of `--repeat`.
+const REPEAT: Range<u32> = Range::closed(1, 1000);
 
 const EXAMPLES: &str = "\
 Renders every combination once; photons are traced once for all k of one n. Writes DIR/study.csv, study.json,
@@ -35,9 +39,9 @@ pub struct StudyArgs {
     #[arg(allow_hyphen_values = true, required_unless_present = "preset", conflicts_with = "preset")]
     pub photons: Vec<u32>,
 
-    /// Neighbours in the radiance estimate, 1 to 1000: several, as 1,10,100
+    #[arg(help = format!("Neighbours in the radiance estimate, {}: several, as 1,10,100", EstimateSettings::NEIGHBORS))]
     #[arg(short = 'k', long, value_name = "K,K…", value_delimiter = ',', help_heading = "Study")]
-    #[arg(value_parser = |text: &str| whole(text, 1, 1000))]
+    #[arg(value_parser = whole(EstimateSettings::NEIGHBORS))]
     #[arg(allow_hyphen_values = true, required_unless_present = "preset", conflicts_with = "preset")]
     pub neighbors: Vec<u32>,
 
@@ -46,9 +50,11 @@ pub struct StudyArgs {
     #[arg(conflicts_with = "preset", help_heading = "Study")]
     pub modes: Vec<ModeArg>,
 
-    /// Renders of each combination with seeds of their own, 1 to 1000; noise and bias need two [default: 1, of the
-    /// preset's plane of n and k 2]
-    #[arg(long, value_name = "R", value_parser = |text: &str| whole(text, 1, 1000), help_heading = "Study")]
+    #[arg(help = format!(
+        "Renders of each combination with seeds of their own, {REPEAT}; noise and bias need two [default: 1, of the \
+         preset's plane of n and k 2]"
+    ))]
+    #[arg(long, value_name = "R", value_parser = whole(REPEAT), help_heading = "Study")]
     pub repeat: Option<u32>,
 
     /// What pictures are measured against: an EXR file of their size, or auto for a much finer render [default: none]

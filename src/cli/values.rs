@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use caustica::settings::Crop;
+use caustica::settings::{Crop, EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Range};
 
 /// A whole number of at least 1 with an optional suffix: `250`, `200k`, `1.5M`.
 pub fn count(text: &str) -> Result<u64, String> {
@@ -28,34 +28,41 @@ pub fn count(text: &str) -> Result<u64, String> {
     }
 }
 
-/// A whole number in a range.
-pub fn whole(text: &str, least: u32, most: u32) -> Result<u32, String> {
-    let number = text.parse::<u32>().ok().filter(|n| (least..=most).contains(n));
-    number.ok_or_else(|| format!("a whole number from {least} to {most}"))
+/// Parser of whole numbers in a range.
+pub fn whole(range: Range<u32>) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let number = text.parse::<u32>().ok().filter(|number| range.contains(*number));
+        number.ok_or_else(|| format!("a whole number from {} to {}", range.least(), range.most()))
+    }
 }
 
 /// A count that a photon map can be asked to hold.
 pub fn photons(text: &str) -> Result<u32, String> {
-    u32::try_from(count(text)?).map_err(|_| format!("too large; at most {}", u32::MAX))
+    let most = PhotonSettings::CAPACITY.most();
+    u32::try_from(count(text)?).map_err(|_| format!("too large; at most {most}"))
 }
 
 /// `WxH` in pixels.
 pub fn size(text: &str) -> Result<(u32, u32), String> {
-    let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=65535).contains(n));
+    let range = PictureSettings::SIDE;
+    let side = |s: &str| s.parse::<u32>().ok().filter(|n| range.contains(*n));
     let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
-    parts.ok_or_else(|| "width x height in pixels, as 1024x768, each 1 to 65535".to_string())
+    parts.ok_or_else(|| format!("width x height in pixels, as 1024x768, each {range}"))
 }
 
 /// Constant of the cone filter.
 pub fn cone_constant(text: &str) -> Result<f32, String> {
-    number(text).filter(|c| *c >= 1.0).ok_or_else(|| "a number of at least 1".to_string())
+    in_range(text, EstimateSettings::CONE_CONSTANT, "a number of ")
 }
 
 /// A radius in metres.
 pub fn radius(text: &str) -> Result<f32, String> {
-    number(text)
-        .filter(|r| *r > 0.0 && *r <= 1e18)
-        .ok_or_else(|| "a length in metres, more than 0, at most 1e18".to_string())
+    in_range(text, EstimateSettings::RADIUS, "a length in metres, ")
+}
+
+/// A distance in metres along the camera's axis.
+pub fn focus(text: &str) -> Result<f32, String> {
+    in_range(text, PictureSettings::FOCUS, "a length in metres, ")
 }
 
 /// `X,Y,W,H` in pixels.
@@ -69,12 +76,12 @@ pub fn crop(text: &str) -> Result<Crop, String> {
 
 /// Diameter of a lens.
 pub fn aperture(text: &str) -> Result<f32, String> {
-    number(text).filter(|d| *d >= 0.0).ok_or_else(|| "a length in metres, at least 0".to_string())
+    in_range(text, PictureSettings::APERTURE, "a length in metres, ")
 }
 
 /// A fraction of the radius of an estimate.
 pub fn share_reach(text: &str) -> Result<f32, String> {
-    number(text).filter(|f| (0.0..=2.0).contains(f)).ok_or_else(|| "a number from 0 to 2".to_string())
+    in_range(text, EstimateSettings::SHARE_REACH, "a number ")
 }
 
 /// A relative difference.
@@ -107,15 +114,22 @@ pub fn color(text: &str) -> Result<[f32; 3], String> {
 
 /// `NAME=WEIGHT`; the name may hold a `=` itself.
 pub fn light_weight(text: &str) -> Result<(String, f64), String> {
-    let wrong = || "a light's name, '=' and a number above 0, as lamp=2".to_string();
+    let range = LightSettings::PHOTON_WEIGHT;
+    let wrong = || format!("a light's name, '=' and a number {range}, as lamp=2");
     let (name, weight) = text.rsplit_once('=').ok_or_else(wrong)?;
-    let weight = weight.parse::<f64>().ok().filter(|w| *w > 0.0 && w.is_finite()).ok_or_else(wrong)?;
+    let weight = weight.parse::<f64>().ok().filter(|w| range.contains(*w)).ok_or_else(wrong)?;
     Ok((name.to_string(), weight))
 }
 
 /// Stops of exposure.
 pub fn exposure(text: &str) -> Result<f32, String> {
     number(text).filter(|e| e.abs() <= 100.0).ok_or_else(|| "a number of stops, -100 to 100".to_string())
+}
+
+/// A number in the range; in the message `what` comes before the range.
+fn in_range(text: &str, range: Range<f32>, what: &str) -> Result<f32, String> {
+    let number = text.parse::<f32>().ok().filter(|number| range.contains(*number));
+    number.ok_or_else(|| format!("{what}{range}"))
 }
 
 fn number(text: &str) -> Option<f32> {

@@ -1,5 +1,6 @@
 //! Pictures: the film's frame, EXR and PNG files, tone mapping, difference measures.
 
+#[cfg(feature = "report")]
 mod canvas;
 pub mod difference;
 mod exr;
@@ -12,6 +13,7 @@ mod png;
 mod radiance;
 mod tonemap;
 
+#[cfg(feature = "report")]
 pub use canvas::{Canvas, Rgb8};
 pub use exr::{EnvironmentProvenance, Provenance, read_exr, read_exr_attributes, write_exr};
 pub use file::{check_output, close_files, write_file};

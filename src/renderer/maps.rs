@@ -35,6 +35,15 @@ impl PhotonMaps {
         self.kinds.iter().copied().zip(&self.maps)
     }
 
+    /// The map of one kind alone, for pictures of its part of the light.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn only(mut self, kind: MapKind) -> Self {
+        let pairs = self.kinds.into_iter().zip(self.maps).filter(|(k, _)| *k == kind);
+        (self.kinds, self.maps) = pairs.unzip();
+        self
+    }
+
     /// What they were traced with; pictures made of them use the same mode, bounces, sampler, seed and
     /// rays of final gathering.
     #[must_use]

@@ -27,7 +27,9 @@ use crate::{
 /// A finished render.
 #[derive(Clone, Debug)]
 pub struct Render {
+    /// The picture.
     pub frame: Frame,
+    /// What happened.
     pub stats: Stats,
 }
 

@@ -2,14 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::fail;
+use super::{Range, fail};
 use crate::{
     density::{Density, DensityKernel},
     error::Result,
 };
-
-/// Largest radius of an estimate, metres: its square is far from the largest float.
-const MAX_RADIUS: f32 = 1e18;
 
 /// Which photons an estimate sums, and how they are found. Grid and kd-tree give the same picture but for rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,21 +25,22 @@ pub enum Search {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EstimateSettings {
-    /// Neighbours in the radiance estimate, 1 to 1000.
+    /// Photons in the radiance estimate, in [`Self::NEIGHBORS`].
     pub neighbors: u32,
     /// Shape of the kernel that weighs the photons.
     pub kernel: DensityKernel,
-    /// Constant C of the cone filter, ≥ 1.
+    /// Constant C of the cone filter, in [`Self::CONE_CONSTANT`].
     pub cone_constant: f32,
-    /// Bound of the search radius, metres.
+    /// Bound of the search radius, metres, in [`Self::RADIUS`]; `None`: the nearest photons, however far.
     pub max_radius: Option<f32>,
+    /// How photons are found.
     pub search: Search,
-    /// Radius of the estimate with [`Search::Radius`], metres; `None` with the others.
+    /// Radius of the estimate with [`Search::Radius`], metres, in [`Self::RADIUS`]; `None` with the others.
     pub radius: Option<f32>,
     /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the estimate of the report.
     pub raw: bool,
-    /// Distance within which visible points on one surface share an estimate, as a fraction of its radius, 0 to 2;
-    /// 0: every camera sample has its own.
+    /// Distance within which visible points on one surface share an estimate, as a fraction of its radius, in
+    /// [`Self::SHARE_REACH`]; 0: every camera sample has its own.
     pub share_reach: f32,
 }
 
@@ -62,6 +60,15 @@ impl Default for EstimateSettings {
 }
 
 impl EstimateSettings {
+    /// Range of [`Self::neighbors`].
+    pub const NEIGHBORS: Range<u32> = Range::closed(1, 1000);
+    /// Range of [`Self::cone_constant`].
+    pub const CONE_CONSTANT: Range<f32> = Range::at_least(1.0);
+    /// Range of [`Self::radius`] and [`Self::max_radius`], metres: the square of the largest is far from the largest float.
+    pub const RADIUS: Range<f32> = Range::above(0.0, 1e18);
+    /// Range of [`Self::share_reach`].
+    pub const SHARE_REACH: Range<f32> = Range::closed(0.0, 2.0);
+
     /// The kernel with its constant.
     #[must_use]
     pub fn density(&self) -> Density {
@@ -73,25 +80,15 @@ impl EstimateSettings {
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        if !(1..=1000).contains(&self.neighbors) {
-            return fail("neighbors", self.neighbors.to_string(), "must be from 1 to 1000");
-        }
-        if !(self.cone_constant >= 1.0 && self.cone_constant.is_finite()) {
-            return fail("cone-constant", self.cone_constant.to_string(), "must be at least 1");
-        }
-        if let Some(r) = self.max_radius.filter(|r| !(*r > 0.0 && *r <= MAX_RADIUS)) {
-            return fail("max-radius", r.to_string(), "must be above 0, at most 1e18");
-        }
-        if !(0.0..=2.0).contains(&self.share_reach) {
-            return fail("share", self.share_reach.to_string(), "must be from 0 to 2");
-        }
+        Self::NEIGHBORS.check("neighbors", self.neighbors)?;
+        Self::CONE_CONSTANT.check("cone-constant", self.cone_constant)?;
+        self.max_radius.map_or(Ok(()), |radius| Self::RADIUS.check("max-radius", radius))?;
+        Self::SHARE_REACH.check("share", self.share_reach)?;
         match (self.search, self.radius) {
             (Search::Radius, None) => fail("search", "radius".to_string(), "needs a radius"),
-            (Search::Radius, Some(r)) if !(r > 0.0 && r <= MAX_RADIUS) => {
-                fail("radius", r.to_string(), "must be above 0, at most 1e18")
-            }
-            (Search::Radius, Some(_)) | (_, None) => Ok(()),
-            (_, Some(r)) => fail("radius", r.to_string(), "goes with the search by radius only"),
+            (Search::Radius, Some(radius)) => Self::RADIUS.check("radius", radius),
+            (_, None) => Ok(()),
+            (_, Some(radius)) => fail("radius", radius.to_string(), "goes with the search by radius only"),
         }
     }
 }

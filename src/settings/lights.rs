@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::fail;
+use super::{Range, fail};
 use crate::error::Result;
 
 /// How photon paths are dealt to lights.
@@ -31,20 +31,27 @@ pub enum LightUnit {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct LightSettings {
+    /// How photon paths are dealt to lights.
     pub sampling: LightSampling,
-    /// Lights by name, and the factor on their share of the photons, each > 0.
+    /// Names of lights, and the factor on the photons of each, in [`Self::PHOTON_WEIGHT`]. An emissive material or the
+    /// environment is a light of its name.
     pub photon_weights: Vec<(String, f64)>,
+    /// How light intensities of the file are read.
     pub unit: LightUnit,
 }
 
 impl LightSettings {
+    /// Range of the factors in [`Self::photon_weights`].
+    pub const PHOTON_WEIGHT: Range<f64> = Range::above(0.0, f64::MAX);
+
     /// Checks every value against its range.
     ///
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        if let Some((light, weight)) = self.photon_weights.iter().find(|(_, w)| !(*w > 0.0 && w.is_finite())) {
-            return fail("light-photons", format!("{light}={weight}"), "the weight must be above 0");
+        let range = Self::PHOTON_WEIGHT;
+        if let Some((light, weight)) = self.photon_weights.iter().find(|(_, weight)| !range.contains(*weight)) {
+            return fail("light-photons", format!("{light}={weight}"), &format!("the weight must be {range}"));
         }
         Ok(())
     }

@@ -4,6 +4,7 @@ mod estimate;
 mod lights;
 mod photons;
 mod picture;
+mod range;
 
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +12,7 @@ pub use estimate::{EstimateSettings, Search};
 pub use lights::{LightSampling, LightSettings, LightUnit};
 pub use photons::{Emission, MAX_BOUNCES, Mode, PhotonSettings, Sampler};
 pub use picture::{Crop, PictureSettings};
+pub use range::{Number, Range};
 
 use crate::error::{Error, Result};
 
@@ -18,9 +20,13 @@ use crate::error::{Error, Result};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
+    /// How lights are read and sampled.
     pub lights: LightSettings,
+    /// The first pass.
     pub photons: PhotonSettings,
+    /// The radiance estimate.
     pub estimate: EstimateSettings,
+    /// Camera, pixels and samples.
     pub picture: PictureSettings,
 }
 

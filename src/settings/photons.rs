@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::fail;
+use super::{Range, fail};
 use crate::error::Result;
 
 /// Longest path, surfaces: so far the key of a staged photon counts along its path.
@@ -94,21 +94,25 @@ pub enum Sampler {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PhotonSettings {
+    /// Which light reaches the picture.
     pub mode: Mode,
-    /// Photons that the global map can hold, ≥ 1.
+    /// Photons that the global map can hold, in [`Self::CAPACITY`].
     pub global: u32,
-    /// Photons that the caustic map can hold, ≥ 1.
+    /// Photons that the caustic map can hold, in [`Self::CAPACITY`].
     pub caustic: u32,
-    /// Photon paths emitted at most, for each map by itself unless emission is unaimed; `None`: 100 times the larger
-    /// capacity.
+    /// Photon paths emitted at most, in [`Self::MAX_PATHS`], for each map by itself unless emission is unaimed; `None`:
+    /// 100 times the larger capacity.
     pub max_paths: Option<u64>,
+    /// Where photon paths are sent.
     pub emission: Emission,
-    /// Longest photon path and longest delta chain of a camera path, 1 to [`MAX_BOUNCES`]; 0: roulette alone ends paths.
+    /// Longest photon path and longest delta chain of a camera path, surfaces, in [`Self::MAX_BOUNCES`]; 0:
+    /// roulette alone ends paths.
     pub max_bounces: u32,
+    /// Numbers for sampling.
     pub sampler: Sampler,
     /// Decides all randomness.
     pub seed: u32,
-    /// Rays of final gathering per visible point, 0 to 65,536: light that comes over another surface is what they see of
+    /// Rays of final gathering per visible point, in [`Self::FINAL_GATHER`]: light that comes over another surface is what they see of
     /// the global map there, not what that map holds at the point itself; 0: without. In the modes hybrid and
     /// indirect-photons.
     pub final_gather: u32,
@@ -131,6 +135,15 @@ impl Default for PhotonSettings {
 }
 
 impl PhotonSettings {
+    /// Range of [`Self::global`] and [`Self::caustic`], photons.
+    pub const CAPACITY: Range<u32> = Range::at_least(1);
+    /// Range of [`Self::max_paths`].
+    pub const MAX_PATHS: Range<u64> = Range::at_least(1);
+    /// Range of [`Self::max_bounces`], surfaces.
+    pub const MAX_BOUNCES: Range<u32> = Range::closed(0, MAX_BOUNCES);
+    /// Range of [`Self::final_gather`], rays.
+    pub const FINAL_GATHER: Range<u32> = Range::closed(0, 65_536);
+
     /// The global map stores photons that come straight from a light (LD): as the mode says, and for rays of final
     /// gathering.
     #[must_use]
@@ -149,22 +162,13 @@ impl PhotonSettings {
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        if self.final_gather > 65_536 {
-            return fail("final-gather", self.final_gather.to_string(), "must be at most 65536");
-        }
+        Self::FINAL_GATHER.check("final-gather", self.final_gather)?;
         if self.final_gather > 0 && !matches!(self.mode, Mode::Hybrid | Mode::IndirectPhotons) {
             let problem = format!("goes with the modes hybrid and indirect-photons, not {}", self.mode.name());
             return fail("final-gather", self.final_gather.to_string(), &problem);
         }
-        if self.global == 0 || self.caustic == 0 {
-            return fail("photons", "0".to_string(), "must be at least 1");
-        }
-        if self.max_bounces > MAX_BOUNCES {
-            return fail("max-bounces", self.max_bounces.to_string(), &format!("must be at most {MAX_BOUNCES}"));
-        }
-        if self.max_paths == Some(0) {
-            return fail("max-paths", "0".to_string(), "must be at least 1");
-        }
-        Ok(())
+        Self::CAPACITY.check("photons", self.global.min(self.caustic))?;
+        Self::MAX_BOUNCES.check("max-bounces", self.max_bounces)?;
+        self.max_paths.map_or(Ok(()), |paths| Self::MAX_PATHS.check("max-paths", paths))
     }
 }

@@ -2,15 +2,19 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::fail;
+use super::{Range, fail};
 use crate::{error::Result, pixel_filter::PixelFilter};
 
 /// Part of a picture, in pixels of the whole from its upper left corner; at least one pixel each way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Crop {
+    /// Column of the upper left pixel, from 0.
     pub column: u32,
+    /// Row of the upper left pixel, from 0 at the top.
     pub row: u32,
+    /// Columns, at least 1.
     pub width: u32,
+    /// Rows, at least 1.
     pub height: u32,
 }
 
@@ -27,20 +31,23 @@ impl Crop {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PictureSettings {
-    /// Picture in pixels; `None`: 512 high, as wide as the camera's aspect says.
+    /// Width and height in pixels, each in [`Self::SIDE`]; `None`: 512 high, as wide as the camera's aspect says.
     pub size: Option<(u32, u32)>,
     /// The part of the picture that is rendered; `None`: all.
     pub crop: Option<Crop>,
     /// Name or index of the camera in the file; `None`: the first.
     pub camera: Option<String>,
-    /// Camera samples per pixel, ≥ 1.
+    /// Camera samples per pixel, in [`Self::SPP`]. With light samples and final gathering the bound is lower: see
+    /// [`super::Settings::check`].
     pub spp: u32,
+    /// How the light around a pixel's centre is weighed.
     pub pixel_filter: PixelFilter,
-    /// Diameter of the lens, metres, ≥ 0; 0: a pinhole, all is sharp.
+    /// Diameter of the lens, metres, in [`Self::APERTURE`]; 0: a pinhole, all is sharp.
     pub aperture: f32,
-    /// Distance of the sharp plane along the camera's axis, metres, > 0; with an aperture only.
+    /// Distance of the sharp plane along the camera's axis, metres, in [`Self::FOCUS`]; with an aperture only.
     pub focus: Option<f32>,
-    /// Samples of the direct light of emissive surfaces and the environment per visible point, 1 to 4096.
+    /// Samples of the direct light of emissive surfaces and the environment per visible point, in
+    /// [`Self::LIGHT_SAMPLES`].
     pub light_samples: u32,
 }
 
@@ -60,6 +67,17 @@ impl Default for PictureSettings {
 }
 
 impl PictureSettings {
+    /// Range of the width and of the height, pixels.
+    pub const SIDE: Range<u32> = Range::closed(1, 65_535);
+    /// Range of [`Self::spp`].
+    pub const SPP: Range<u32> = Range::at_least(1);
+    /// Range of [`Self::aperture`], metres.
+    pub const APERTURE: Range<f32> = Range::at_least(0.0);
+    /// Range of [`Self::focus`], metres.
+    pub const FOCUS: Range<f32> = Range::above(0.0, 1e18);
+    /// Range of [`Self::light_samples`].
+    pub const LIGHT_SAMPLES: Range<u32> = Range::closed(1, 4096);
+
     /// The part of a picture of that size that is rendered.
     #[must_use]
     pub fn window(&self, (width, height): (u32, u32)) -> Crop {
@@ -77,19 +95,13 @@ impl PictureSettings {
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        if self.spp == 0 {
-            return fail("spp", "0".to_string(), "must be at least 1");
-        }
-        if !(1..=4096).contains(&self.light_samples) {
-            return fail("light-samples", self.light_samples.to_string(), "must be from 1 to 4096");
-        }
-        if !(self.aperture >= 0.0 && self.aperture.is_finite()) {
-            return fail("aperture", self.aperture.to_string(), "must be at least 0");
-        }
+        Self::SPP.check("spp", self.spp)?;
+        Self::LIGHT_SAMPLES.check("light-samples", self.light_samples)?;
+        Self::APERTURE.check("aperture", self.aperture)?;
         match self.focus {
             None if self.aperture > 0.0 => fail("aperture", self.aperture.to_string(), "needs a focus"),
-            Some(f) if !(f > 0.0 && f.is_finite()) => fail("focus", f.to_string(), "must be above 0"),
-            _ => Ok(()),
+            Some(focus) => Self::FOCUS.check("focus", focus),
+            None => Ok(()),
         }
     }
 }

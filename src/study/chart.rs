@@ -9,6 +9,7 @@ use plotters::{
 };
 
 use super::numbers::brief;
+use crate::html::escaped;
 
 /// A line through points.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,15 +132,19 @@ fn viridis(place: f64) -> (RGBColor, RGBColor) {
 
 fn svg(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {
     let mut text = String::new();
-    {
+    // Drawing into a string fails only where a chart has no extent.
+    let drawn = {
         let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        // Drawing into a string fails only where a chart has no extent.
-        let drawn = draw(&area).and_then(|()| area.present().map_err(Into::into));
-        if let Err(error) = drawn {
-            tracing::warn!("a chart could not be drawn: {error}");
-        }
-    }
-    text
+        draw(&area).and_then(|()| area.present().map_err(Into::into))
+    };
+    drawn.map_or_else(|error| message(size, &format!("this chart could not be drawn: {error}")), |()| text)
+}
+
+/// A chart's rectangle with a line of text in it.
+fn message((width, height): (u32, u32), line: &str) -> String {
+    format!(
+        r#"<svg width="{width}" height="{height}" viewBox="0 0 {width} {height}" xmlns="http://www.w3.org/2000/svg">"#
+    ) + &format!(r#"<text x="8" y="20" font-family="sans-serif" font-size="15">{}</text></svg>"#, escaped(line))
 }
 
 fn heading(area: &Area, title: &str) -> Drawn {
@@ -194,6 +199,13 @@ mod tests {
         }
         assert!(line_chart("t", "x", "y", &[line(&[])]).contains("nothing to show"));
         assert!(!chart.contains("nothing to show"));
+    }
+
+    #[test]
+    fn a_chart_that_cannot_be_drawn_says_why() {
+        let chart = svg((100, 50), |_| Err("no <extent>".into()));
+        assert!(chart.starts_with("<svg") && chart.contains("not be drawn: no &lt;extent&gt;<"), "{chart}");
+        assert!(!svg((100, 50), |_| Ok(())).contains("not be drawn"));
     }
 
     #[test]

@@ -1,0 +1,64 @@
+//! Links and paths of the documents lead to files of the repository.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Folders in which a word in backquotes with a slash is a path from the root.
+const FOLDERS: [&str; 8] = ["src", "shaders", "tests", "docs", "scripts", "scenes", "examples", "benches"];
+
+/// Targets of links, without their anchors, that are no addresses.
+fn links(text: &str) -> impl Iterator<Item = &str> {
+    let targets = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    targets.map(|target| target.split('#').next().unwrap_or_default()).filter(|t| !t.is_empty() && !t.contains("://"))
+}
+
+/// Words in backquotes that are paths from the root, without patterns and placeholders (`NAME`).
+fn paths(text: &str) -> impl Iterator<Item = &str> {
+    let words = text.split('`').skip(1).step_by(2).map(|word| word.split("::").next().unwrap_or_default());
+    words.filter(|word| {
+        let in_folder = word.split_once('/').is_some_and(|(first, _)| FOLDERS.contains(&first));
+        in_folder && !word.contains(['*', ' ', '|', '…', '{']) && !word.contains("NAME")
+    })
+}
+
+/// Links and paths of a document that lead nowhere; links are relative to its folder.
+fn dead(root: &Path, document: &Path, text: &str) -> Vec<String> {
+    let folder = document.parent().unwrap_or(root);
+    // Fenced blocks have three backquotes and are left out.
+    let prose: String = text.split("```").step_by(2).collect();
+    let missing = |base: &Path, names: Vec<&str>| -> Vec<String> {
+        names.into_iter().filter(|name| !base.join(name).exists()).map(str::to_owned).collect()
+    };
+    [missing(folder, links(&prose).collect()), missing(root, paths(&prose).collect())].concat()
+}
+
+#[test]
+fn links_and_paths_lead_to_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let listed =
+        fs::read_dir(root.join("docs")).expect("docs/ can be listed").map(|entry| entry.expect("an entry").path());
+    let top = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "scenes/README.md"].map(|name| root.join(name));
+    let documents: Vec<PathBuf> = listed.filter(|p| p.extension().is_some_and(|e| e == "md")).chain(top).collect();
+    let mut named = 0;
+    let found: Vec<String> = documents
+        .iter()
+        .flat_map(|document| {
+            let text = fs::read_to_string(document).expect("the document can be read");
+            named += links(&text).count() + paths(&text).count();
+            let name = document.strip_prefix(root).expect("below the root").display().to_string();
+            dead(root, document, &text).into_iter().map(move |word| format!("{name}: {word}"))
+        })
+        .collect();
+    assert!(named > 100, "{named} links and paths");
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn dead_links_and_paths_are_found() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = "[a](search.md#states) [b](nothing.md) [c](https://example.org/x) `src/lib.rs` `src/nothing.rs::f` `src/*.rs`\n\
+                ```\n`src/in/a/block.rs`\n```\n";
+    assert_eq!(dead(root, &root.join("docs/a.md"), text), ["nothing.md", "src/nothing.rs"]);
+}
