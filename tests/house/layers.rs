@@ -5,8 +5,8 @@ use std::{fs, path::Path};
 /// Layer of a module of the crate's root, by name.
 fn layer_of(module: &str) -> Option<u32> {
     Some(match module {
-        "density" | "pixel_filter" | "error" | "html" | "settings" | "image" | "layout" | "memory" | "rng"
-        | "stats" | "progress" => 0,
+        "density" | "pixel_filter" | "error" | "html" | "settings" | "image" | "layout" | "map_kind" | "memory"
+        | "rng" | "stats" | "progress" => 0,
         // What lib.rs hands out of `error` under its own name.
         "Error" | "Result" => 0,
         "scene" | "bvh" => 1,
