@@ -13,7 +13,7 @@ use caustica::{
     bvh::Bvh,
     layout::{self, Counters, PhotonBatch},
     scene::{Light, LightKind},
-    settings::{LightSettings, Mode, Sampler, Settings},
+    settings::{LightSettings, Mode, Sampler},
     upload::{SceneBuffers, sampler_constant},
 };
 use glam::{Vec3, vec3};
