@@ -162,13 +162,13 @@ impl Gatherer for Sides<'_> {
 fn check(settings: &Settings, options: &Options) -> Result<()> {
     let fail = |name, value: String, problem: &str| Err(Error::Setting { name, value, problem: problem.to_string() });
     if !settings.photons.mode.traces_photons() {
-        return fail("mode", settings.photons.mode.name().to_string(), "has no photons to compare");
+        return fail("photons.mode", settings.photons.mode.name().to_string(), "has no photons to compare");
     }
     if settings.photons.final_gather > 0 {
-        return fail("final-gather", settings.photons.final_gather.to_string(), "is not compared");
+        return fail("photons.final_gather", settings.photons.final_gather.to_string(), "is not compared");
     }
     if settings.estimate.search == Search::Radius {
-        return fail("search", "radius".to_string(), "has no nearest photons to compare");
+        return fail("estimate.search", "radius".to_string(), "has no nearest photons to compare");
     }
     if !(options.tolerance >= 0.0 && options.tolerance.is_finite()) {
         return fail("tolerance", options.tolerance.to_string(), "must be at least 0");

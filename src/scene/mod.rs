@@ -175,7 +175,7 @@ impl Scene {
             let list: Vec<String> =
                 self.cameras.iter().enumerate().map(|(i, camera)| format!("{i} {:?}", camera.name)).collect();
             Error::Setting {
-                name: "camera",
+                name: "picture.camera",
                 value: wanted.unwrap_or("0").to_owned(),
                 problem: format!("{} has the cameras {}", self.file_name, list.join(", ")),
             }
@@ -197,7 +197,7 @@ impl Scene {
         if self.lights.is_empty() && !self.has_emission() && self.environment.as_ref().is_none_or(Environment::is_dark)
         {
             let problem = "no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give \
-                           --env, --background or --default-light sky";
+                           `scene.environment`";
             return Err(error("scene", problem.to_owned()));
         }
         Ok(())

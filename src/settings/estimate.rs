@@ -80,15 +80,15 @@ impl EstimateSettings {
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        Self::NEIGHBORS.check("neighbors", self.neighbors)?;
-        Self::CONE_CONSTANT.check("cone-constant", self.cone_constant)?;
-        self.max_radius.map_or(Ok(()), |radius| Self::RADIUS.check("max-radius", radius))?;
-        Self::SHARE_REACH.check("share", self.share_reach)?;
+        Self::NEIGHBORS.check("estimate.neighbors", self.neighbors)?;
+        Self::CONE_CONSTANT.check("estimate.cone_constant", self.cone_constant)?;
+        self.max_radius.map_or(Ok(()), |radius| Self::RADIUS.check("estimate.max_radius", radius))?;
+        Self::SHARE_REACH.check("estimate.share_reach", self.share_reach)?;
         match (self.search, self.radius) {
-            (Search::Radius, None) => fail("search", "radius".to_string(), "needs a radius"),
-            (Search::Radius, Some(radius)) => Self::RADIUS.check("radius", radius),
+            (Search::Radius, None) => fail("estimate.search", "radius".to_string(), "needs a radius"),
+            (Search::Radius, Some(radius)) => Self::RADIUS.check("estimate.radius", radius),
             (_, None) => Ok(()),
-            (_, Some(radius)) => fail("radius", radius.to_string(), "goes with the search by radius only"),
+            (_, Some(radius)) => fail("estimate.radius", radius.to_string(), "goes with the search by radius only"),
         }
     }
 }

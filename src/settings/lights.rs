@@ -51,7 +51,7 @@ impl LightSettings {
     pub fn check(&self) -> Result<()> {
         let range = Self::PHOTON_WEIGHT;
         if let Some((light, weight)) = self.photon_weights.iter().find(|(_, weight)| !range.contains(*weight)) {
-            return fail("light-photons", format!("{light}={weight}"), &format!("the weight must be {range}"));
+            return fail("lights.photon_weights", format!("{light}={weight}"), &format!("the weight must be {range}"));
         }
         Ok(())
     }

@@ -65,7 +65,7 @@ pub(crate) fn check_samples(photons: &PhotonSettings, picture: &PictureSettings)
     let most = (1_u64 << 32) / u64::from(each);
     if u64::from(picture.spp) > most {
         let problem = format!("must be at most {most} with these light samples and rays of final gathering");
-        return fail("spp", picture.spp.to_string(), &problem);
+        return fail("picture.spp", picture.spp.to_string(), &problem);
     }
     Ok(())
 }

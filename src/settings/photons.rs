@@ -162,13 +162,14 @@ impl PhotonSettings {
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        Self::FINAL_GATHER.check("final-gather", self.final_gather)?;
+        Self::FINAL_GATHER.check("photons.final_gather", self.final_gather)?;
         if self.final_gather > 0 && !matches!(self.mode, Mode::Hybrid | Mode::IndirectPhotons) {
             let problem = format!("goes with the modes hybrid and indirect-photons, not {}", self.mode.name());
-            return fail("final-gather", self.final_gather.to_string(), &problem);
+            return fail("photons.final_gather", self.final_gather.to_string(), &problem);
         }
-        Self::CAPACITY.check("photons", self.global.min(self.caustic))?;
-        Self::MAX_BOUNCES.check("max-bounces", self.max_bounces)?;
-        self.max_paths.map_or(Ok(()), |paths| Self::MAX_PATHS.check("max-paths", paths))
+        Self::CAPACITY.check("photons.global", self.global)?;
+        Self::CAPACITY.check("photons.caustic", self.caustic)?;
+        Self::MAX_BOUNCES.check("photons.max_bounces", self.max_bounces)?;
+        self.max_paths.map_or(Ok(()), |paths| Self::MAX_PATHS.check("photons.max_paths", paths))
     }
 }

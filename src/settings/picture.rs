@@ -95,12 +95,12 @@ impl PictureSettings {
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        Self::SPP.check("spp", self.spp)?;
-        Self::LIGHT_SAMPLES.check("light-samples", self.light_samples)?;
-        Self::APERTURE.check("aperture", self.aperture)?;
+        Self::SPP.check("picture.spp", self.spp)?;
+        Self::LIGHT_SAMPLES.check("picture.light_samples", self.light_samples)?;
+        Self::APERTURE.check("picture.aperture", self.aperture)?;
         match self.focus {
-            None if self.aperture > 0.0 => fail("aperture", self.aperture.to_string(), "needs a focus"),
-            Some(focus) => Self::FOCUS.check("focus", focus),
+            None if self.aperture > 0.0 => fail("picture.aperture", self.aperture.to_string(), "needs a focus"),
+            Some(focus) => Self::FOCUS.check("picture.focus", focus),
             None => Ok(()),
         }
     }
