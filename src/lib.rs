@@ -44,7 +44,7 @@
 //! # Errors
 //!
 //! Every failure that a file, a setting, the device or the disk can cause is an [`Error`], displayed as one line. A wrong
-//! setting is [`Error::Setting`] with the setting's name and range; the ranges are constants beside the settings, such as
+//! setting is [`Error::Setting`] with the setting's path in [`Settings`], such as `picture.spp`, and its range; the ranges are constants beside the settings, such as
 //! [`settings::EstimateSettings::NEIGHBORS`]. A panic is a bug. What was ignored or changed in a scene is in
 //! [`Scene::warnings`], what went wrong in a picture without spoiling it in [`Stats::warnings`].
 //!

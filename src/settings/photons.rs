@@ -20,7 +20,7 @@ pub enum Mode {
     Photons,
     /// 2: direct light by shadow rays only.
     DirectRays,
-    /// 3: light straight from the lights or through delta surfaces only, by photons.
+    /// 3: light straight from the lights or through specular surfaces only, by photons.
     DirectPhotons,
     /// 4: what mode 0 takes from photons. The only one that does not show what shines.
     IndirectPhotons,
@@ -105,7 +105,7 @@ pub struct PhotonSettings {
     pub max_paths: Option<u64>,
     /// Where photon paths are sent.
     pub emission: Emission,
-    /// Longest photon path and longest delta chain of a camera path, surfaces, in [`Self::MAX_BOUNCES`]; 0:
+    /// Longest photon path and longest specular chain of a camera path, surfaces, in [`Self::MAX_BOUNCES`]; 0:
     /// roulette alone ends paths.
     pub max_bounces: u32,
     /// Numbers for sampling.
