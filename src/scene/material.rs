@@ -96,14 +96,15 @@ pub struct Material {
     pub name: String,
     /// How the surface scatters light.
     pub surface: Surface,
-    /// Radiance that it sends out by itself, W/(m² sr) in each channel, alike in all directions of its front side, where a
-    /// triangle's corners run counterclockwise, or a sphere's outside.
+    /// Radiance that it sends out by itself, W/(m² sr) in each channel, alike in all directions of
+    /// its front side, where a triangle's corners run counterclockwise, or a sphere's outside.
     pub emission: Vec3,
     /// Its back sends out as much.
     pub double_sided: bool,
 }
 
-/// The media of a scene. Each material that bounds a solid has a medium of its own, so that a path knows which solid it leaves.
+/// The media of a scene. Each material that bounds a solid has a medium of its own, so that a path
+/// knows which solid it leaves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MediaTable {
     /// The media, by index.
