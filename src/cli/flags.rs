@@ -1,6 +1,7 @@
 //! Names of settings in the library's messages, as flags of the command.
 
-/// A setting or another input of the library, by the name in its messages, and the flag that sets it.
+/// A setting or another input of the library, by the name in its messages, and the flag that sets
+/// it.
 type Row = (&'static str, &'static str);
 
 /// Inputs that an error or a warning of the library can name.
@@ -34,8 +35,9 @@ const FLAGS: [Row; 24] = [
 /// The environment has no flag of its own name: three flags give light from all around.
 const ENVIRONMENT: Row = ("scene.environment", "--env, --background or --default-light sky");
 
-/// A line with flags in the place of settings: "`picture.crop`" becomes "--crop", and the name that begins the message
-/// of a refused setting, as in "error: picture.spp 0: must be at least 1", becomes the flag without its dashes.
+/// A line with flags in the place of settings: "`picture.crop`" becomes "--crop", and the name that
+/// begins the message of a refused setting, as in "error: picture.spp 0: must be at least 1",
+/// becomes the flag without its dashes.
 pub fn with_flags(line: &str) -> String {
     FLAGS.iter().chain([&ENVIRONMENT]).fold(line.to_owned(), |line, (setting, flag)| {
         let line = line.replace(&format!("`{setting}`"), flag);
@@ -65,7 +67,8 @@ mod tests {
         sections.iter().flat_map(fields).collect()
     }
 
-    /// Names in the errors of `Settings::check` when one setting at a time has a value that may be out of its range.
+    /// Names in the errors of `Settings::check` when one setting at a time has a value that may be
+    /// out of its range.
     fn refused() -> BTreeSet<&'static str> {
         let values =
             [json!(0), json!(-1), json!(1), json!(u32::MAX), json!(1e300), json!("radius"), json!([["lamp", 0]])];

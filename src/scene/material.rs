@@ -8,13 +8,29 @@ use glam::Vec3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
     /// Lambert reflectance.
-    Diffuse { albedo: Vec3 },
+    Diffuse {
+        /// Reflectance of each channel.
+        albedo: Vec3,
+    },
     /// Perfect mirror.
-    Mirror { tint: Vec3 },
+    Mirror {
+        /// Colour of the specular lobe, see [`Surface::color`].
+        tint: Vec3,
+    },
     /// Closed solid of smooth dielectric.
-    Glass { ior: f32, tint: Vec3 },
+    Glass {
+        /// Index of refraction.
+        ior: f32,
+        /// Colour of the specular lobe, see [`Surface::color`].
+        tint: Vec3,
+    },
     /// Thin smooth dielectric sheet, crossed in a straight line.
-    Pane { ior: f32, tint: Vec3 },
+    Pane {
+        /// Index of refraction.
+        ior: f32,
+        /// Colour of the specular lobe, see [`Surface::color`].
+        tint: Vec3,
+    },
 }
 
 impl Surface {
@@ -76,18 +92,22 @@ pub struct Medium {
 /// A named surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
+    /// Name in the file.
     pub name: String,
+    /// How the surface scatters light.
     pub surface: Surface,
-    /// Radiance that it sends out by itself, W/(m² sr) in each channel, alike in all directions of its front side, where a
-    /// triangle's corners run counterclockwise, or a sphere's outside.
+    /// Radiance that it sends out by itself, W/(m² sr) in each channel, alike in all directions of
+    /// its front side, where a triangle's corners run counterclockwise, or a sphere's outside.
     pub emission: Vec3,
     /// Its back sends out as much.
     pub double_sided: bool,
 }
 
-/// The media of a scene. Each material that bounds a solid has a medium of its own, so that a path knows which solid it leaves.
+/// The media of a scene. Each material that bounds a solid has a medium of its own, so that a path
+/// knows which solid it leaves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MediaTable {
+    /// The media, by index.
     pub media: Vec<Medium>,
     /// Index of the medium of each material.
     of_materials: Vec<Option<u32>>,

@@ -43,8 +43,11 @@ pub struct Scene {
     pub hash: String,
     /// Offset subtracted from all world coordinates of the file: the centre of its geometry.
     pub center: DVec3,
+    /// Triangles of all meshes.
     pub triangles: Vec<Triangle>,
+    /// Exact spheres.
     pub spheres: Vec<Sphere>,
+    /// Materials; triangles and spheres refer to them by index.
     pub materials: Vec<Material>,
     /// Punctual lights.
     pub lights: Vec<Light>,

@@ -8,14 +8,16 @@ use crate::{
     error::Result,
 };
 
-/// Which photons an estimate sums, and how they are found. Grid and kd-tree give the same picture but for rounding.
+/// Which photons an estimate sums, and how they are found. Grid and kd-tree give the same picture
+/// but for rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Search {
     /// The nearest, by the grid on the device.
     #[default]
     Grid,
-    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU; makes the raw estimate always.
+    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU; makes the raw estimate
+    /// always.
     KdTree,
     /// All within [`EstimateSettings::radius`], by the grid.
     Radius,
@@ -31,16 +33,19 @@ pub struct EstimateSettings {
     pub kernel: DensityKernel,
     /// Constant C of the cone filter, in [`Self::CONE_CONSTANT`].
     pub cone_constant: f32,
-    /// Bound of the search radius, metres, in [`Self::RADIUS`]; `None`: the nearest photons, however far.
+    /// Bound of the search radius, metres, in [`Self::RADIUS`]; `None`: the nearest photons,
+    /// however far.
     pub max_radius: Option<f32>,
     /// How photons are found.
     pub search: Search,
-    /// Radius of the estimate with [`Search::Radius`], metres, in [`Self::RADIUS`]; `None` with the others.
+    /// Radius of the estimate with [`Search::Radius`], metres, in [`Self::RADIUS`]; `None` with the
+    /// others.
     pub radius: Option<f32>,
-    /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the estimate of the report.
+    /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the
+    /// estimate of the report.
     pub raw: bool,
-    /// Distance within which visible points on one surface share an estimate, as a fraction of its radius, in
-    /// [`Self::SHARE_REACH`]; 0: every camera sample has its own.
+    /// Distance within which visible points on one surface share an estimate, as a fraction of its
+    /// radius, in [`Self::SHARE_REACH`]; 0: every camera sample has its own.
     pub share_reach: f32,
 }
 
@@ -64,7 +69,8 @@ impl EstimateSettings {
     pub const NEIGHBORS: Range<u32> = Range::closed(1, 1000);
     /// Range of [`Self::cone_constant`].
     pub const CONE_CONSTANT: Range<f32> = Range::at_least(1.0);
-    /// Range of [`Self::radius`] and [`Self::max_radius`], metres: the square of the largest is far from the largest float.
+    /// Range of [`Self::radius`] and [`Self::max_radius`], metres: the square of the largest is far
+    /// from the largest float.
     pub const RADIUS: Range<f32> = Range::above(0.0, 1e18);
     /// Range of [`Self::share_reach`].
     pub const SHARE_REACH: Range<f32> = Range::closed(0.0, 2.0);

@@ -33,8 +33,8 @@ pub enum LightUnit {
 pub struct LightSettings {
     /// How photon paths are dealt to lights.
     pub sampling: LightSampling,
-    /// Names of lights, and the factor on the photons of each, in [`Self::PHOTON_WEIGHT`]. An emissive material or the
-    /// environment is a light of its name.
+    /// Names of lights, and the factor on the photons of each, in [`Self::PHOTON_WEIGHT`]. An
+    /// emissive material or the environment is a light of its name.
     pub photon_weights: Vec<(String, f64)>,
     /// How light intensities of the file are read.
     pub unit: LightUnit,

@@ -24,8 +24,8 @@ macro_rules! number {
 
 number!(u32: u32::MAX, u64: u64::MAX, f32: 1e9, f64: 1e9);
 
-/// Values that a setting can have. Infinities and NaN are in no range. Displayed as `from 1 to 1000`, `at least 1`,
-/// `above 0` or `above 0, at most 1e18`.
+/// Values that a setting can have. Infinities and NaN are in no range. Displayed as
+/// `from 1 to 1000`, `at least 1`, `above 0` or `above 0, at most 1e18`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range<T> {
     least: T,
