@@ -50,7 +50,7 @@ fn twins() -> Vec<Twin> {
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
         Path { origin, history, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
-        VisiblePoint { position, valid, weight, offset, ng, media_outer, ns, media_inner }
+        VisiblePoint { position, next_map, weight, offset, ng, media_outer, ns, media_inner }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
         Store { staged, first_photon, photons, kind }
@@ -63,9 +63,9 @@ fn twins() -> Vec<Twin> {
         PhotonPlace { position, wi }
         PhotonFlux { flux, normal }
         MapInfo { count, levels, split, pad }
-        GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, turn, pad0, pad1 }
+        GatherInfo { count, first, neighbors, fixed_radius, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, map_number, pad0, pad1 }
         Gathered { radius_squared, count, fingerprint }
-        ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, turn }
+        ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, map_number }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
         KeyStep { count, window_first, window_count, fine }

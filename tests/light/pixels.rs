@@ -63,7 +63,7 @@ fn visible(scene: &Scene, camera: &Camera, size: u32, settings: &Settings) -> Ve
         let count = tracer.point_count(&tile);
         let points: Vec<VisiblePoint> = gpu().read(&tracer.points, 0, count.into()).expect("points read back");
         for (i, point) in (0..).zip(&points) {
-            if let Some(pixel) = tracer.pixel(&tile, i * tile.pixels / count).filter(|_| point.valid != 0) {
+            if let Some(pixel) = tracer.pixel(&tile, i * tile.pixels / count).filter(|_| point.next_map != 0) {
                 found.push((pixel, point.position.into()));
             }
         }

@@ -63,7 +63,7 @@ impl CameraKernels {
 pub struct CameraTracer {
     kernels: CameraKernels,
     wavefront: Wavefront,
-    /// A [`VisiblePoint`] per place for a path, some of them not valid.
+    /// A [`VisiblePoint`] per path slot, some without a point.
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
     pub radiance: Buffer,
