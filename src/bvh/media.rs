@@ -1,10 +1,12 @@
-//! Which solids of glass a point lies in: the media that a path which starts there is inside of.
+//! Initial media stack: the dielectric solids that contain the start of a path.
 //!
-//! From far away a straight path to the point enters and leaves solids as any path does, and what it has not left is
-//! around the point. Six such paths come along the axes; the most frequent answer holds, so that a hole in one solid does not
-//! decide. Along an axis, whether a triangle is crossed is a question of the plane: its outline winds about the point or not.
-//! Edges count by a half-open rule (Sunday 2021, "Practical Geometry Algorithms", winding number), the same for both
-//! triangles of an edge, so a path through edges or corners of a closed mesh enters it as often as it leaves it.
+//! A straight path from infinity to the point enters and leaves solids; those that it has not left
+//! contain the point. Six such paths run along the axes, and the most frequent result is taken, so
+//! that a hole in one solid does not change it. Along an axis, the crossing test of a triangle is a
+//! winding number in the plane perpendicular to the axis. Edges follow a half-open rule (Sunday
+//! 2021, "Practical Geometry Algorithms", winding number), which is the same for both triangles of
+//! an edge. A path through edges or corners of a closed mesh therefore enters it as often as it
+//! leaves it.
 
 use glam::{DVec2, DVec3};
 
@@ -14,10 +16,11 @@ use crate::{
     scene::{Bounds, MediaTable, Scene},
 };
 
-/// By how much of their coordinates boxes are widened: corners in them are rounded.
+/// Relative widening of boxes, which covers the rounding of their corners.
 const BOX_SLACK: f64 = 1e-6;
 
-/// A stack of media as the device takes it: indices of media, each plus one, outermost first; 0 for none.
+/// Stack of media in the device's format: index of each medium plus one, outermost first; 0 for
+/// none.
 pub type Media = [u32; MEDIA_DEPTH];
 
 /// Finds the media around points of a scene.
@@ -30,18 +33,18 @@ pub struct MediaProbe<'a> {
     bounds: Bounds,
 }
 
-/// A place where a line along an axis meets the surface of a solid.
+/// Intersection of a line along an axis with the surface of a solid.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
-    /// Metres along the axis from the point.
+    /// Distance along the axis from the point, metres.
     height: f64,
-    /// The outside lies further along the axis.
+    /// Whether the outside lies ahead along the axis.
     outside_ahead: bool,
     medium: u32,
 }
 
 impl<'a> MediaProbe<'a> {
-    /// For points of `scene`, whose tree is `bvh`.
+    /// Prepares queries for points of `scene`, whose hierarchy is `bvh`.
     #[must_use]
     pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
         let media = MediaTable::new(&scene.materials);
@@ -52,7 +55,7 @@ impl<'a> MediaProbe<'a> {
         Self { scene, bvh, media, bounds }
     }
 
-    /// Indices of the media around a point, metres, outermost first.
+    /// Indices of the media that contain a point (coordinates in metres), outermost first.
     #[must_use]
     pub fn at(&self, point: DVec3) -> Vec<u32> {
         let (min, max) = (self.bounds.min.as_dvec3(), self.bounds.max.as_dvec3());
@@ -67,11 +70,12 @@ impl<'a> MediaProbe<'a> {
             })
             .collect();
         let votes = |stack: &Vec<u32>| found.iter().filter(|other| *other == stack).count();
-        // The last of several maxima is taken: the first in order of the axes.
+        // `max_by_key` returns the last of several maxima; the reversed order makes it the first
+        // axis.
         found.iter().rev().max_by_key(|stack| votes(stack)).cloned().unwrap_or_default()
     }
 
-    /// Where the line through `point` along an axis crosses solids that have a medium.
+    /// Intersections of the line through `point` along an axis with solids that have a medium.
     fn crossings(&self, point: DVec3, axis: usize) -> Vec<Crossing> {
         let mut found = Vec::new();
         let mut waiting = vec![0];
@@ -114,7 +118,8 @@ impl<'a> MediaProbe<'a> {
     }
 }
 
-/// The stack as the device takes it, and whether all of it fits; if not, the outermost media are kept.
+/// Converts the stack to the device's format and tells whether it fits. If not, the outermost media
+/// are kept.
 #[must_use]
 pub fn packed(stack: &[u32]) -> (Media, bool) {
     let mut media = Media::default();
@@ -122,7 +127,7 @@ pub fn packed(stack: &[u32]) -> (Media, bool) {
     (media, stack.len() <= MEDIA_DEPTH)
 }
 
-/// What to say where paths start in more media than they keep.
+/// Warning for paths that start inside more media than the stack holds.
 #[must_use]
 pub fn too_deep(what: &str, count: usize) -> Option<String> {
     (count > 0).then(|| {
@@ -132,8 +137,8 @@ pub fn too_deep(what: &str, count: usize) -> Option<String> {
     })
 }
 
-/// The media that a path along the axis has not left when it comes to the point, from far ahead or from far behind.
-/// `crossings`: the farthest first.
+/// Media that a path along the axis, from infinity ahead or behind, has not left at the point.
+/// `crossings` begins with the farthest.
 fn stack_along(crossings: &[Crossing], from_ahead: bool) -> Vec<u32> {
     let mut stack = Vec::new();
     for crossing in crossings.iter().filter(|c| if from_ahead { c.height > 0.0 } else { c.height < 0.0 }) {
@@ -146,7 +151,7 @@ fn stack_along(crossings: &[Crossing], from_ahead: bool) -> Vec<u32> {
     stack
 }
 
-/// A vector's part across an axis, and that along it.
+/// Components of a vector perpendicular to an axis, and the component along it.
 fn split(v: DVec3, axis: usize) -> (DVec2, f64) {
     (DVec2::new(v[(axis + 1) % 3], v[(axis + 2) % 3]), v[axis])
 }
@@ -160,21 +165,23 @@ fn is_on_line(child: &BvhChild, point: DVec3, axis: usize) -> bool {
     })
 }
 
-/// Height at which the axis through the origin passes through a triangle, and whether its outside is ahead there.
+/// Coordinate along the axis at which the axis through the origin intersects a triangle, and
+/// whether the triangle's outside lies ahead.
 fn cross_triangle(corners: [(DVec2, f64); 3]) -> Option<(f64, bool)> {
     let [a, b, c] = corners;
     let winding = edge_winding(a.0, b.0) + edge_winding(b.0, c.0) + edge_winding(c.0, a.0);
     if winding == 0 {
         return None;
     }
-    // Barycentric weights, up to a factor.
+    // Barycentric weights up to a common factor.
     let weights = [b.0.perp_dot(c.0), c.0.perp_dot(a.0), a.0.perp_dot(b.0)];
     let sum: f64 = weights.iter().sum();
     let height = weights.iter().zip(corners).map(|(w, corner)| w * corner.1).sum::<f64>() / sum;
     Some((if height.is_finite() { height } else { a.1 }, winding > 0))
 }
 
-/// What an edge adds to the winding of an outline about the origin; the opposite of what the reversed edge adds.
+/// Contribution of an edge to the winding number about the origin; the negative of the reversed
+/// edge's.
 fn edge_winding(from: DVec2, to: DVec2) -> i32 {
     let side = from.perp_dot(to);
     if from.y <= 0.0 && to.y > 0.0 && side > 0.0 {
@@ -196,7 +203,8 @@ mod tests {
         Scene { materials: vec![material; surfaces], ..Scene::default() }
     }
 
-    /// A cube about the origin whose corners, edges and diagonals lie on the axes' lines through round numbers.
+    /// Cube about the origin whose corners, edges and diagonals lie on axis-parallel lines through
+    /// round numbers.
     fn add_cube(scene: &mut Scene, half: f32, material: u32, faces: usize) {
         let corner = |u: f32, v: f32, axis: usize, side: f32| {
             let mut p = Vec3::ZERO;
@@ -222,7 +230,7 @@ mod tests {
         scene.spheres.push(Sphere { center: Vec3::ZERO, radius: 1.0, material: 2 });
         add_cube(&mut scene, 2.0, 1, 6);
         add_cube(&mut scene, 4.0, 0, 6);
-        // On edges and diagonals of the faces as seen along all axes, and off them.
+        // Points on and off the edges and diagonals of the faces as projected along all axes.
         for (point, around) in [
             (dvec3(0.0, 0.0, 0.0), vec![0, 1, 2]),
             (dvec3(1.5, 1.5, 1.5), vec![0, 1]),

@@ -1,4 +1,4 @@
-//! What is counted over the queries of a comparison.
+//! Statistics over the queries of a comparison.
 
 use crate::{
     layout::{Gathered, VisiblePoint},
@@ -6,10 +6,10 @@ use crate::{
     settings::Settings,
 };
 
-/// Photons of one tie that are looked into at most.
+/// Maximum number of photons in one tie that is examined.
 const MOST_TIED: usize = 16;
 
-/// What the grid found at each point of a tile.
+/// Result of the grid at each point of a tile.
 pub(super) struct GridAnswer {
     pub gathered: Vec<Gathered>,
     pub radiance: Vec<[f32; 4]>,
@@ -19,11 +19,11 @@ pub(super) struct GridAnswer {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Measure {
     pub queries: u64,
-    /// Queries in which both sides summed the same photons.
+    /// Number of queries in which both sides summed the same photons.
     pub identical: u64,
-    /// Queries whose last photon and the next one are tied.
+    /// Number of queries whose last photon and the next one are tied.
     pub tied: u64,
-    /// Queries that differ in more than tied photons.
+    /// Number of queries that differ in photons that are not tied.
     pub different: u64,
     pub radiance: Differences,
     pub radius: Differences,
@@ -38,17 +38,19 @@ pub(super) struct Differences {
     count: u64,
 }
 
-/// Queries by the relative difference of their radiance.
+/// Histogram of queries over the relative difference of their radiance.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Histogram {
-    /// Without any difference.
+    /// Number of queries without any difference.
     pub none: u64,
-    /// Bin `i` ends at 10^([`Self::FIRST`] + (i + 1) / 2); the first takes what is smaller, the last what is larger.
+    /// Counts per bin. Bin `i` ends at 10^([`Self::FIRST`] + (i + 1) / 2). The first bin also holds
+    /// smaller values, the last also larger ones.
     pub bins: [u64; 18],
 }
 
 impl Measure {
-    /// Counts the valid points of a tile. `explains` says whether the photons of a point differ in tied ones only.
+    /// Counts the valid points of a tile. `explains` says whether the photons of a point differ in
+    /// tied ones only.
     pub fn add(
         &mut self,
         points: &[VisiblePoint],
@@ -103,7 +105,7 @@ impl Histogram {
     }
 }
 
-/// |a - b| as a fraction of the larger; infinite if one of them is no number.
+/// |a - b| relative to the larger value; infinite if either is NaN.
 pub(super) fn relative(a: f64, b: f64) -> f64 {
     match (a - b).abs() {
         0.0 => 0.0,
@@ -117,7 +119,7 @@ fn sets_agree(grid: &Gathered, kdtree: &Estimate) -> bool {
     grid.fingerprint == kdtree.fingerprint && grid.count == kdtree.count
 }
 
-/// Whether the grid's photons can be had from those of the estimate by exchanging photons that are tied with its last.
+/// Whether exchanging photons tied with the estimate's last one yields the grid's photons.
 pub(super) fn explained_by_ties(
     map: &KdMap,
     point: &VisiblePoint,
@@ -126,7 +128,7 @@ pub(super) fn explained_by_ties(
     grid: &Gathered,
 ) -> bool {
     let edge = estimate.radius_squared;
-    // Their number is k or all but one, unless the bound of the radius cuts through the tie.
+    // The estimate sums k photons or all but one, unless the maximum radius cuts through the tie.
     let cut = settings.estimate.max_radius.is_some_and(|r| are_tied(edge, r * r));
     if !cut && grid.count != estimate.count {
         return false;
@@ -140,7 +142,7 @@ pub(super) fn explained_by_ties(
         && some_add_up(&tied, grid.count - certain, grid.fingerprint.wrapping_sub(base))
 }
 
-/// Whether `count` of the numbers have that wrapping sum.
+/// Whether some `count` of the numbers have the wrapping sum `sum`.
 fn some_add_up(numbers: &[u32], count: u32, sum: u32) -> bool {
     match numbers {
         _ if count == 0 => sum == 0,
@@ -159,7 +161,8 @@ mod tests {
 
     const SETTINGS: fn() -> Settings = || Settings::default().with(|s| s.estimate.neighbors = 2);
 
-    /// Photons at these distances along x, all of them from above, and the origin to see them from.
+    /// Photons at these distances along x, all incident from above, with the query point at the
+    /// origin.
     fn line(distances: &[f32]) -> (KdMap, VisiblePoint) {
         let place = |&x: &f32| PhotonPlace { position: [x, 0.0, 0.0], wi: octahedral(glam::Vec3::Y) };
         let flux = PhotonFlux { flux: [1.0; 3], normal: 0 };
@@ -168,7 +171,8 @@ mod tests {
         (KdMap::new(distances.iter().map(place).collect(), vec![flux; distances.len()], 1), point)
     }
 
-    /// What is counted when the grid has summed these photons of a line, with the estimate's radiance times `factor`.
+    /// Counts of a query in which the grid has summed these photons of the line, with the
+    /// estimate's radiance times `factor`.
     fn counted(distances: &[f32], summed: &[u32], factor: f32) -> Measure {
         let (map, point) = line(distances);
         let estimate = map.estimate(&point, &SETTINGS().estimate);
@@ -185,7 +189,7 @@ mod tests {
         measure
     }
 
-    /// 2 m, and so little more that their squares are tied.
+    /// 2 m, and a distance so close to it that the squares are tied.
     const TIED: [f32; 3] = [2.0, 2.000_000_5, 2.000_000_2];
 
     #[test]
@@ -198,7 +202,7 @@ mod tests {
             assert_eq!((m.queries, m.tied, m.identical, m.different), (1, 1, identical, different), "{summed:?}");
             assert_eq!(m.radiance.max, 0.0, "ties are left out of the differences");
         }
-        // Several of one tie, of which the estimate takes two.
+        // Several tied photons, of which the estimate sums two.
         let m = counted(&[TIED[0], TIED[1], TIED[2]], &[1, 2], 1.0);
         assert_eq!((m.tied, m.identical, m.different), (1, 0, 0));
     }

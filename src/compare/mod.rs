@@ -1,9 +1,11 @@
-//! The grid on the device against the kd-tree on the CPU: one set of photons, every visible point gathered by both.
+//! Comparison of the grid on the device with the kd-tree on the CPU: both gather every visible
+//! point from the same photons.
 //!
-//! Both sides get the same photons, visible points and settings in the same single precision. They may differ in what
-//! rounding decides: where the last photon of an estimate and the next one are tied (their squared distances differ by
-//! at most [`TIE`]), either may be summed. Such queries are counted, may differ in tied photons only, and do not enter
-//! the differences of radius and radiance. Both make the report's raw estimate, whatever [`Settings::raw_estimate`] says.
+//! Both sides get the same photons, visible points and settings in the same single precision. They
+//! may differ in what rounding decides: where the last photon of an estimate and the next one are
+//! tied (their squared distances differ by at most [`TIE`]), either may be summed. Such queries are
+//! counted, may differ in tied photons only, and do not enter the differences of radius and
+//! radiance. Both make the report's raw estimate, whatever [`Settings::raw_estimate`] says.
 
 mod measure;
 mod page;
@@ -33,12 +35,14 @@ use sides::{GridGather, KdTreeGather};
 /// Default of [`Options::tolerance`].
 pub const TOLERANCE: f64 = 1e-4;
 
-/// What a comparison allows.
+/// Limits of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Largest relative difference of a channel's radiance, and of the radius, at any query without a tie; ≥ 0.
+    /// Largest relative difference of a channel's radiance, and of the radius, at any query without
+    /// a tie; ≥ 0.
     pub tolerance: f64,
-    /// Photons that the kd-tree leaves out, for tests of the comparison itself: it must then fail.
+    /// Number of photons that the kd-tree leaves out, a negative control of the comparison: it must
+    /// then fail.
     pub sabotage: u32,
 }
 
@@ -52,18 +56,19 @@ impl Default for Options {
 #[derive(Clone, Debug)]
 pub struct Comparison {
     pub report: Report,
-    /// The picture by the grid.
+    /// Picture gathered with the grid.
     pub grid: Frame,
-    /// The picture by the kd-tree; all but the radiance is that of the grid's.
+    /// Picture gathered with the kd-tree; all layers but the radiance are those of the grid's
+    /// picture.
     pub kdtree: Frame,
     pub stats: Stats,
     tolerance: f64,
-    /// Queries that differ in more than tied photons.
+    /// Number of queries that differ in photons that are not tied.
     different: u64,
     histogram: Histogram,
 }
 
-/// Names of the files that [`Comparison::write`] leaves in its folder.
+/// Names of the files that [`Comparison::write`] writes to its folder.
 pub const FILES: [&str; 8] = [
     "grid.exr",
     "kdtree.exr",
@@ -75,10 +80,11 @@ pub const FILES: [&str; 8] = [
     "report.html",
 ];
 
-/// Traces the photons once and gathers every visible point of the picture by both searches.
+/// Traces the photons once and gathers every visible point of the picture with both searches.
 ///
 /// # Errors
-/// As [`crate::renderer::render`]; also if the settings' mode has no photons, or `tolerance` is no number ≥ 0.
+/// As [`crate::renderer::render`]; also if the settings' mode has no photons, or `tolerance` is no
+/// number ≥ 0.
 pub fn compare(
     gpu: &Gpu,
     scene: &Scene,
@@ -97,7 +103,7 @@ pub fn compare(
         sabotage: options.sabotage,
         radiance: Default::default(),
     };
-    // Each point is gathered: no estimates are shared.
+    // Every visible point is gathered: no two share an estimate.
     let estimate = EstimateSettings { share_reach: 0.0, ..settings.estimate.clone() };
     let (films, mut stats) =
         session.films(&maps, &estimate, &settings.picture, (&mut sides, Stage::Compare), progress)?;
@@ -115,19 +121,19 @@ pub fn compare(
     })
 }
 
-/// Both sides and what is counted of them.
+/// State of a comparison: both sides and the counts.
 struct Sides<'a> {
     grid: GridGather<'a>,
     kdtree: KdTreeGather<'a>,
     measure: Measure,
-    /// Photons that the kd-tree has yet to leave out.
+    /// Number of photons that the kd-tree has still to leave out.
     sabotage: u32,
     /// Radiance of the tile's points by the grid and by the kd-tree.
     radiance: [Vec<[f32; 4]>; 2],
 }
 
 impl Gatherer for Sides<'_> {
-    /// Gathers the tile's points over all maps by both.
+    /// Gathers the tile's points over all maps with both sides.
     fn gather(&mut self, pass: &CameraPass, tile: &Tile, _: &mut Stats, progress: &dyn Progress) -> Result<()> {
         let points = pass.points(tile)?;
         self.sabotage -= self.kdtree.leave_out(self.sabotage, &points);
@@ -177,11 +183,11 @@ fn check(settings: &Settings, options: &Options) -> Result<()> {
 }
 
 impl Comparison {
-    /// Whether both sides agree, or in one line how they do not.
+    /// Checks that both sides agree.
     ///
     /// # Errors
-    /// [`Error::Differs`] if a query differs in photons that are not tied, a difference exceeds the tolerance, or there
-    /// was no query.
+    /// [`Error::Differs`] if a query differs in photons that are not tied, a difference exceeds the
+    /// tolerance, or there was no query.
     pub fn verdict(&self) -> Result<()> {
         let report = &self.report;
         let beyond = |what: &str, found: f64| {
@@ -201,9 +207,9 @@ impl Comparison {
         problem.map_or(Ok(()), |problem| Err(Error::Differs(format!("grid and kd-tree differ: {problem}"))))
     }
 
-    /// Writes [`FILES`] to the folder, each whole or not at all: both pictures and their difference (grid minus kd-tree)
-    /// as EXR; as PNG both with `exposure` and `tonemap`, and the relative difference in false colours; the report as
-    /// JSON and as a page that needs no other file.
+    /// Writes [`FILES`] to the folder, each whole or not at all: both pictures and their difference
+    /// (grid minus kd-tree) as EXR; as PNG both with `exposure` and `tonemap`, and the relative
+    /// difference in false colours; the report as JSON and as a page that needs no other file.
     ///
     /// # Errors
     /// [`Error::Io`].

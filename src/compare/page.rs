@@ -1,4 +1,4 @@
-//! The page of a comparison: one file that needs no other.
+//! HTML page of a comparison, a single self-contained file.
 
 use std::fmt::Write;
 
@@ -12,7 +12,7 @@ use crate::{
 };
 
 const TEMPLATE: &str = include_str!("page.html");
-/// A picture narrower than this shows its pixels as squares.
+/// Width below which a picture is shown with its pixels as squares.
 const PIXELATED_BELOW: u32 = 300;
 
 /// The page; `difference` is the PNG of the difference.
@@ -81,7 +81,7 @@ fn row(cells: &[&str]) -> String {
     format!("<tr><th scope=\"row\">{}</th>{others}</tr>\n", escaped(cells[0]))
 }
 
-/// Bars over half decades, as SVG.
+/// Histogram over half decades, as SVG.
 fn histogram(histogram: &Histogram, tolerance: f64) -> String {
     const BAR: f64 = 22.0;
     const LEFT: f64 = 20.0;
@@ -91,7 +91,7 @@ fn histogram(histogram: &Histogram, tolerance: f64) -> String {
     let most = histogram.bins.iter().copied().max().unwrap_or(0).max(1);
     let mut svg = format!("<svg viewBox=\"0 0 {width} 230\" role=\"img\" aria-label=\"histogram\">\n");
     for (i, &count) in histogram.bins.iter().enumerate().filter(|(_, count)| **count > 0) {
-        // At least a sign of even a single query.
+        // Minimum height that makes even a single query visible.
         let height = ((BOTTOM - TOP) * count as f64 / most as f64).max(2.0);
         let (x, y) = (LEFT + BAR * i as f64, BOTTOM - height);
         let _ = writeln!(
@@ -124,7 +124,7 @@ fn histogram(histogram: &Histogram, tolerance: f64) -> String {
     svg + "</svg>"
 }
 
-/// A count in at most four characters.
+/// Formats a count in at most four characters.
 fn short(count: u64) -> String {
     match count {
         0..10_000 => count.to_string(),

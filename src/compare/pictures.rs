@@ -10,14 +10,16 @@ use crate::{
 
 const PAPER: Rgb8 = [24; 3];
 const INK: Rgb8 = [235; 3];
-/// The picture is enlarged by whole factors up to this width, and the scale is at least as wide.
+/// Width in pixels up to which the picture is enlarged by integer factors; also the minimum width
+/// of the scale.
 const WIDTH: u32 = 384;
-/// Left and right of the scale's bar, for the halves of its outer numbers.
+/// Margin at both ends of the scale's bar, half the width of its outer numbers.
 const MARGIN: u32 = 14;
 const BAR: u32 = 10;
 const SCALE: u32 = 50;
 
-/// Radiance of the grid minus that of the kd-tree; all else is that of the grid's picture.
+/// Radiance of the grid minus that of the kd-tree; all other layers are those of the grid's
+/// picture.
 pub(super) fn difference(grid: &Frame, kdtree: &Frame) -> Frame {
     let mut difference = grid.clone();
     let pixels = difference.radiance_mut().iter_mut().zip(kdtree.radiance());
@@ -25,7 +27,8 @@ pub(super) fn difference(grid: &Frame, kdtree: &Frame) -> Frame {
     difference
 }
 
-/// Relative difference of each pixel's worst channel, in false colours over a logarithmic scale; a PNG file.
+/// Relative difference of each pixel's worst channel, in false colours over a logarithmic scale; a
+/// PNG file.
 pub(super) fn false_colors(grid: &Frame, kdtree: &Frame) -> Result<Vec<u8>> {
     let zoom = (WIDTH / grid.width).max(1);
     let (width, height) = (grid.width * zoom, grid.height * zoom);
@@ -40,11 +43,12 @@ pub(super) fn false_colors(grid: &Frame, kdtree: &Frame) -> Result<Vec<u8>> {
     canvas.to_png().map_err(|source| Error::Io { path: "difference.png".into(), source })
 }
 
-/// Black for none; else the place of the difference's logarithm between 10^[`Histogram::FIRST`] and 1.
+/// False colour: black for no difference, else by the logarithm of the difference between
+/// 10^[`Histogram::FIRST`] and 1.
 pub(super) fn color(difference: f64) -> Rgb8 {
     let first = f64::from(Histogram::FIRST);
     let place = if difference > 0.0 { (1.0 - difference.log10() / first).clamp(0.0, 1.0) } else { return [0; 3] };
-    // The scale's own black is kept for what is equal.
+    // Black is reserved for equal pixels, so the scale begins above it.
     colorous::INFERNO.eval_continuous(0.15 + 0.85 * place).as_array()
 }
 

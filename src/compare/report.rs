@@ -1,4 +1,4 @@
-//! The numbers of a comparison, for scripts and for people.
+//! Report of a comparison, as JSON and as text.
 
 use serde::Serialize;
 
@@ -12,7 +12,7 @@ use crate::stats::{DeviceStats, Stats};
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     pub device: DeviceStats,
-    /// Gathers of each side: visible points times photon maps.
+    /// Number of queries of each side: visible points times photon maps.
     pub queries: u64,
     pub neighbors: Neighbors,
     pub radius: RelativeDifference,
@@ -21,7 +21,7 @@ pub struct Report {
     pub kdtree: KdTreeSide,
 }
 
-/// Which photons were summed.
+/// Agreement of the summed photons.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Neighbors {
     /// Fraction of all queries in which both sides summed the same photons, 0 to 1.
@@ -30,7 +30,8 @@ pub struct Neighbors {
     pub tied: u64,
 }
 
-/// Difference over the larger of both values, over all queries without a tie; of radiance that of the worst channel.
+/// Differences relative to the larger of both values, over all queries without a tie; for radiance,
+/// that of the worst channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RelativeDifference {
     pub max_relative_difference: f64,
@@ -95,7 +96,7 @@ impl Report {
         }
     }
 
-    /// What is said of both sides together: name and value.
+    /// Facts about both sides together: name and value.
     #[must_use]
     pub fn facts(&self) -> Vec<(&'static str, String)> {
         let difference = |d: &RelativeDifference| match d.max_relative_difference {
@@ -113,7 +114,7 @@ impl Report {
         ]
     }
 
-    /// What is said of each side.
+    /// Rows of the table of both sides.
     #[must_use]
     pub fn rows(&self) -> Vec<Row> {
         let (g, t) = (&self.grid, &self.kdtree);
@@ -128,7 +129,7 @@ impl Report {
         ]
     }
 
-    /// Facts and rows as lines of text.
+    /// Formats the facts and rows as lines of text.
     #[must_use]
     pub fn table(&self) -> String {
         let mut lines: Vec<_> = self.facts().iter().map(|(what, value)| format!("{what:<32} {value}")).collect();
@@ -141,7 +142,7 @@ impl Report {
     }
 }
 
-/// Digits in groups of three.
+/// Formats an integer with digits in groups of three.
 pub(super) fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
@@ -154,13 +155,13 @@ pub(super) fn grouped(number: u64) -> String {
     text
 }
 
-/// Three digits that count.
+/// Formats a number with three significant digits.
 fn rounded(rate: f64) -> String {
     let unit = 10_f64.powf((rate.max(1.0).log10().floor() - 2.0).max(0.0));
     grouped(((rate / unit).round() * unit) as u64)
 }
 
-/// So many decimals that what is not all is not shown as 100.
+/// Formats a percentage with enough decimals that only all queries give 100.
 fn percent(fraction: f64) -> String {
     let shown = format!("{:.4}", (fraction * 1e6).floor() / 1e4);
     shown.trim_end_matches('0').trim_end_matches('.').to_string()

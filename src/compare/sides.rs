@@ -1,4 +1,4 @@
-//! The two sides of a comparison, each with its clock.
+//! The two sides of a comparison, each with its timer.
 
 use super::measure::{GridAnswer, explained_by_ties};
 use crate::{
@@ -13,14 +13,14 @@ use crate::{
     stats::timed,
 };
 
-/// Points that a warm-up gathers.
+/// Number of points that a warm-up gathers.
 const WARM_UP: u32 = 64;
 
-/// Gathers on the grid.
+/// The grid's side, on the device.
 pub(super) struct GridGather<'a> {
     pub maps: &'a [PhotonMap],
     gather: Gather<'static>,
-    /// Radiance by one map alone.
+    /// Radiance of one map alone.
     radiance: Option<Buffer>,
     warm: bool,
     /// Seconds that sorting the photons and building the grids take once the kernels are compiled.
@@ -51,7 +51,7 @@ impl<'a> GridGather<'a> {
         };
         let results = (&radiance, gathered);
         if !self.warm {
-            // Drivers compile a kernel when it first runs; that is no part of a query.
+            // Drivers compile a kernel at its first dispatch, which must not count as query time.
             for map in self.maps {
                 self.gather.run(gpu, map, points, count.min(WARM_UP), &pass.estimate, results, progress)?;
             }
@@ -76,7 +76,7 @@ impl<'a> GridGather<'a> {
     pub fn bytes(&self) -> u64 {
         let of_map = |map: &PhotonMap| {
             let mut buffers = map.bindings().map(|(_, buffer)| buffer).to_vec();
-            // A map of one window shows it under two names.
+            // A map with a single window binds the same buffer twice.
             buffers.dedup_by(|a, b| std::ptr::eq(*a, *b));
             buffers.iter().map(|buffer| buffer.size()).sum::<u64>()
         };
@@ -84,8 +84,8 @@ impl<'a> GridGather<'a> {
     }
 }
 
-/// Builds the maps once more, of photons in as little order as they come from the tracer: drivers compile a kernel when it first runs, so the
-/// first time says little.
+/// Rebuilds the maps to time them without kernel compilation, which drivers do at the first
+/// dispatch. The photons are shuffled to the disorder in which the tracer stores them.
 fn build_seconds(gpu: &Gpu, maps: &[PhotonMap]) -> Result<f64> {
     let kernels = MapKernels::new(gpu);
     let mut seconds = 0.0;
@@ -107,7 +107,7 @@ fn build_seconds(gpu: &Gpu, maps: &[PhotonMap]) -> Result<f64> {
     Ok(seconds)
 }
 
-/// Gathers on the kd-tree.
+/// The kd-tree's side, on the CPU.
 pub(super) struct KdTreeGather<'a> {
     maps: Vec<KdMap>,
     settings: &'a Settings,
@@ -117,7 +117,7 @@ pub(super) struct KdTreeGather<'a> {
 }
 
 impl<'a> KdTreeGather<'a> {
-    /// Reads the maps' photons back and balances them.
+    /// Reads the maps' photons back and builds balanced trees of them.
     pub fn new(gpu: &Gpu, maps: &[PhotonMap], settings: &'a Settings) -> Result<Self> {
         let mut build_seconds = 0.0;
         let mut build = |map: &PhotonMap| {
@@ -128,7 +128,8 @@ impl<'a> KdTreeGather<'a> {
         Ok(Self { maps, settings, build_seconds, seconds: 0.0 })
     }
 
-    /// Lets the first map lose up to `count` photons, each the nearest to one of the points; returns how many.
+    /// Removes up to `count` photons from the first map, each the nearest to one of the points.
+    /// Returns their number.
     pub fn leave_out(&mut self, count: u32, points: &[VisiblePoint]) -> u32 {
         let Some(map) = self.maps.first_mut() else { return 0 };
         let limit = self.settings.estimate.max_radius.map_or(f32::INFINITY, |r| r * r);
@@ -136,7 +137,8 @@ impl<'a> KdTreeGather<'a> {
         let places = (count as usize).min(valid.len());
         let mut lost = 0;
         for point in (0..places).map(|i| valid[i * valid.len() / places]) {
-            // Without a bound a photon alone is never summed: it would only give the radius.
+            // With k = 1 and no maximum radius, no photon is summed: the only one defines the
+            // radius.
             if let [(_, nearest), rest @ ..] = &map.search(point, 2, limit)[..]
                 && (!rest.is_empty() || limit.is_finite())
             {
@@ -152,7 +154,7 @@ impl<'a> KdTreeGather<'a> {
         timed(&mut self.seconds, || self.maps[map].gather(points, &self.settings.estimate, progress))
     }
 
-    /// Whether the photons that the grid summed differ from those of the estimate in tied ones only.
+    /// Whether the grid's photons differ from those of the estimate only in tied ones.
     pub fn explains(&self, map: usize, point: &VisiblePoint, estimate: &Estimate, gathered: &Gathered) -> bool {
         explained_by_ties(&self.maps[map], point, self.settings, estimate, gathered)
     }

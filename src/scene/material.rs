@@ -1,10 +1,10 @@
-//! How surfaces scatter light.
+//! Materials: how surfaces scatter and emit light.
 
 use std::fmt;
 
 use glam::Vec3;
 
-/// How a surface scatters light; colours are linear Rec.709, each channel 0 to 1.
+/// Scattering model of a surface. Colours are linear Rec.709, each channel 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
     /// Lambert reflectance.
@@ -34,13 +34,13 @@ pub enum Surface {
 }
 
 impl Surface {
-    /// Scatters into single directions only.
+    /// Whether all scattering is specular.
     #[must_use]
     pub fn is_delta(&self) -> bool {
         !matches!(self, Surface::Diffuse { .. })
     }
 
-    /// Albedo of the diffuse lobe, or tint of the specular one that has a colour.
+    /// Albedo of the diffuse lobe, or tint of the specular lobe where it has one.
     #[must_use]
     pub fn color(&self) -> Vec3 {
         match *self {
@@ -49,7 +49,7 @@ impl Surface {
         }
     }
 
-    /// Index of refraction of what lets light through.
+    /// Index of refraction of a transmitting surface.
     #[must_use]
     pub fn ior(&self) -> Option<f32> {
         match *self {
@@ -58,7 +58,7 @@ impl Surface {
         }
     }
 
-    /// What fills the solid that it bounds.
+    /// Medium inside the solid that the surface bounds.
     #[must_use]
     pub fn medium(&self) -> Option<Medium> {
         match *self {
@@ -82,7 +82,7 @@ impl fmt::Display for Surface {
     }
 }
 
-/// What fills a solid.
+/// Medium inside a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Medium {
     /// Index of refraction.
@@ -96,25 +96,26 @@ pub struct Material {
     pub name: String,
     /// How the surface scatters light.
     pub surface: Surface,
-    /// Radiance that it sends out by itself, W/(m² sr) in each channel, alike in all directions of
-    /// its front side, where a triangle's corners run counterclockwise, or a sphere's outside.
+    /// Emitted radiance, W/(m² sr) per channel, constant over all directions of the front side. The
+    /// front side of a triangle is the one from which its corners run counterclockwise; that of a
+    /// sphere is its outside.
     pub emission: Vec3,
-    /// Its back sends out as much.
+    /// Whether the back side emits the same radiance.
     pub double_sided: bool,
 }
 
-/// The media of a scene. Each material that bounds a solid has a medium of its own, so that a path
-/// knows which solid it leaves.
+/// Media of a scene. Each material that bounds a solid has its own medium, which identifies the
+/// solid that a path leaves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MediaTable {
     /// The media, by index.
     pub media: Vec<Medium>,
-    /// Index of the medium of each material.
+    /// Index of the medium of each material, if it bounds a solid.
     of_materials: Vec<Option<u32>>,
 }
 
 impl MediaTable {
-    /// The media that `materials` bound, in their order.
+    /// Lists the media that `materials` bound, in the order of the materials.
     #[must_use]
     pub fn new(materials: &[Material]) -> Self {
         let mut table = Self::default();

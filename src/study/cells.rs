@@ -1,4 +1,4 @@
-//! Finished renders on the disk, by a hash of all that decides them.
+//! Disk cache of finished renders, keyed by a hash of all inputs that determine them.
 
 use std::{
     fs, io,
@@ -18,12 +18,13 @@ use crate::{
     stats::Stats,
 };
 
-/// All that decides a render, as text.
+/// All inputs that determine a render, as text.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key(String);
 
 impl Key {
-    /// Scenes and environments count by the bytes of their files ([`Scene::hash`]), not by their names.
+    /// Scenes and environments are identified by the bytes of their files ([`Scene::hash`]), not by
+    /// their names.
     pub fn new(gpu: &Gpu, scene: &Scene, settings: &Settings) -> Self {
         let settings = serde_json::to_string(settings).expect("settings hold nothing that JSON cannot");
         let (version, hash) = (env!("CARGO_PKG_VERSION"), &scene.hash);
@@ -43,28 +44,28 @@ impl Key {
     }
 }
 
-/// What was measured while a cell was rendered.
+/// Measurements of the render of a cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Measured {
     pub stats: Stats,
-    /// Of the global and of the caustic map; none where no photon was near.
+    /// Radii of the global and of the caustic map; `None` where no estimate found a photon.
     pub radii: [Option<Radii>; 2],
 }
 
-/// The file beside each picture.
+/// Record file beside each picture.
 #[derive(Serialize, Deserialize)]
 struct Record {
     key: String,
     measured: Measured,
 }
 
-/// The folder `cells` of a study.
+/// Folder `cells` of a study.
 pub(super) struct Cells {
     folder: PathBuf,
 }
 
 impl Cells {
-    /// Makes the folder where there is none.
+    /// Creates the folder if it does not exist.
     pub fn open(study: &Path) -> Result<Self> {
         let folder = study.join("cells");
         fs::create_dir_all(&folder).map_err(|source| failure(&folder, source))?;
@@ -80,18 +81,18 @@ impl Cells {
         self.folder.join(key.file_name() + ".exr")
     }
 
-    /// What was kept under the key. A cell that is damaged, or not ours, counts as missing.
+    /// Loads the record stored under the key. A damaged or foreign cell counts as missing.
     pub fn find(&self, key: &Key) -> Option<Measured> {
         let record: Record = serde_json::from_slice(&fs::read(self.record_path(key)).ok()?).ok()?;
         (record.key == key.0 && self.frame(key).is_ok()).then_some(record.measured)
     }
 
-    /// The picture that was kept under the key.
+    /// Loads the picture stored under the key.
     pub fn frame(&self, key: &Key) -> Result<Frame> {
         read_exr(&self.picture_path(key))
     }
 
-    /// The record is written last: it says that the picture is there.
+    /// The record is written last: its presence marks the picture as complete.
     pub fn keep(&self, key: &Key, scene: &Scene, settings: &Settings, frame: &Frame, measured: Measured) -> Result<()> {
         let origin = scene.origin(settings, &measured.stats);
         write_exr(&self.picture_path(key), frame, &origin)?;

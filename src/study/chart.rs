@@ -1,4 +1,4 @@
-//! Charts as SVG, drawn so that they read on light and on dark paper.
+//! Charts as SVG, legible on light and on dark backgrounds.
 
 use std::ops::Range;
 
@@ -20,11 +20,11 @@ pub(super) struct Series {
 
 /// Size of a chart, pixels.
 const SIZE: (u32, u32) = (680, 420);
-/// Room for the legend at the right.
+/// Width reserved for the legend at the right, pixels.
 const LEGEND: u32 = 190;
-/// The one colour that a page replaces by that of its text.
+/// Colour that a page replaces by its text colour.
 pub(super) const INK: &str = "#000000";
-/// Colours that those with weak colour vision tell apart, on light and on dark (Okabe and Ito 2008).
+/// Palette for colour vision deficiency, legible on light and on dark (Okabe and Ito 2008).
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -38,7 +38,7 @@ const COLORS: [RGBColor; 7] = [
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-/// Lines with both axes logarithmic. Points that are not positive are left out.
+/// Line chart with logarithmic axes. Points that are not positive are left out.
 pub(super) fn line_chart(title: &str, x_name: &str, y_name: &str, series: &[Series]) -> String {
     let positive = |s: &Series| Series {
         name: s.name.clone(),
@@ -87,7 +87,8 @@ fn draw_lines(area: &Area, title: &str, x_name: &str, y_name: &str, series: &[Se
     Ok(())
 }
 
-/// A plane of values: colours go with their logarithm. `values` are rows of as many entries as there are columns.
+/// Heat map with colours by the logarithm of the value. `values` holds rows with one entry per
+/// column.
 pub(super) fn heat_map(title: &str, columns: &[String], rows: &[String], values: &[Vec<Option<f64>>]) -> String {
     const CELL: (i32, i32) = (104, 52);
     const CORNER: (i32, i32) = (110, 66);
@@ -123,7 +124,8 @@ pub(super) fn heat_map(title: &str, columns: &[String], rows: &[String], values:
     })
 }
 
-/// A colour of the scale viridis, 0 to 1, and one that reads on it; neither is [`INK`].
+/// Colour of the viridis scale at 0 to 1, and a text colour with contrast to it; neither is
+/// [`INK`].
 fn viridis(place: f64) -> (RGBColor, RGBColor) {
     let [r, g, b] = colorous::VIRIDIS.eval_continuous(place.clamp(0.0, 1.0)).as_array();
     let ink = if place < 0.55 { RGBColor(255, 255, 255) } else { RGBColor(1, 1, 1) };
@@ -132,7 +134,7 @@ fn viridis(place: f64) -> (RGBColor, RGBColor) {
 
 fn svg(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {
     let mut text = String::new();
-    // Drawing into a string fails only where a chart has no extent.
+    // Drawing into a string fails only for a chart of zero size.
     let drawn = {
         let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
         draw(&area).and_then(|()| area.present().map_err(Into::into))
@@ -140,7 +142,7 @@ fn svg(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {
     drawn.map_or_else(|error| message(size, &format!("this chart could not be drawn: {error}")), |()| text)
 }
 
-/// A chart's rectangle with a line of text in it.
+/// Rectangle of a heat map with a line of text.
 fn message((width, height): (u32, u32), line: &str) -> String {
     format!(
         r#"<svg width="{width}" height="{height}" viewBox="0 0 {width} {height}" xmlns="http://www.w3.org/2000/svg">"#
@@ -159,20 +161,20 @@ fn text(size: i32) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&BLACK)
 }
 
-/// A range that holds all values with room at both ends; `None` without a value.
+/// Range that contains all values with a margin at both ends; `None` without a value.
 fn decades(values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
     let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
-    // Wide enough that two powers of two lie in it.
+    // Minimum range, which contains two powers of two.
     let room = (high / low).powf(0.06).max(if high < 2.0 * low { 2.0 } else { 1.15 });
     (low <= high).then(|| low / room..high * room)
 }
 
-/// Marks stand at powers of ten, or of two on a short axis.
+/// Tick marks at powers of ten, or of two on a short axis.
 fn base(range: &Range<f64>) -> f64 {
     if range.end / range.start > 50.0 { 10.0 } else { 2.0 }
 }
 
-/// A number at an axis.
+/// Formats a tick label.
 fn tick(x: f64) -> String {
     let text = brief(x);
     if text.contains('.') && !text.contains('e') {

@@ -1,4 +1,5 @@
-//! What a university report on photon mapping claims, put to the test: each answer is computed from the rows of a figure.
+//! Tests of the claims of a university report on photon mapping: each answer is computed from the
+//! rows of a figure.
 
 use serde::Serialize;
 
@@ -10,11 +11,11 @@ use super::{Figure, Question, Row, findings};
 pub enum Verdict {
     Holds,
     DoesNotHold,
-    /// The run has not what it takes to tell.
+    /// The rows do not suffice to decide.
     Unknown,
 }
 
-/// A claim, what was measured, and whether they agree.
+/// Answer to a question: a claim, the measurement, and whether they agree.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Claim {
     pub question: Question,
@@ -26,7 +27,7 @@ pub struct Claim {
 }
 
 impl Question {
-    /// The claim, and the rule by which it is judged.
+    /// The claim and its acceptance rule.
     fn texts(self) -> (&'static str, &'static str) {
         match self {
             Self::Energy => (
@@ -73,7 +74,7 @@ impl Question {
     }
 }
 
-/// The answers to a figure's questions.
+/// Answers a figure's questions.
 pub(super) fn answers(figure: &Figure, rows: &[Row]) -> Vec<Claim> {
     let good: Vec<&Row> = figure.combinations().map(|i| &rows[i]).filter(|row| row.error.is_none()).collect();
     figure.questions.iter().map(|&question| answer(question, &good)).collect()

@@ -1,4 +1,4 @@
-//! Every claim holds on rows made so that it does, and does not on rows made wrong.
+//! Each claim holds for rows that satisfy it and fails for rows that contradict it.
 
 use super::*;
 use crate::{
@@ -48,7 +48,7 @@ fn plane() -> Vec<Row> {
     rows
 }
 
-/// Makes a row wrong.
+/// Change that makes a row contradict the claim.
 type Spoil = fn(&mut Row);
 
 fn verdict(question: Question, rows: &[Row]) -> Verdict {

@@ -1,5 +1,5 @@
-//! Where two surfaces meet in a corner that is open to the viewer: there the nearest photons lie on both, and an
-//! estimate that takes them for one plane is too bright.
+//! Concave corners between two visible surfaces. There the nearest photons lie on both surfaces,
+//! and an estimate that assumes one plane is too bright.
 
 use glam::Vec3;
 
@@ -8,12 +8,12 @@ use crate::{
     scene::{Camera, Projection},
 };
 
-/// Cosine between normals below which surfaces meet in a corner and not in a curve.
+/// Cosine between normals below which two surfaces form a corner and not a curve.
 const BENT: f32 = 0.7;
-/// Half of the width of the region, as a part of the picture's height.
+/// Half of the region's width relative to the picture's height.
 const REACH: f32 = 1.0 / 48.0;
 
-/// The pixels near such corners.
+/// Pixels near concave corners.
 pub(super) fn corner_region(frame: &Frame, camera: &Camera) -> Vec<bool> {
     let (width, height) = (frame.width as usize, frame.height as usize);
     let points = Points::new(frame, camera);
@@ -37,12 +37,12 @@ pub(super) fn corner_region(frame: &Frame, camera: &Camera) -> Vec<bool> {
     region
 }
 
-/// First hits in world space.
+/// First hits, world space, metres.
 struct Points<'a> {
     frame: &'a Frame,
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
-    /// Width of each pixel where its first hit is, metres.
+    /// Width of each pixel at the distance of its first hit, metres.
     widths: Vec<f32>,
 }
 
@@ -71,10 +71,11 @@ impl<'a> Points<'a> {
         Self { frame, positions, normals, widths }
     }
 
-    /// Whether the surfaces at two pixels, `step` apart, belong to one concave corner: neither is the silhouette of
-    /// something before the other, and each lies before the other's plane.
+    /// Whether the surfaces at two pixels, `step` apart, form one concave corner: neither occludes
+    /// the other, and each lies in front of the other's plane.
     fn meet(&self, a: usize, b: usize, step: usize) -> bool {
-        // Pixels that hold more than one surface have no normal of their own.
+        // The normals of a pixel that shows more than one surface are averaged to less than unit
+        // length.
         let whole = |i: usize| self.frame.alpha()[i] > 0.99 && self.normals[i].length_squared() > 0.98;
         let (na, nb, between) = (self.normals[a], self.normals[b], self.positions[b] - self.positions[a]);
         let near = 8.0 * step as f32 * self.widths[a].min(self.widths[b]);
@@ -94,7 +95,8 @@ mod tests {
 
     const SIZE: u32 = 48;
 
-    /// What a camera at the origin sees of two planes that meet on its axis at depth 2; `depth` of the tangent.
+    /// Layers of two planes that meet on the axis of a camera at the origin at depth 2; `depth`
+    /// maps the tangent of the view angle to the depth.
     fn wedge(sign: f32) -> (Frame, Camera) {
         let camera = Camera {
             name: String::new(),

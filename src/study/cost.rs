@@ -1,4 +1,4 @@
-//! How far a study is, and how long it will still take.
+//! Progress of a study and estimate of the remaining time.
 
 use std::{
     fmt,
@@ -11,27 +11,27 @@ use crate::{
     settings::Settings,
 };
 
-/// How far a study is.
+/// Progress of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// What is being rendered, as `diffuse.gltf, hybrid, n = 10k, k = 50`.
+    /// The current render in words, such as `diffuse.gltf, hybrid, n = 10k, k = 50`.
     pub cell: String,
-    /// Its number, from 1, of those that are to be rendered now.
+    /// One-based number of the current cell among those to render.
     pub number: usize,
-    /// Cells to be rendered now.
+    /// Number of cells to render.
     pub total: usize,
-    /// Cells that were there already.
+    /// Number of cells found on the disk.
     pub kept: usize,
-    /// Part of the work that is done, 0 to 1.
+    /// Completed fraction of the work, 0 to 1.
     pub done: f64,
     /// Estimate; `None` until there is one.
     pub seconds_left: Option<f64>,
 }
 
-/// Listener of a study. Its methods are called often and must return at once.
+/// Observer of a study. Its methods are called often and must return at once.
 pub trait Watch: Sync {
     fn report(&self, state: &State);
-    /// The study should end as soon as it can; what is finished is kept.
+    /// Whether the study should stop as soon as possible; finished cells are kept.
     fn stop_requested(&self) -> bool;
 }
 
@@ -42,7 +42,8 @@ impl Watch for crate::progress::Silent {
     }
 }
 
-/// Work of a cell, in arbitrary units: samples times neighbours, and photons. Only its proportions count.
+/// Work of a cell in arbitrary units, from samples times neighbours and from photons. Only ratios
+/// matter.
 pub(super) fn work(settings: &Settings) -> f64 {
     let (width, height) = settings.picture.size.unwrap_or((512, 512));
     let samples = f64::from(width) * f64::from(height) * f64::from(settings.picture.spp);
@@ -51,7 +52,7 @@ pub(super) fn work(settings: &Settings) -> f64 {
     1e5 + samples * (10.0 + gather) + f64::from(settings.photons.global)
 }
 
-/// Turns the stages of one render after the other into the progress of the whole.
+/// Maps the progress of successive renders to the progress of the study.
 pub(super) struct Meter<'a> {
     watch: &'a dyn Watch,
     started: Instant,
@@ -72,7 +73,7 @@ impl<'a> Meter<'a> {
         Self { watch, started: Instant::now(), total_work, state: Mutex::new((state, Work::default())) }
     }
 
-    /// A cell begins.
+    /// Marks the beginning of a cell.
     pub fn begin(&self, cell: String, settings: &Settings) {
         self.update(|state, work_done| {
             state.cell = cell;
@@ -82,7 +83,7 @@ impl<'a> Meter<'a> {
         });
     }
 
-    /// The cell is done, or has failed.
+    /// Marks the end of a cell, finished or failed.
     pub fn end(&self) {
         self.update(|_, work_done| {
             work_done.finished += work_done.current;
@@ -91,7 +92,7 @@ impl<'a> Meter<'a> {
         });
     }
 
-    /// `change` returns the part of the current cell that is done.
+    /// Applies `change`, which returns the completed fraction of the current cell.
     fn update(&self, change: impl FnOnce(&mut State, &mut Work) -> f64) {
         let mut guard = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let (state, work_done) = &mut *guard;

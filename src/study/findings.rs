@@ -1,4 +1,4 @@
-//! What rows say to the claims: each function looks at the rows of one figure.
+//! Evaluation of the claims: each function examines the rows of one figure.
 
 use super::{
     Row,
@@ -6,17 +6,19 @@ use super::{
 };
 use crate::settings::Mode;
 
-/// Part by which means may differ and still count as the same.
+/// Relative tolerance within which two means count as equal.
 const SAME_LIGHT: f64 = 0.05;
-/// The same for scenes whose lights hang in different places, of which the picture sees more or less.
+/// The same tolerance between scenes whose lights have different positions, which changes how much
+/// of their light the picture shows.
 const ABOUT_THE_SAME_LIGHT: f64 = 0.25;
-/// Factor by which times may differ and still count as the same.
+/// Factor within which two times count as equal.
 const SAME_TIME: f64 = 1.25;
 
-/// What was measured, and whether the claim holds; `None` if there is too little to tell.
+/// Measurement, and whether the claim holds; `None` if the rows do not suffice to decide.
 pub(super) type Finding = Option<(String, bool)>;
 
-/// Rows of one scene, mode and further value, sorted by what varies; only those with two or more.
+/// Groups rows by scene, mode and a further value, and sorts each group by the varying parameter.
+/// Groups of fewer than two rows are left out.
 fn series<'a>(rows: &[&'a Row], fixed: fn(&Row) -> u32, varied: fn(&Row) -> u32) -> Vec<Vec<&'a Row>> {
     let mut sorted: Vec<&Row> = rows.iter().copied().filter(|row| row.mode.traces_photons()).collect();
     let group = |row: &Row| (row.scene.clone(), row.mode as u32, fixed(row));
@@ -37,7 +39,7 @@ fn ends<'a>(group: &[&'a Row]) -> (&'a Row, &'a Row) {
     (group[0], group[group.len() - 1])
 }
 
-/// Smallest and largest.
+/// Minimum and maximum.
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.fold(None, |range, x| Some(range.map_or((x, x), |(low, high): (f64, f64)| (low.min(x), high.max(x)))))
 }
@@ -63,7 +65,8 @@ pub(super) fn gather_dominates(rows: &[&Row]) -> Finding {
     Some((text, most == shares.len()))
 }
 
-/// Growth of the gather's time from the first to the last row of each group, as text and as smallest and largest.
+/// Growth of the gather's time from the first to the last row of each group, as text and as minimum
+/// and maximum.
 fn growth(groups: &[Vec<&Row>]) -> Option<(f64, f64)> {
     let of = |group: &Vec<&Row>| {
         let (first, last) = ends(group);
@@ -72,7 +75,7 @@ fn growth(groups: &[Vec<&Row>]) -> Option<(f64, f64)> {
     range(groups.iter().map(of)).filter(|(low, high)| low.is_finite() && high.is_finite())
 }
 
-/// One factor, or the smallest and the largest.
+/// Formats one factor, or the minimum and the maximum.
 fn factors((low, high): (f64, f64)) -> String {
     let (low, high) = (brief(low), brief(high));
     if low == high { low } else { format!("{low} to {high}") }
@@ -127,7 +130,7 @@ pub(super) fn noise_for_bias(rows: &[&Row]) -> Finding {
     let seen = |row: &&&Row| row.bias > row.bias_limit;
     let of = |group: &Vec<&Row>| {
         let (first, last) = ends(group);
-        // Where noise hides the bias there is nothing to compare.
+        // A bias below its detection limit cannot be compared.
         let low = group[..group.len() - 1].iter().find(seen)?;
         let text = format!(
             "n = {}: noise {} at k = {} and {} at k = {}, bias {} at k = {} and {} at k = {}",
@@ -163,7 +166,8 @@ pub(super) fn corners_bright(rows: &[&Row]) -> Finding {
     (!smooth.is_empty()).then(|| (text, most > 1.01 && smooth.iter().all(|(_, ratio)| *ratio > 1.0)))
 }
 
-/// Direct light by photons over that by rays, for each scene; `true` where there are caustics as well.
+/// Ratio of direct light by photons to that by rays for each scene; `true` where caustics are
+/// present as well.
 fn photons_over_rays<'a>(rows: &[&'a Row]) -> Vec<(&'a Row, f64, bool)> {
     let rays = |scene: &str| rows.iter().find(|row| row.mode == Mode::DirectRays && row.scene == scene);
     let pair = |row: &&'a Row| {

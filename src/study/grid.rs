@@ -1,4 +1,4 @@
-//! The plan of a plain study: every mode with every n and every k.
+//! Grid plan: every mode with every n and every k.
 
 use super::{Combination, Figure, Look, Plan, Question, Subject, numbers::short};
 use crate::settings::{Mode, Settings};
@@ -24,7 +24,7 @@ pub fn grid(
     plan
 }
 
-/// Adds a figure of n down and k across, with its combinations.
+/// Adds a figure with n in rows and k in columns, and its combinations.
 pub(super) fn add_plane(
     plan: &mut Plan,
     subject: usize,

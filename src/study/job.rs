@@ -1,4 +1,4 @@
-//! The renders that combinations and references are made of.
+//! Render jobs of combinations and references.
 
 use super::{Combination, Finer, cells::Key};
 use crate::settings::{LightSettings, Mode, PhotonSettings, Settings};
@@ -16,14 +16,15 @@ pub(super) fn repeats(combination: &Combination) -> impl Iterator<Item = Setting
     (0..combination.repeats).map(|r| settings.clone().with(|s| s.photons.seed = settings.photons.seed.wrapping_add(r)))
 }
 
-/// What decides the photon maps: all cells with the same share them.
+/// Key of the photon maps: cells with equal keys use the same maps.
 pub(super) fn photon_part(settings: &Settings) -> (&LightSettings, &PhotonSettings) {
     (&settings.lights, &settings.photons)
 }
 
 /// Settings of the passes of a reference.
 pub(super) fn finer_settings(settings: &Settings, finer: Finer, mode: Mode) -> Vec<Settings> {
-    // Far from the seeds that a study counts up from its own.
+    // Offset that keeps the references' seeds apart from the seeds of the repeats, which count up
+    // from the settings' seed.
     const APART: u32 = 0x8000_0000;
     let seed = |pass: u32| settings.photons.seed.wrapping_add(APART).wrapping_add(pass);
     let pass = |pass: u32| {

@@ -1,4 +1,4 @@
-//! What is measured of a combination's renders.
+//! Measurements of a combination's renders.
 
 use serde::Serialize;
 
@@ -21,14 +21,15 @@ use crate::{
     stats::{MapStats, Seconds},
 };
 
-/// One combination: a line of the table. Numbers are means over its repeats unless said otherwise; all are zero or
-/// missing if it failed.
+/// Row of the table: one combination. Numbers are means over its repeats unless stated otherwise;
+/// all are zero or missing if it failed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// File name.
     pub scene: String,
     pub mode: Mode,
-    /// Photons that each map can hold; means nothing, as `neighbors`, where the mode traces none.
+    /// Capacity of each map, photons. Like `neighbors`, it has no meaning where the mode traces no
+    /// photons.
     pub photons: u32,
     pub neighbors: u32,
     /// Seed of the first repeat.
@@ -38,13 +39,15 @@ pub struct Row {
     pub width: u32,
     pub height: u32,
     pub spp: u32,
-    /// By stage. Those of `bvh`, `photons` and `grid` are shared by all combinations of the same photons.
+    /// Seconds by stage. Those of `bvh`, `photons` and `grid` are common to all combinations of the
+    /// same photons.
     pub seconds: Seconds,
     pub global: MapRow,
     pub caustic: MapRow,
     /// Of each channel over all pixels, W/(m² sr).
     pub mean_radiance: [f64; 3],
-    /// Standard deviation between the repeats, root of the mean over pixels and channels, W/(m² sr); from two repeats.
+    /// Standard deviation between the repeats, root of the mean over pixels and channels, W/(m²
+    /// sr); from two repeats.
     pub noise: Option<f64>,
     /// Against the reference, over all pixels and channels.
     pub rel_mse: Option<f64>,
@@ -52,38 +55,39 @@ pub struct Row {
     pub rmse: Option<f64>,
     /// Mean FLIP error of the tone-mapped pictures, 0 to 1.
     pub flip: Option<f64>,
-    /// What all repeats share of the error, root of the mean square over pixels and channels, W/(m² sr); from two repeats.
+    /// Bias: the error common to all repeats, root mean square over pixels and channels, W/(m² sr);
+    /// needs two repeats.
     pub bias: Option<f64>,
-    /// A smaller bias cannot be told from noise, W/(m² sr).
+    /// Detection limit of the bias, W/(m² sr): a smaller bias is indistinguishable from noise.
     pub bias_limit: Option<f64>,
-    /// Mean radiance near open corners over the reference's there, 1 is right.
+    /// Mean radiance near concave corners relative to the reference's there; 1 is correct.
     pub corner_ratio: Option<f64>,
-    /// Why it failed.
+    /// Error message of a failed combination.
     pub error: Option<String>,
     /// Of the first repeat.
     #[serde(skip)]
     pub(super) thumbnail: Thumbnail,
 }
 
-/// One of a combination's photon maps, of the first repeat.
+/// Statistics of one photon map of a combination, in the first repeat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MapRow {
-    /// Paths that the map is normalised by.
+    /// Number of emitted paths, which normalises the map.
     pub emitted: u64,
-    /// Photons in the map.
+    /// Number of photons in the map.
     pub stored: u64,
-    /// Of the estimates at all visible points.
+    /// Radii of the estimates at all visible points.
     pub radius: Option<Radii>,
 }
 
 impl Row {
-    /// Mean of the channels of [`Self::mean_radiance`].
+    /// Mean over the channels of [`Self::mean_radiance`], W/(m² sr).
     #[must_use]
     pub fn mean(&self) -> f64 {
         self.mean_radiance.iter().sum::<f64>() / 3.0
     }
 
-    /// The combination in words.
+    /// Description of the combination.
     #[must_use]
     pub fn name(&self) -> String {
         let mode = self.mode.name();
@@ -95,7 +99,7 @@ impl Row {
     }
 }
 
-/// A render in words.
+/// Description of a render.
 pub(super) fn name(scene: &str, s: &Settings) -> String {
     format!(
         "{scene}, {}, n = {}, k = {}, seed {}",
@@ -106,7 +110,7 @@ pub(super) fn name(scene: &str, s: &Settings) -> String {
     )
 }
 
-/// Measures the renders, one a repeat; none if the combination failed.
+/// Measures the renders, one per repeat; there are none if the combination failed.
 pub(super) fn measure(
     plan: &Plan,
     combination: &Combination,
@@ -197,14 +201,14 @@ fn map_row(map: MapStats, radius: Option<Radii>) -> MapRow {
     MapRow { emitted: map.emitted, stored: map.stored, radius }
 }
 
-/// Mean of the channels over the pixels of the region.
+/// Mean over the channels and the pixels of the region.
 fn mean_in(frame: &Frame, region: &[bool]) -> Option<f64> {
     let inside = || frame.radiance().iter().zip(region).filter(|(_, inside)| **inside).map(|(pixel, _)| pixel);
     let count = inside().count();
     (count > 0).then(|| inside().flatten().map(|&x| f64::from(x)).sum::<f64>() / (3 * count) as f64)
 }
 
-/// A small picture for the contact sheet, in sRGB.
+/// Thumbnail for the contact sheet, in sRGB.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Thumbnail {
     pub width: u32,
@@ -213,10 +217,10 @@ pub(super) struct Thumbnail {
 }
 
 impl Thumbnail {
-    /// Longest side, pixels.
+    /// Maximum side length, pixels.
     const SIDE: u32 = 192;
 
-    /// The picture made smaller by a whole factor, so that its noise stays what it looks like.
+    /// Reduces the picture by an integer factor, which preserves the look of its noise.
     pub fn new(frame: &Frame, look: Look) -> Self {
         let factor = frame.width.max(frame.height).div_ceil(Self::SIDE).max(1);
         let (width, height) = ((frame.width / factor).max(1), (frame.height / factor).max(1));

@@ -1,10 +1,12 @@
-//! Photons against neighbours: renders many combinations of settings, measures each, and reports them together.
+//! Studies of photon count against neighbour count: renders many combinations of settings, measures
+//! each, and reports them together.
 //!
-//! A [`Plan`] lists [`Combination`]s of a scene and settings, and [`Figure`]s that arrange them in rows and columns and
-//! put [`Question`]s to them. [`fn@run`] makes one render a combination and repeat, a cell, with photons traced once for
-//! all cells that share them. Finished cells are kept in the folder under a hash of all that decides them, so that an
-//! interrupted study goes on where it stopped. Out come [`Results`]: a [`Row`] a combination, and answers. [`fn@write`]
-//! makes tables, a contact sheet, plots and a page of them.
+//! A [`Plan`] lists [`Combination`]s of a scene and settings, and [`Figure`]s that arrange them in
+//! rows and columns and ask [`Question`]s about them. [`fn@run`] makes one render, a cell, per
+//! combination and repeat, and traces photons once for all cells with the same maps. Finished cells
+//! are stored in the folder under a hash of all their inputs, so that an interrupted study resumes.
+//! The [`Results`] hold a [`Row`] per combination and the answers. [`fn@write`] writes them as
+//! tables, a contact sheet, plots and a page.
 
 mod cells;
 mod chart;

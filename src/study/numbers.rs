@@ -1,6 +1,6 @@
-//! Numbers as text.
+//! Numbers formatted as text.
 
-/// 1000 as `1k`, 1500000 as `1.5M`; exact.
+/// Formats 1000 as `1k` and 1500000 as `1.5M`; exact.
 pub(super) fn short(n: u32) -> String {
     match n {
         0 => "0".to_string(),
@@ -10,7 +10,7 @@ pub(super) fn short(n: u32) -> String {
     }
 }
 
-/// Three digits that count.
+/// Formats a number with three significant digits.
 pub(super) fn brief(x: f64) -> String {
     let magnitude = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
     if x != 0.0 && !(-3..=5).contains(&magnitude) {

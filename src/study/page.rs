@@ -1,4 +1,4 @@
-//! The page: all of a study in one file, without a network.
+//! HTML page of a study: one self-contained file.
 
 use std::io;
 

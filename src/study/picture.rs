@@ -1,4 +1,4 @@
-//! One picture with the radii of its estimates, and the mean of several.
+//! A picture with the radii of its estimates, and the mean of several pictures.
 
 use super::{cells::Measured, radii::Counts};
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
     settings::Settings,
 };
 
-/// Counts the radii of the estimates of each map.
+/// Histogram of the estimates' radii, per map.
 #[derive(Default)]
 struct Radii(ByKind<Counts>);
 
@@ -21,7 +21,8 @@ impl Observer for Radii {
     }
 }
 
-/// One picture of the maps and the radii of its estimates. No estimates are shared.
+/// Renders one picture of the maps and counts the radii of its estimates. No two visible points
+/// share an estimate.
 pub(super) fn picture(
     session: &Session,
     maps: &PhotonMaps,
@@ -38,7 +39,7 @@ pub(super) fn picture(
     Ok((film.finish(), Measured { stats, radii: [radii.0.global.finish(), radii.0.caustic.finish()] }))
 }
 
-/// Mean of pictures of one size; the other layers are the first one's.
+/// Mean radiance of pictures of equal size; the other layers are those of the first.
 pub(super) fn mean_frame(frames: Vec<Frame>) -> Frame {
     let scale = 1.0 / frames.len().max(1) as f32;
     let mut frames = frames.into_iter();

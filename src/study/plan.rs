@@ -1,4 +1,4 @@
-//! What a study is to do.
+//! Plan of a study.
 
 use serde::Serialize;
 
@@ -10,54 +10,55 @@ use crate::{
     settings::{Mode, Settings},
 };
 
-/// A study: what to render, and how to show it.
+/// Plan of a study: what to render, and how to show it.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Heads the page.
+    /// Title of the page.
     pub title: String,
     pub subjects: Vec<Subject>,
-    /// Each once.
+    /// Combinations, each listed once.
     pub combinations: Vec<Combination>,
     pub figures: Vec<Figure>,
     pub look: Look,
 }
 
-/// A scene, and what its pictures are measured against.
+/// A scene and the reference for its pictures.
 #[derive(Clone, Debug)]
 pub struct Subject {
     pub scene: Scene,
     pub reference: Reference,
 }
 
-/// The picture that counts as right.
+/// Reference for the error of a picture.
 #[derive(Clone, Debug)]
 pub enum Reference {
     None,
-    /// A picture that was brought along, for all modes.
+    /// A given picture, for all modes.
     Picture {
         name: String,
         frame: Box<Frame>,
     },
-    /// Much finer renders of our own, one for all modes that show the same light.
+    /// Finer renders made by the study, one for all modes that show the same light.
     Finer(Finer),
 }
 
-/// How much finer a reference of our own is: the mean of several passes of more photons.
+/// Settings of a rendered reference: the mean of several passes with more photons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Finer {
-    /// Photons that each map can hold.
+    /// Capacity of each map, photons.
     pub photons: u32,
     pub neighbors: u32,
     pub spp: u32,
-    /// Passes of different seeds.
+    /// Number of passes, each with its own seed.
     pub passes: u32,
 }
 
-/// Photons that a pass of a reference stops at, unless the study itself asks for more.
+/// Maximum number of photons in a pass of a reference, unless the study itself uses more.
 const MOST_PHOTONS: u32 = 1_000_000;
 
 impl Finer {
-    /// Ten times the photons of the study's finest map within reason, in several passes of so many samples a pixel.
+    /// Default for a study: several passes with ten times the photons of its finest map, up to a
+    /// limit, and `samples` samples a pixel.
     #[must_use]
     pub fn than(most_photons: u32, spp: u32) -> Self {
         let photons = most_photons.saturating_mul(10).min(MOST_PHOTONS.max(most_photons));
@@ -65,28 +66,28 @@ impl Finer {
     }
 }
 
-/// A scene under settings, in one row of the table.
+/// A scene with settings: one row of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Combination {
     /// Index into [`Plan::subjects`].
     pub subject: usize,
-    /// Repeat r, from 0, has the seed `settings.photons.seed` + r.
+    /// Settings of the renders. Repeat r, from 0, has the seed `settings.photons.seed` + r.
     pub settings: Settings,
-    /// Renders of different seeds, ≥ 1.
+    /// Number of renders with different seeds, ≥ 1.
     pub repeats: u32,
-    /// Whether it is measured against the subject's reference.
+    /// Whether the renders are compared with the subject's reference.
     pub measured: bool,
 }
 
-/// Combinations in rows and columns: a part of the contact sheet and of the page.
+/// Combinations in rows and columns, shown together on the contact sheet and the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
     pub title: String,
     pub columns: Vec<String>,
-    /// Label and combinations, as many as there are columns, by index into [`Plan::combinations`].
+    /// Rows: a label, and for each column an index into [`Plan::combinations`].
     pub rows: Vec<(String, Vec<Option<usize>>)>,
     pub questions: Vec<Question>,
-    /// Whether it is a plane of n down and k across, which is plotted.
+    /// Whether the figure is a plane with n in rows and k in columns, which is plotted.
     pub plane: bool,
 }
 
@@ -97,17 +98,18 @@ impl Figure {
     }
 }
 
-/// How pictures are shown.
+/// Display of the pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Look {
-    /// Stops by which pictures are brightened.
+    /// Exposure of the displayed pictures, stops.
     pub exposure: f32,
     pub tonemap: Tonemap,
 }
 
 impl Plan {
-    /// Adds a combination, or finds it; the larger number of repeats stays. Where no photons are traced, n and k make no
-    /// difference and are the defaults. A study is of estimates: each point has its own.
+    /// Adds a combination, or finds an equal one and keeps the larger number of repeats. Where no
+    /// photons are traced, n and k have no effect and are set to the defaults. Sharing of estimates
+    /// is switched off: a study measures one estimate per visible point.
     pub fn add(&mut self, mut new: Combination) -> usize {
         new.settings.estimate.share_reach = 0.0;
         if !new.settings.photons.mode.traces_photons() {
@@ -127,10 +129,11 @@ impl Plan {
         self.combinations.len() - 1
     }
 
-    /// Checks all that can be checked before the work.
+    /// Checks everything that can be checked before rendering.
     ///
     /// # Errors
-    /// Settings out of their range, scenes that cannot be rendered, a reference of another size than the pictures.
+    /// Fails for settings out of range, scenes that cannot be rendered, and a reference whose size
+    /// differs from the pictures'.
     pub fn check(&self) -> Result<()> {
         for subject in &self.subjects {
             subject.scene.check_renderable()?;
@@ -159,7 +162,8 @@ impl Plan {
     }
 }
 
-/// The mode whose picture is right for a mode: by photons or by rays, direct light is the same light.
+/// Mode of the reference for a mode: direct light by photons and by rays has the same expected
+/// value.
 pub(super) fn reference_mode(mode: Mode, has_delta: bool) -> Mode {
     match mode {
         Mode::Photons => Mode::Hybrid,

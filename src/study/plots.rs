@@ -1,4 +1,4 @@
-//! The plots of a study.
+//! Plots of a study.
 
 use super::{
     Figure, Row,
@@ -6,14 +6,15 @@ use super::{
     numbers::short,
 };
 
-/// A plot: the stem of its file's name, and the picture as SVG.
+/// Plot: file stem, and the picture as SVG.
 #[derive(Clone, Debug)]
 pub(super) struct Plot {
     pub stem: String,
     pub svg: String,
 }
 
-/// Plots of all planes of n and k: error against time, cost against k and against n, error over the plane.
+/// Plots of all planes of n and k: error against time, cost against k and against n, error over the
+/// plane.
 pub(super) fn plots(figures: &[Figure], rows: &[Row]) -> Vec<Plot> {
     let planes: Vec<&Figure> = figures.iter().filter(|figure| figure.plane).collect();
     planes.iter().flat_map(|figure| of_plane(figure, rows, planes.len() > 1)).collect()
@@ -50,7 +51,7 @@ fn of_plane(figure: &Figure, rows: &[Row], several: bool) -> Vec<Plot> {
     plots
 }
 
-/// One line a name, in the order in which names and points come.
+/// Groups the points into one line per name, in the order of their first appearance.
 fn lines(rows: &[&Row], name: impl Fn(&Row) -> String, point: impl Fn(&Row) -> Option<(f64, f64)>) -> Vec<Series> {
     let mut lines: Vec<Series> = Vec::new();
     for row in rows {

@@ -12,7 +12,7 @@ use crate::{
 const PHOTONS: [u32; 4] = [1_000, 10_000, 50_000, 100_000];
 const NEIGHBORS: [u32; 4] = [1, 10, 50, 100];
 
-/// The scenes, in the order in which they are indices here; in the report they are 1, 2 and 4.
+/// Scenes, in the order of the indices used here; the report numbers them 1, 2 and 4.
 const MIRROR_AND_GLASS: usize = 0;
 const DIFFUSE: usize = 1;
 const DIFFUSE_IN_GLASS: usize = 2;
@@ -21,11 +21,12 @@ const THREE_LIGHTS: usize = 4;
 const FILES: [&str; 5] =
     ["mirror-and-glass.gltf", "diffuse.gltf", "diffuse-in-glass.gltf", "one-light.gltf", "three-lights.gltf"];
 
-/// The report's figures, each at its own n and k; all else is as the settings say. `scale` multiplies every n, 1 for the
-/// report itself. References are our own, where a figure needs one.
+/// Plans the report's figures, each with its own n and k and otherwise the given settings. `scale`
+/// multiplies every n; 1 reproduces the report. Where a figure needs a reference, the study renders
+/// it.
 ///
 /// # Errors
-/// A scene that is missing in the folder or cannot be read.
+/// Fails if a scene is missing in the folder or cannot be read.
 pub fn report(folder: &Path, settings: &Settings, repeats: u32, scale: f64, look: Look) -> Result<Plan> {
     let scenes = FILES.iter().map(|file| Scene::load(&folder.join(file))).collect::<Result<Vec<_>>>()?;
     let scaled = |n: u32| ((f64::from(n) * scale).round() as u32).max(1);
@@ -47,7 +48,7 @@ pub fn report(folder: &Path, settings: &Settings, repeats: u32, scale: f64, look
     Ok(figures.plan)
 }
 
-/// A plan that grows figure by figure.
+/// Builder that adds figures to a plan.
 struct Figures<'a> {
     plan: Plan,
     settings: &'a Settings,
@@ -96,7 +97,7 @@ impl Figures<'_> {
         self.figure(&title, names(&modes), vec![("scene 1".to_string(), cells)], &[Question::DeltaShadows]);
     }
 
-    /// The whole plane, and the report's two lines in it.
+    /// The whole plane, and the report's two lines through it.
     fn plane(&mut self) {
         let photons = PHOTONS.map(self.scaled);
         let along_n = self.add_plane(&photons, &[10], "More photons at k = 10 (scene 1)".to_string());

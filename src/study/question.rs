@@ -1,4 +1,4 @@
-//! The claims that a figure can be asked about.
+//! Questions: the claims that a figure can test.
 
 use serde::Serialize;
 
@@ -19,7 +19,7 @@ pub enum Question {
 }
 
 impl Question {
-    /// What can be asked of a plane of n and k.
+    /// Questions that a plane of n and k can answer.
     pub(super) const OF_A_PLANE: [Self; 7] = [
         Self::Energy,
         Self::GatherDominates,

@@ -8,15 +8,16 @@ use crate::layout::Gathered;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Radii {
     pub min: f32,
-    /// To within 0.1 %.
+    /// Median, to within 0.1 %, metres.
     pub median: f32,
     pub max: f32,
 }
 
-/// Leading bits of a squared radius that choose its bin: sign, exponent and 9 of the mantissa, so 2⁻¹⁰ of a radius.
+/// Leading bits of a squared radius that select its bin: sign, exponent and 9 bits of mantissa, a
+/// relative resolution of 2⁻¹⁰ in radius.
 const SHIFT: u32 = 14;
 
-/// Counts of radii, in memory that does not grow with the picture.
+/// Histogram of radii, in memory independent of the picture's size.
 pub(super) struct Counts {
     bins: Vec<u64>,
     total: u64,
@@ -31,7 +32,7 @@ impl Default for Counts {
 }
 
 impl Counts {
-    /// Points without a photon have no radius.
+    /// Points without a photon have no radius and are not counted.
     pub fn add(&mut self, gathered: &[Gathered]) {
         let squares = gathered.iter().filter(|g| g.count > 0).map(|g| g.radius_squared);
         for square in squares.filter(|s| s.is_finite() && *s >= 0.0) {
@@ -42,14 +43,14 @@ impl Counts {
         }
     }
 
-    /// `None` if there was no radius.
+    /// Statistics of the counted radii; `None` if there are none.
     pub fn finish(&self) -> Option<Radii> {
         let mut below = 0;
         let bin = self.bins.iter().position(|count| {
             below += count;
             2 * below >= self.total && self.total > 0
         })?;
-        // The bin's middle, within what was seen.
+        // Centre of the bin, clamped to the minimum and maximum radius counted.
         let middle = f32::from_bits(((bin as u32) << SHIFT) | (1 << (SHIFT - 1)));
         let median = middle.clamp(self.min, self.max).sqrt();
         Some(Radii { min: self.min.sqrt(), median, max: self.max.sqrt() })

@@ -1,4 +1,4 @@
-//! Renders what is not there yet and measures all.
+//! Runs a study: renders the missing cells and measures all.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -23,27 +23,27 @@ use crate::{
     stats::DeviceStats,
 };
 
-/// What a study found.
+/// Results of a study.
 #[derive(Clone, Debug)]
 pub struct Results {
     pub device: DeviceStats,
-    /// As [`Plan::combinations`].
+    /// Rows in the order of [`Plan::combinations`].
     pub rows: Vec<Row>,
-    /// What the references are, one line each.
+    /// Descriptions of the references, one line each.
     pub references: Vec<String>,
-    /// Cells rendered now.
+    /// Number of cells rendered by this run.
     pub rendered: usize,
-    /// Cells that were there already.
+    /// Number of cells found on the disk.
     pub kept: usize,
-    /// What failed and why, one line each.
+    /// Failures with their causes, one line each.
     pub failures: Vec<String>,
 }
 
-/// Runs the study in the folder, which is made where there is none.
+/// Runs the study in the folder, which is created if it does not exist.
 ///
 /// # Errors
-/// What [`Plan::check`] finds, a folder that cannot be written, or [`Error::Stopped`]. A cell that fails is no error
-/// but stands in its row and in [`Results::failures`].
+/// Fails with the errors of [`Plan::check`], for a folder that cannot be written, or with
+/// [`Error::Stopped`]. A failed cell is not an error; its row and [`Results::failures`] record it.
 pub fn run(gpu: &Gpu, plan: &Plan, folder: &Path, watch: &dyn Watch) -> Result<Results> {
     plan.check()?;
     let cells = Cells::open(folder)?;
@@ -65,7 +65,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, folder: &Path, watch: &dyn Watch) -> Result<R
     })
 }
 
-/// Failed cells, and why.
+/// Failed cells and their error messages.
 type Failed = BTreeMap<Key, String>;
 
 struct Study<'a> {
@@ -75,7 +75,8 @@ struct Study<'a> {
 }
 
 impl Study<'_> {
-    /// All renders, references first, each once, in an order in which those that share photons follow each other.
+    /// All renders, each once, references first, ordered so that renders of the same photons are
+    /// adjacent.
     fn jobs(&self) -> Vec<Job> {
         let mut jobs: Vec<Job> = Vec::new();
         let mut add = |subject: usize, settings: Settings| {
@@ -98,7 +99,7 @@ impl Study<'_> {
         Key::new(self.gpu, &self.plan.subjects[subject].scene, settings)
     }
 
-    /// Settings of the renders that make up a combination's reference, if that is our own.
+    /// Settings of the passes of a combination's reference, if the study renders it.
     fn reference_cells(&self, combination: &Combination) -> Vec<Settings> {
         let subject = &self.plan.subjects[combination.subject];
         let (Reference::Finer(finer), true) = (&subject.reference, combination.measured) else { return Vec::new() };
@@ -130,7 +131,7 @@ impl Study<'_> {
                         for job in sharing {
                             failed.insert(job.key.clone(), format!("{}: {text}", self.name(job)));
                         }
-                        // The first was begun above.
+                        // The first cell was begun above.
                         meter.end();
                         for job in &sharing[1..] {
                             self.begin(job, meter)?;
@@ -149,7 +150,7 @@ impl Study<'_> {
         Ok(())
     }
 
-    /// All pictures of one set of maps.
+    /// Renders all pictures of one set of maps.
     fn render_sharing(
         &self,
         session: &Session,
@@ -175,7 +176,7 @@ impl Study<'_> {
         Ok(())
     }
 
-    /// A tiny render before the first that is timed: drivers compile kernels when they are used first.
+    /// Warm-up render before the first timed one: drivers compile kernels at their first dispatch.
     fn warm_up(&self, session: &Session, settings: &Settings) -> Result<()> {
         session.prefetch(settings);
         let tiny = settings.clone().with(|s| {
@@ -200,7 +201,7 @@ impl Study<'_> {
             let error = keys.iter().find_map(|key| failed.get(key)).cloned();
             let mut renders = Vec::new();
             for key in keys.iter().filter(|_| error.is_none()) {
-                // Nobody but us has had the folder since it was filled or checked.
+                // This run has filled or checked the folder, so its cells exist.
                 let lost = || Error::Gpu("a finished cell has gone from the folder; run the study again".to_string());
                 renders.push((self.cells.frame(key)?, self.cells.find(key).ok_or_else(lost)?));
             }
@@ -209,7 +210,7 @@ impl Study<'_> {
         Ok(rows)
     }
 
-    /// The picture that is right for the combination; `None` if there is none or it has failed.
+    /// Reference picture of the combination; `None` if there is none or its render failed.
     fn reference<'r>(
         &'r self,
         combination: &Combination,
@@ -255,7 +256,8 @@ impl Study<'_> {
     }
 }
 
-/// Why a cell failed, as one line; a study that is to stop, or whose device is lost, stops here: what it has is kept.
+/// Converts the error of a failed cell to one line. A stop request or a lost device is returned as
+/// an error and ends the study; finished cells are kept.
 fn one_line(error: Error) -> Result<String> {
     match error {
         Error::Stopped | Error::Lost { .. } => Err(error),

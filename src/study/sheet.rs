@@ -1,4 +1,4 @@
-//! The contact sheet: all pictures of a figure, with captions.
+//! Contact sheet: all pictures of a figure, with captions.
 
 use std::io;
 
@@ -17,7 +17,7 @@ const PAPER: Rgb8 = [24, 24, 27];
 const INK: Rgb8 = [236, 236, 238];
 const SOFT: Rgb8 = [160, 160, 168];
 const MISSING: Rgb8 = [60, 40, 40];
-/// Pixels between things.
+/// Gap between elements, pixels.
 const GAP: u32 = 8;
 /// Height of a line of text, pixels.
 const LINE: u32 = 17;
@@ -25,7 +25,7 @@ const TITLE_FONT: &MonoFont = &FONT_9X15_BOLD;
 const LABEL_FONT: &MonoFont = &FONT_6X13_BOLD;
 const CAPTION_FONT: &MonoFont = &FONT_7X13;
 
-/// Figures below each other as a PNG file.
+/// Draws the figures below each other into a PNG file.
 pub(super) fn contact_sheet(figures: &[Figure], rows: &[Row]) -> io::Result<Vec<u8>> {
     let layouts: Vec<Layout> = figures.iter().map(|figure| Layout::new(figure, rows)).collect();
     let width = layouts.iter().map(Layout::width).max().unwrap_or(0).max(1);
@@ -39,17 +39,17 @@ pub(super) fn contact_sheet(figures: &[Figure], rows: &[Row]) -> io::Result<Vec<
     canvas.to_png()
 }
 
-/// Where the parts of a figure stand.
+/// Layout of a figure.
 struct Layout<'a> {
     figure: &'a Figure,
-    /// Room for each picture, pixels.
+    /// Size reserved for each picture, pixels.
     cell: (u32, u32),
-    /// Room for the labels at the left.
+    /// Width reserved for the labels at the left, pixels.
     labels: u32,
 }
 
 impl<'a> Layout<'a> {
-    /// Least width of a cell: its caption must fit.
+    /// Minimum width of a column, in which the caption fits, pixels.
     const NARROWEST: u32 = 148;
 
     fn new(figure: &'a Figure, rows: &[Row]) -> Self {

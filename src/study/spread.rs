@@ -1,8 +1,9 @@
-//! Noise and bias: how renders of different seeds differ from each other, and what they share of the error.
+//! Noise and bias: the deviation between renders of different seeds, and the error that they have
+//! in common.
 
 use crate::image::Frame;
 
-/// Side of the blocks whose differences tell how sure the bias is, pixels.
+/// Side of the blocks over which the standard error of the bias is estimated, pixels.
 const BLOCK: usize = 8;
 
 /// Bias of renders of different seeds against a reference.
@@ -10,11 +11,13 @@ const BLOCK: usize = 8;
 pub(super) struct Bias {
     /// Root of the mean square over pixels and channels, W/(m² sr).
     pub value: f64,
-    /// A smaller one cannot be told from noise: the root of two standard errors of the square.
+    /// Detection limit: the root of two standard errors of the square, W/(m² sr). A smaller bias is
+    /// indistinguishable from noise.
     pub limit: f64,
 }
 
-/// Root of the mean over pixels and channels of the unbiased variance between renders; `None` of fewer than two.
+/// Root of the mean over pixels and channels of the unbiased variance between renders; `None` of
+/// fewer than two.
 pub(super) fn noise(frames: &[&Frame]) -> Option<f64> {
     let count = frames.len() as f64;
     let values = frames.first()?.radiance().len() * 3;
@@ -29,8 +32,9 @@ pub(super) fn noise(frames: &[&Frame]) -> Option<f64> {
     Some(((0..values).map(variance).sum::<f64>() / values as f64).sqrt())
 }
 
-/// Products of two renders' differences from the reference hold no noise on average, for that is independent. `None` of
-/// fewer than two renders, or of a picture without a pixel.
+/// Estimates the squared bias from products of two renders' differences from the reference: their
+/// noise is independent and averages to zero. `None` for fewer than two renders or an empty
+/// picture.
 pub(super) fn bias(frames: &[&Frame], reference: &Frame) -> Option<Bias> {
     let count = frames.len() as f64;
     if frames.len() < 2 || reference.radiance().is_empty() {
@@ -45,14 +49,14 @@ pub(super) fn bias(frames: &[&Frame], reference: &Frame) -> Option<Bias> {
             let difference = |frame: &&Frame| f64::from(frame.radiance()[i][c]) - f64::from(*right);
             let sum: f64 = frames.iter().map(difference).sum();
             let squares: f64 = frames.iter().map(|frame| difference(frame).powi(2)).sum();
-            // The mean of the products over all pairs.
+            // Mean of the products over all pairs.
             block.0 += (sum * sum - squares) / (count * (count - 1.0));
             block.1 += 1.0;
         }
     }
     let values: f64 = blocks.iter().map(|(_, n)| n).sum();
     let square = blocks.iter().map(|(sum, _)| sum).sum::<f64>() / values;
-    // Each block departs from what its size lets expect.
+    // Deviation of each block from the value expected for its size.
     let departures: f64 = blocks.iter().map(|(sum, n)| (sum - square * n).powi(2)).sum();
     Some(Bias { value: square.max(0.0).sqrt(), limit: (2.0 * departures.sqrt() / values).sqrt() })
 }
@@ -66,7 +70,7 @@ mod tests {
         Frame::new(side, side, &radiance)
     }
 
-    /// A number from -1 to 1 that looks random.
+    /// Pseudorandom number from -1 to 1.
     fn random(i: u32, seed: u32) -> f32 {
         let mut h = i.wrapping_mul(0x9E37_79B9) ^ seed.wrapping_mul(0x85EB_CA6B);
         for _ in 0..3 {

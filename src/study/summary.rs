@@ -1,10 +1,10 @@
-//! A study on the terminal: one line a combination, then the claims.
+//! Text summary of a study: one line per combination, then the claims.
 
 use std::fmt::Write;
 
 use super::{Plan, Results, Row, Verdict, claims::answers, numbers::brief};
 
-/// The table and the claims as text.
+/// Formats the table and the claims as text.
 #[must_use]
 pub fn summary(plan: &Plan, results: &Results) -> String {
     let mut text = format!(

@@ -1,4 +1,4 @@
-//! The tables: CSV for spreadsheets, JSON for scripts.
+//! Tables: CSV for spreadsheets, JSON for scripts.
 
 use serde::Serialize;
 
@@ -55,7 +55,7 @@ fn of_photons(row: &Row, value: u32) -> String {
     if row.mode.traces_photons() { value.to_string() } else { String::new() }
 }
 
-/// All digits that count, without an exponent that a spreadsheet may not read.
+/// Formats all significant digits without an exponent, which some spreadsheets cannot read.
 fn number(x: f64) -> String {
     let digits = if x.abs() >= 1.0 { 6 } else { (6.0 - x.abs().max(1e-12).log10().floor()) as usize };
     let text = format!("{x:.digits$}");
@@ -83,7 +83,7 @@ fn quoted(field: &str) -> String {
     }
 }
 
-/// What `study.json` holds.
+/// Contents of `study.json`.
 #[derive(Serialize)]
 struct Report<'a> {
     version: &'static str,

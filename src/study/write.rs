@@ -1,4 +1,4 @@
-//! The files of a study.
+//! Output files of a study.
 
 use std::{
     io,
@@ -11,11 +11,11 @@ use crate::{
     image::write_file,
 };
 
-/// Writes `study.csv`, `study.json`, `contact-sheet.png`, the plots as SVG, and `report.html` with all of them. Returns
-/// their paths.
+/// Writes `study.csv`, `study.json`, `contact-sheet.png`, the plots as SVG, and `report.html` with
+/// all of them. Returns their paths.
 ///
 /// # Errors
-/// [`Error::Io`] if one cannot be written; those that were written before it stay.
+/// [`Error::Io`] if a file cannot be written; files written before it stay.
 pub fn write(plan: &Plan, results: &Results, folder: &Path) -> Result<Vec<PathBuf>> {
     let other = |name: &str, source: io::Error| Error::Io { path: folder.join(name), source };
     let mut written = Vec::new();
@@ -39,7 +39,7 @@ pub fn write(plan: &Plan, results: &Results, folder: &Path) -> Result<Vec<PathBu
     Ok(written)
 }
 
-/// A plot that stands alone, on white: its ink is black wherever it is shown.
+/// Standalone version of a plot: black ink on white, whatever the viewer's colours.
 fn on_paper(svg: &str) -> String {
     svg.replacen('>', "><rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>", 1)
 }
