@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 
-use super::{Comparison, measure::Histogram, report::grouped};
+use super::{comparison::Comparison, measure::Histogram, report::grouped};
 use crate::{
     error::{Error, Result},
     html::{escaped, filled},

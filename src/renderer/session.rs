@@ -1,7 +1,6 @@
 //! A scene on the device, and the stages of a render one by one.
 
 use super::{
-    Render,
     gatherer::{MapGatherer, Observer, gather_for},
     maps::{PhotonMaps, trace_maps},
     tally,
@@ -11,7 +10,7 @@ use crate::{
     bvh::{Bvh, Media, MediaProbe, packed, too_deep},
     error::Result,
     gpu::Gpu,
-    image::Film,
+    image::{Film, Frame},
     passes::{CameraKernels, EstimateSharing, MapKernels, PhotonTracer},
     progress::{Progress, Stage},
     scene::Scene,
@@ -19,6 +18,15 @@ use crate::{
     stats::{DeviceStats, Stats, timed},
     upload::SceneBuffers,
 };
+
+/// A finished render.
+#[derive(Clone, Debug)]
+pub struct Render {
+    /// The picture.
+    pub frame: Frame,
+    /// What happened.
+    pub stats: Stats,
+}
 
 /// A scene on the device. Photons are traced once for each call of [`Self::photon_maps`]; any number
 /// of pictures can be made of the same maps.

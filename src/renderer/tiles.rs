@@ -6,7 +6,6 @@ use crate::{
     error::Result,
     gpu::{Buffer, Gpu},
     image::Film,
-    layout::VisiblePoint,
     passes::{CameraTracer, FinalGather, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
     scene::Camera,
@@ -137,16 +136,19 @@ impl<'a> CameraPass<'a> {
     }
 
     /// The tile's visible points, some slots without a point.
-    pub fn points(&self, tile: &Tile) -> Result<Vec<VisiblePoint>> {
+    #[cfg(feature = "report")]
+    pub fn points(&self, tile: &Tile) -> Result<Vec<crate::layout::VisiblePoint>> {
         self.gpu.read(&self.tracer.points, 0, self.tracer.point_count(tile).into())
     }
 
     /// Radiance from each of them so far.
+    #[cfg(feature = "report")]
     pub fn radiance(&self, tile: &Tile) -> Result<Vec<[f32; 4]>> {
         self.gpu.read(&self.tracer.radiance, 0, self.tracer.point_count(tile).into())
     }
 
     /// Replaces it.
+    #[cfg(feature = "report")]
     pub fn set_radiance(&self, radiance: &[[f32; 4]]) {
         self.gpu.write(&self.tracer.radiance, 0, radiance);
     }

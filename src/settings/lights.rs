@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Range, fail};
+use super::range::{Range, fail};
 use crate::error::Result;
 
 /// How photon paths are dealt to lights.

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Range, fail};
+use super::range::{Range, fail};
 use crate::error::Result;
 
 /// Longest path, surfaces: so far the key of a staged photon counts along its path.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Range, fail};
+use super::range::{Range, fail};
 use crate::{error::Result, pixel_filter::PixelFilter};
 
 /// Part of a picture, in pixels of the whole from its upper left corner; at least one pixel each

@@ -2,8 +2,7 @@
 
 use std::fmt;
 
-use super::fail;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Numbers that a [`Range`] can bound.
 pub trait Number: Copy + PartialOrd + fmt::Display + fmt::LowerExp {
@@ -89,6 +88,11 @@ impl<T: Number> fmt::Display for Range<T> {
             (true, true) => write!(f, "above {least}, at most {most}"),
         }
     }
+}
+
+/// The error of a setting outside its range.
+pub(super) fn fail(name: &'static str, value: String, problem: &str) -> Result<()> {
+    Err(Error::Setting { name, value, problem: problem.to_string() })
 }
 
 #[cfg(test)]

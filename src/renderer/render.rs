@@ -1,0 +1,32 @@
+//! The algorithm in one screen: a session used once.
+
+use std::time::Instant;
+
+use super::{
+    session::{Render, Session},
+    size::picture_size,
+};
+use crate::{error::Result, gpu::Gpu, progress::Progress, scene::Scene, settings::Settings};
+
+/// Renders the scene. The seconds of `load` are the caller's to add.
+///
+/// # Errors
+/// A setting out of its range, a scene without light or without anything to draw, a limit of the
+/// adapter, a fault of the driver, or [`crate::Error::Stopped`].
+pub fn render(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
+    let start = Instant::now();
+    check(scene, settings)?;
+    let session = Session::open(gpu, scene, &settings.lights, progress)?;
+    session.prefetch(settings);
+    let maps = session.photon_maps(&settings.photons, progress)?;
+    let mut render = session.picture(&maps, &settings.estimate, &settings.picture, progress)?;
+    render.stats.seconds.total = start.elapsed().as_secs_f64();
+    Ok(render)
+}
+
+/// Finds what is wrong with the settings before the work begins.
+pub(crate) fn check(scene: &Scene, settings: &Settings) -> Result<()> {
+    settings.check()?;
+    scene.check_renderable()?;
+    picture_size(scene.camera(settings.picture.camera.as_deref())?, &settings.picture).map(drop)
+}
