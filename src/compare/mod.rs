@@ -55,12 +55,14 @@ impl Default for Options {
 /// A finished comparison.
 #[derive(Clone, Debug)]
 pub struct Comparison {
+    /// Report of all queries.
     pub report: Report,
     /// Picture gathered with the grid.
     pub grid: Frame,
     /// Picture gathered with the kd-tree; all layers but the radiance are those of the grid's
     /// picture.
     pub kdtree: Frame,
+    /// Statistics of the stages and of the photon maps.
     pub stats: Stats,
     tolerance: f64,
     /// Number of queries that differ in photons that are not tied.

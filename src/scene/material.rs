@@ -8,13 +8,29 @@ use glam::Vec3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Surface {
     /// Lambert reflectance.
-    Diffuse { albedo: Vec3 },
+    Diffuse {
+        /// Fraction of the light reflected diffusely, per channel.
+        albedo: Vec3,
+    },
     /// Perfect mirror.
-    Mirror { tint: Vec3 },
+    Mirror {
+        /// Factor of the reflected radiance, per channel.
+        tint: Vec3,
+    },
     /// Closed solid of smooth dielectric.
-    Glass { ior: f32, tint: Vec3 },
+    Glass {
+        /// Index of refraction.
+        ior: f32,
+        /// Factor of the transmitted radiance at each crossing of the surface, per channel.
+        tint: Vec3,
+    },
     /// Thin smooth dielectric sheet, crossed in a straight line.
-    Pane { ior: f32, tint: Vec3 },
+    Pane {
+        /// Index of refraction.
+        ior: f32,
+        /// Factor of the transmitted radiance, per channel.
+        tint: Vec3,
+    },
 }
 
 impl Surface {
@@ -76,7 +92,9 @@ pub struct Medium {
 /// A named surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
+    /// Name in the scene's file.
     pub name: String,
+    /// Scattering model.
     pub surface: Surface,
     /// Emitted radiance, W/(m² sr) per channel, constant over all directions of the front side. The
     /// front side of a triangle is the one from which its corners run counterclockwise; that of a
@@ -90,6 +108,7 @@ pub struct Material {
 /// solid that a path leaves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MediaTable {
+    /// Media, in the order of the materials that bound them.
     pub media: Vec<Medium>,
     /// Index of the medium of each material, if it bounds a solid.
     of_materials: Vec<Option<u32>>,
