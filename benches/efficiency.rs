@@ -49,7 +49,7 @@ fn measure(scene: &str, setting: &str) {
     let median = seconds[RUNS / 2];
     let picture = read_exr(&out).expect("the program wrote a picture");
     let reference = read_exr(&folder.join(format!("{scene}.exr"))).expect("the reference reads");
-    let error = rel_mse(&picture.radiance(), &reference.radiance(), None);
+    let error = rel_mse(picture.radiance(), reference.radiance(), None);
     let efficiency = 1.0 / (error * median);
     println!("{scene:>5} {error:>10.5} {median:>9.3} {efficiency:>11.1}  {setting}");
     if let Err(e) = std::fs::remove_file(&out) {

@@ -79,7 +79,7 @@ fn queries() -> Vec<VisiblePoint> {
     let spread =
         |x: f32| (0..16).fold(0u64, |code, bit| code | (u64::from((x * 65535.0) as u32 >> bit & 1) << (3 * bit)));
     positions.sort_by_key(|p| spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2);
-    let point = |p: Vec3| VisiblePoint { position: p.into(), valid: 1, weight: [1.0; 3], ..VisiblePoint::default() };
+    let point = |p: Vec3| VisiblePoint { position: p.into(), next_map: 1, weight: [1.0; 3], ..VisiblePoint::default() };
     positions.into_iter().map(point).collect()
 }
 

@@ -182,9 +182,9 @@ impl View<'_> {
         };
         let point = |i: usize| {
             let (position, normal) = (self.position(i), self.first_hits.normal()[i]);
-            let valid = u32::from(self.first_hits.alpha()[i] > 0.0 && !on_delta(position));
+            let next_map = u32::from(self.first_hits.alpha()[i] > 0.0 && !on_delta(position));
             let position = position.to_array();
-            VisiblePoint { position, valid, weight: [1.0; 3], ng: normal, ns: normal, ..VisiblePoint::default() }
+            VisiblePoint { position, next_map, weight: [1.0; 3], ng: normal, ns: normal, ..VisiblePoint::default() }
         };
         (0..(SIZE * SIZE) as usize).map(point).collect()
     }
@@ -199,7 +199,7 @@ impl View<'_> {
         let mut gather = Gather::new(gpu, GatherOptions::default());
         gather.run(gpu, map, &asked, count, &estimate, (&radiance, &gathered), &Silent)?;
         let found: Vec<Gathered> = gpu.read(&gathered, 0, count.into())?;
-        let radius = |i: usize| if points[i].valid == 0 { 0.0 } else { found[i].radius_squared.sqrt() };
+        let radius = |i: usize| if points[i].next_map == 0 { 0.0 } else { found[i].radius_squared.sqrt() };
         let valid = (0..points.len()).map(radius).filter(|r| *r > 0.0);
         let (least, most) = valid.fold((f32::INFINITY, 0.0_f32), |(l, m), r| (l.min(r), m.max(r)));
         println!("radii: {least:.4} m dark to {most:.4} m bright, logarithmic");

@@ -47,8 +47,8 @@ pub enum Error {
     },
     /// No memory of the device is left for something.
     #[error(
-        "no device memory is left for {what}{}; {adapter} has given {} MiB; ask for fewer --photons, for a smaller scene, or \
-        use another --device",
+        "no device memory is left for {what}{}; {adapter} has given {} MiB; ask for fewer `photons.global`, for a smaller scene, or \
+        use another `device`",
         needed.map_or(String::new(), |bytes| format!(" of {bytes} bytes")),
         used >> 20
     )]
@@ -64,8 +64,8 @@ pub enum Error {
     },
     /// The device is gone in the middle of the work.
     #[error(
-        "the device was lost: {adapter}: {why}; run it again, with fewer --photons or a smaller -k if work took too long, or \
-        with another --device"
+        "the device was lost: {adapter}: {why}; run it again, with fewer `photons.global` or a smaller `estimate.neighbors` if work took too long, or \
+        with another `device`"
     )]
     Lost {
         /// Name of the adapter.
@@ -79,7 +79,7 @@ pub enum Error {
     /// A setting outside its range.
     #[error("{name} {value}: {problem}")]
     Setting {
-        /// Name of the setting.
+        /// Path of the setting in [`crate::Settings`], such as `picture.spp`, or the name of another input.
         name: &'static str,
         /// Its value.
         value: String,

@@ -216,9 +216,8 @@ pub struct Photon {
 pub struct VisiblePoint {
     /// Metres.
     pub position: [f32; 3],
-    /// 0 if the camera path ended without a point; else the turn from which on light is missing, 1 at first: the maps are
-    /// gathered in turns from 1.
-    pub valid: u32,
+    /// 0: no point. Otherwise the first map, from 1, that is not gathered here yet.
+    pub next_map: u32,
     /// Weight of the camera path times the BRDF, albedo/π: multiplies irradiance.
     pub weight: [f32; 3],
     /// Distance by which a ray that leaves must be moved along `ng` off the surface, metres.
@@ -522,14 +521,14 @@ pub struct MapInfo {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct GatherInfo {
-    /// Queries of the batch, valid or not.
+    /// Queries of the batch, also those without a point.
     pub count: u32,
     /// Index of the batch's first point.
     pub first: u32,
     /// k.
     pub neighbors: u32,
-    /// 1 if all photons within the largest radius are taken, however many.
-    pub takes_all: u32,
+    /// 1: the radius is the maximum radius, whatever the number of photons.
+    pub fixed_radius: u32,
     /// Square of the largest radius, m²; negative if there is none.
     pub max_radius_squared: f32,
     /// 1 / number of emitted paths.
@@ -541,8 +540,8 @@ pub struct GatherInfo {
     /// Coefficients of the kernel's polynomial from the rim, see [`crate::density`]: the first four, and the fifth.
     pub kernel: [f32; 4],
     pub kernel_fifth: f32,
-    /// Points take part whose [`VisiblePoint::valid`] is not 0 and at most this.
-    pub turn: u32,
+    /// Number of the map gathered, from 1. Points take part whose [`VisiblePoint::next_map`] is not 0 and at most this.
+    pub map_number: u32,
     pub pad0: u32,
     pub pad1: u32,
 }
@@ -585,7 +584,7 @@ pub struct ShareRound {
     /// Visible points of the tile, without its margin.
     pub points: u32,
     /// As in [`GatherInfo`].
-    pub turn: u32,
+    pub map_number: u32,
 }
 
 /// Consecutive entries that one invocation of the radix sort walks.

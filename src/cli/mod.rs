@@ -8,6 +8,7 @@ mod compare;
 mod devices;
 mod environment;
 mod files;
+mod flags;
 mod info;
 mod loading;
 mod options;

@@ -2,9 +2,11 @@
 
 use std::io::{self, Write};
 
-/// One line on stderr.
+use super::flags::with_flags;
+
+/// One line on stderr; settings that the library names are flags in it.
 pub fn say(line: &str) {
-    let _ = writeln!(io::stderr().lock(), "{line}");
+    let _ = writeln!(io::stderr().lock(), "{}", with_flags(line));
 }
 
 /// Text on stdout: what was asked for.

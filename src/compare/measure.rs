@@ -58,7 +58,7 @@ impl Measure {
         kdtree: &[Estimate],
         explains: impl Fn(usize, &Gathered) -> bool,
     ) {
-        for i in (0..points.len()).filter(|&i| points[i].valid != 0) {
+        for i in (0..points.len()).filter(|&i| points[i].next_map != 0) {
             let (gathered, estimate) = (&grid.gathered[i], &kdtree[i]);
             let same = sets_agree(gathered, estimate);
             self.queries += 1;
@@ -167,7 +167,7 @@ mod tests {
         let place = |&x: &f32| PhotonPlace { position: [x, 0.0, 0.0], wi: octahedral(glam::Vec3::Y) };
         let flux = PhotonFlux { flux: [1.0; 3], normal: 0 };
         let up = [0.0, 1.0, 0.0];
-        let point = VisiblePoint { valid: 1, ng: up, ns: up, weight: [1.0; 3], ..VisiblePoint::default() };
+        let point = VisiblePoint { next_map: 1, ng: up, ns: up, weight: [1.0; 3], ..VisiblePoint::default() };
         (KdMap::new(distances.iter().map(place).collect(), vec![flux; distances.len()], 1), point)
     }
 

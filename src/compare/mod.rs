@@ -5,7 +5,7 @@
 //! may differ in what rounding decides: where the last photon of an estimate and the next one are
 //! tied (their squared distances differ by at most [`TIE`]), either may be summed. Such queries are
 //! counted, may differ in tied photons only, and do not enter the differences of radius and
-//! radiance. Both make the report's raw estimate, whatever [`Settings::raw_estimate`] says.
+//! radiance. Both make the report's raw estimate, whatever [`EstimateSettings::raw`] says.
 
 mod measure;
 mod page;
@@ -170,13 +170,13 @@ impl Gatherer for Sides<'_> {
 fn check(settings: &Settings, options: &Options) -> Result<()> {
     let fail = |name, value: String, problem: &str| Err(Error::Setting { name, value, problem: problem.to_string() });
     if !settings.photons.mode.traces_photons() {
-        return fail("mode", settings.photons.mode.name().to_string(), "has no photons to compare");
+        return fail("photons.mode", settings.photons.mode.name().to_string(), "has no photons to compare");
     }
     if settings.photons.final_gather > 0 {
-        return fail("final-gather", settings.photons.final_gather.to_string(), "is not compared");
+        return fail("photons.final_gather", settings.photons.final_gather.to_string(), "is not compared");
     }
     if settings.estimate.search == Search::Radius {
-        return fail("search", "radius".to_string(), "has no nearest photons to compare");
+        return fail("estimate.search", "radius".to_string(), "has no nearest photons to compare");
     }
     if !(options.tolerance >= 0.0 && options.tolerance.is_finite()) {
         return fail("tolerance", options.tolerance.to_string(), "must be at least 0");

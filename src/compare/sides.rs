@@ -133,7 +133,7 @@ impl<'a> KdTreeGather<'a> {
     pub fn leave_out(&mut self, count: u32, points: &[VisiblePoint]) -> u32 {
         let Some(map) = self.maps.first_mut() else { return 0 };
         let limit = self.settings.estimate.max_radius.map_or(f32::INFINITY, |r| r * r);
-        let valid: Vec<&VisiblePoint> = points.iter().filter(|p| p.valid != 0).collect();
+        let valid: Vec<&VisiblePoint> = points.iter().filter(|p| p.next_map != 0).collect();
         let places = (count as usize).min(valid.len());
         let mut lost = 0;
         for point in (0..places).map(|i| valid[i * valid.len() / places]) {

@@ -213,7 +213,7 @@ impl LightTable {
         };
         let names: Vec<String> = self.groups.iter().map(|group| format!("{:?}", group.name)).collect();
         let problem = format!("no light is called {name:?}; the scene has {}", names.join(", "));
-        Err(Error::Setting { name: "light-photons", value: format!("{name}={weight}"), problem })
+        Err(Error::Setting { name: "lights.photon_weights", value: format!("{name}={weight}"), problem })
     }
 }
 

@@ -83,7 +83,7 @@ impl Fault {
                 "{of} refused a command: {why}; this is a bug of caustica or of the driver, please report it"
             )),
             Self::Internal(why) => {
-                Error::Gpu(format!("the driver of {of} failed: {why}; update the driver or use another --device"))
+                Error::Gpu(format!("the driver of {of} failed: {why}; update the driver or use another `device`"))
             }
             Self::Lost(why) => Error::Lost { adapter: of, why },
         }
@@ -121,10 +121,10 @@ mod tests {
     fn each_fault_says_what_to_do_in_one_line() {
         let text = |fault: Fault| fault.into_error("X", "Y 1", 3 << 20).to_string();
         for (fault, said) in [
-            (Fault::Memory, "--photons"),
+            (Fault::Memory, "`photons.global`"),
             (Fault::Refused(one_line("In a\n  pass")), "In a pass; this is a bug"),
             (Fault::Internal("boom".to_string()), "update the driver"),
-            (Fault::Lost("reset".to_string()), "--device"),
+            (Fault::Lost("reset".to_string()), "`device`"),
         ] {
             let line = text(fault);
             assert!(line.contains(said) && line.contains('X') && !line.contains('\n'), "{line}");

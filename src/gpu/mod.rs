@@ -152,7 +152,7 @@ impl Gpu {
                 limit: "maxStorageBufferRange",
                 adapter: self.name.clone(),
                 allowed: self.max_binding(),
-                advice: "ask for less or use another --device".to_string(),
+                advice: "ask for less or use another `device`".to_string(),
             });
         }
         use wgpu::BufferUsages as U;

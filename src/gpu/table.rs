@@ -48,7 +48,7 @@ impl Table {
                 limit: "maxImageDimension2D",
                 adapter: gpu.name.clone(),
                 allowed: most,
-                advice: "ask for less or use another --device".to_string(),
+                advice: "ask for less or use another `device`".to_string(),
             });
         }
         let columns = (texels as u32).clamp(1, TABLE_COLUMNS);

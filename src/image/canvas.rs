@@ -31,11 +31,13 @@ impl Canvas {
         Self { width, height, pixels: color.repeat(width as usize * height as usize) }
     }
 
+    /// Width in pixels.
     #[must_use]
     pub fn width(&self) -> u32 {
         self.width
     }
 
+    /// Height in pixels.
     #[must_use]
     pub fn height(&self) -> u32 {
         self.height

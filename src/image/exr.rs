@@ -39,6 +39,7 @@ pub struct Provenance<'a> {
     pub scene_hash: &'a str,
     /// The light from all around, if there is any.
     pub environment: Option<EnvironmentProvenance<'a>>,
+    /// Settings of the render.
     pub settings: &'a Settings,
     /// Of these the device and the photon counts are kept: equal runs give equal files.
     pub stats: &'a Stats,
@@ -53,6 +54,7 @@ pub struct EnvironmentProvenance<'a> {
     pub hash: &'a str,
     /// Of a uniform one: W/(m² sr) in each channel.
     pub radiance: Option<[f32; 3]>,
+    /// Factor on its radiance, at least 0.
     pub strength: f32,
     /// Radians.
     pub rotation: f32,

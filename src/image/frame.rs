@@ -10,6 +10,7 @@ pub struct DataWindow {
     pub whole: (u32, u32),
     /// Pixel of the part's upper left corner.
     pub column: u32,
+    /// Row of the same pixel, from 0 at the top.
     pub row: u32,
 }
 
@@ -24,7 +25,9 @@ impl DataWindow {
 /// A finished frame, scene-linear, row 0 at the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
     /// Where the frame lies, if it is a part of a larger picture.
     pub window: Option<DataWindow>,

@@ -16,11 +16,13 @@ pub enum Rule {
 /// One layer: a few numbers for each pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer {
+    /// Name of the layer in [`super::Frame::layer`].
     pub name: &'static str,
     /// Names of its channels in an OpenEXR file.
     pub channels: &'static [&'static str],
     /// Where its sums begin in [`crate::layout::PixelSums`]: row, and number in the row.
     pub source: (usize, usize),
+    /// How the sums become a mean.
     pub rule: Rule,
     /// Value where a file lacks the channel; `None`: such a file is refused.
     pub missing: Option<f32>,

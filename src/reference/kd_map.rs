@@ -122,7 +122,7 @@ impl KdMap {
     ) -> Result<Vec<Estimate>> {
         let at = |point: &VisiblePoint| {
             progress.check()?;
-            Ok(if point.valid == 0 { Estimate::default() } else { self.estimate(point, settings) })
+            Ok(if point.next_map == 0 { Estimate::default() } else { self.estimate(point, settings) })
         };
         points.par_iter().map(at).collect()
     }

@@ -75,7 +75,7 @@ impl<'a> MapGatherer<'a> {
     ) -> Result<()> {
         let gathered = &pass.tracer.gathered;
         if self.observer.is_some() {
-            // Slots without a valid point would keep what an older tile left there.
+            // Slots without a point would keep what an older tile left there.
             let mut encoder = pass.gpu.encoder();
             encoder.clear_buffer(gathered, 0, None);
             pass.gpu.submit(encoder);
@@ -101,7 +101,7 @@ impl<'a> MapGatherer<'a> {
             done += step;
             let (radiance, gathered, count) = (shared.radiance, shared.gathered, pass.tracer.point_count(tile));
             for index in 0..self.maps.maps().len() {
-                let request = EstimateRequest { points, count, turn: 1, radiance, gathered };
+                let request = EstimateRequest { points, count, map_number: 1, radiance, gathered };
                 self.search.answer(pass, self.maps, index, self.estimate, &request, progress)?;
             }
         }
@@ -142,16 +142,16 @@ impl Searches<'_> {
     ) -> Result<()> {
         match self {
             Self::Grid(gather) => {
-                let (points, results) = ((request.count, request.turn), (request.radiance, request.gathered));
+                let (points, results) = ((request.count, request.map_number), (request.radiance, request.gathered));
                 let map = &maps.maps()[index];
-                gather.run_turn(pass.gpu, map, request.points, points, &pass.estimate, results, progress).map(drop)
+                gather.run_waiting(pass.gpu, map, request.points, points, &pass.estimate, results, progress).map(drop)
             }
             Self::KdTree(trees) => kd_estimates(pass.gpu, &trees[index], estimate, request, progress),
         }
     }
 }
 
-/// What [`Gather::run_turn`] does, by a tree.
+/// What [`Gather::run_waiting`] does, by a tree.
 fn kd_estimates(
     gpu: &Gpu,
     tree: &KdMap,
@@ -160,11 +160,11 @@ fn kd_estimates(
     progress: &dyn Progress,
 ) -> Result<()> {
     let mut points: Vec<VisiblePoint> = gpu.read(request.points, 0, request.count.into())?;
-    points.iter_mut().filter(|p| p.valid > request.turn).for_each(|p| p.valid = 0);
+    points.iter_mut().filter(|p| p.next_map > request.map_number).for_each(|p| p.next_map = 0);
     let mut radiance: Vec<[f32; 4]> = gpu.read(request.radiance, 0, request.count.into())?;
     let mut gathered: Vec<Gathered> = gpu.read(request.gathered, 0, request.count.into())?;
     for (i, estimate) in tree.gather(&points, settings, progress)?.into_iter().enumerate() {
-        if points[i].valid != 0 {
+        if points[i].next_map != 0 {
             (0..3).for_each(|c| radiance[i][c] += estimate.radiance[c] as f32);
             let Estimate { radius_squared, count, fingerprint, .. } = estimate;
             gathered[i] = Gathered { radius_squared, count, fingerprint };

@@ -22,7 +22,7 @@ pub(crate) fn picture_size(camera: &Camera, picture: &PictureSettings) -> Result
     });
     if width == 0 || height == 0 || u64::from(width) * u64::from(height) > MAX_PIXELS {
         return Err(Error::Setting {
-            name: "size",
+            name: "picture.size",
             value: format!("{width}x{height}"),
             problem: format!("must have from 1 to {MAX_PIXELS} pixels"),
         });
@@ -31,7 +31,7 @@ pub(crate) fn picture_size(camera: &Camera, picture: &PictureSettings) -> Result
         let inside = |first: u32, size: u32, whole: u32| size > 0 && first < whole && size <= whole - first;
         if !inside(column, w, width) || !inside(row, h, height) {
             return Err(Error::Setting {
-                name: "crop",
+                name: "picture.crop",
                 value: format!("{column},{row},{w},{h}"),
                 problem: format!("must have pixels, all of them in the picture of {width}x{height}"),
             });
@@ -41,10 +41,10 @@ pub(crate) fn picture_size(camera: &Camera, picture: &PictureSettings) -> Result
     let needed = BYTES_PER_PIXEL * u64::from(w) * u64::from(h);
     if let Some(free) = available().filter(|free| needed > *free) {
         return Err(Error::Setting {
-            name: "size",
+            name: "picture.size",
             value: format!("{width}x{height}"),
             problem: format!(
-                "needs about {} MiB of memory, {} MiB are free; ask for a smaller --size, or for parts of it with --crop",
+                "needs about {} MiB of memory, {} MiB are free; ask for a smaller `picture.size`, or for parts of it with `picture.crop`",
                 needed >> 20,
                 free >> 20
             ),

@@ -136,7 +136,7 @@ impl<'a> CameraPass<'a> {
         Ok((&gather.seen, gather.trace(self.gpu, self.scene, &self.tracer, tile, ray)?))
     }
 
-    /// The tile's visible points, some of them not valid.
+    /// The tile's visible points, some slots without a point.
     pub fn points(&self, tile: &Tile) -> Result<Vec<VisiblePoint>> {
         self.gpu.read(&self.tracer.points, 0, self.tracer.point_count(tile).into())
     }

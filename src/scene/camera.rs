@@ -10,9 +10,15 @@ use super::Bounds;
 #[serde(rename_all = "kebab-case")]
 pub enum Projection {
     /// Perspective projection; `yfov` is the full vertical field of view, radians, 0 < yfov < π.
-    Perspective { yfov: f32 },
+    Perspective {
+        /// Full vertical field of view, radians.
+        yfov: f32,
+    },
     /// Orthographic projection; `ymag` is half the height of the view, metres, > 0.
-    Orthographic { ymag: f32 },
+    Orthographic {
+        /// Half the height of the view, metres.
+        ymag: f32,
+    },
 }
 
 impl Projection {
@@ -29,12 +35,17 @@ impl Projection {
 /// A camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
+    /// Name in the file, or of the camera that frames the scene.
     pub name: String,
+    /// Position, metres.
     pub position: Vec3,
     /// Unit vectors of the camera frame: right, up, and the viewing direction.
     pub right: Vec3,
+    /// Upward unit vector.
     pub up: Vec3,
+    /// Unit vector of the viewing direction.
     pub forward: Vec3,
+    /// Projection.
     pub projection: Projection,
     /// Aspect ratio, width over height, if the file gives one.
     pub aspect: Option<f32>,

@@ -10,11 +10,15 @@ use super::{LightKind, Projection, Scene, words::one_line};
 /// radians.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneInfo {
+    /// File name without folders.
     pub file_name: String,
     /// SHA-256, in hexadecimal.
     pub hash: String,
+    /// Number of meshes in the file.
     pub meshes: usize,
+    /// Number of triangles.
     pub triangles: usize,
+    /// Number of exact spheres.
     pub spheres: usize,
     /// Corners of the bounding box of all geometry; `None` if there is no geometry.
     pub bounds: Option<[[f64; 3]; 2]>,
@@ -22,7 +26,9 @@ pub struct SceneInfo {
     pub lights: Vec<LightInfo>,
     /// Emissive materials in use.
     pub emitters: Vec<EmitterInfo>,
+    /// Cameras.
     pub cameras: Vec<CameraInfo>,
+    /// Materials.
     pub materials: Vec<MaterialInfo>,
     /// Features that are ignored or approximated.
     pub notes: Vec<String>,
@@ -31,7 +37,9 @@ pub struct SceneInfo {
 /// Punctual light.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LightInfo {
+    /// Name of the light.
     pub name: String,
+    /// Kind of the light.
     pub kind: LightKind,
     /// `None` for a directional light.
     pub position: Option<[f64; 3]>,
@@ -45,13 +53,17 @@ pub struct LightInfo {
 /// All surfaces of one emissive material.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EmitterInfo {
+    /// Name of the material.
     pub name: String,
+    /// Number of triangles of the material.
     pub triangles: usize,
+    /// Number of spheres of the material.
     pub spheres: usize,
     /// Area of one side, m².
     pub area: f64,
     /// Emitted radiance, W/(m² sr) in each channel.
     pub radiance: [f32; 3],
+    /// Whether both sides emit.
     pub double_sided: bool,
     /// Power, W in each channel: π times radiance and area, of both sides if the material is
     /// double-sided.
@@ -61,8 +73,11 @@ pub struct EmitterInfo {
 /// A camera.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CameraInfo {
+    /// Name of the camera.
     pub name: String,
+    /// Position, metres.
     pub position: [f64; 3],
+    /// Projection.
     pub projection: Projection,
     /// Aspect ratio, width over height, if the file gives one.
     pub aspect: Option<f32>,
@@ -71,6 +86,7 @@ pub struct CameraInfo {
 /// A material.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MaterialInfo {
+    /// Name of the material.
     pub name: String,
     /// Surface type that the material is read as.
     pub read_as: String,

@@ -20,6 +20,7 @@ pub struct Environment {
     pub hash: String,
     /// Size in pixels, each ≥ 1.
     pub width: u32,
+    /// Rows of pixels.
     pub height: u32,
     /// Radiance, W/(m² sr) in each channel, row by row; finite, ≥ 0.
     pub pixels: Vec<[f32; 3]>,

@@ -19,7 +19,12 @@ pub enum LightKind {
     Point,
     /// Full intensity within the inner cone, none outside the outer one; half angles in radians,
     /// 0 ≤ inner < outer ≤ π/2.
-    Spot { inner: f32, outer: f32 },
+    Spot {
+        /// Half angle of the inner cone, radians.
+        inner: f32,
+        /// Half angle of the outer cone, radians.
+        outer: f32,
+    },
     /// Parallel light from infinitely far away.
     Directional,
 }
@@ -27,7 +32,9 @@ pub enum LightKind {
 /// Punctual light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
+    /// Name in the file.
     pub name: String,
+    /// Kind of the light.
     pub kind: LightKind,
     /// Metres; unused by a directional light.
     pub position: Vec3,

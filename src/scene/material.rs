@@ -9,26 +9,26 @@ use glam::Vec3;
 pub enum Surface {
     /// Lambert reflectance.
     Diffuse {
-        /// Fraction of the light reflected diffusely, per channel.
+        /// Reflectance of each channel.
         albedo: Vec3,
     },
     /// Perfect mirror.
     Mirror {
-        /// Factor of the reflected radiance, per channel.
+        /// Colour of the specular lobe, see [`Surface::color`].
         tint: Vec3,
     },
     /// Closed solid of smooth dielectric.
     Glass {
         /// Index of refraction.
         ior: f32,
-        /// Factor of the transmitted radiance at each crossing of the surface, per channel.
+        /// Colour of the specular lobe, see [`Surface::color`].
         tint: Vec3,
     },
     /// Thin smooth dielectric sheet, crossed in a straight line.
     Pane {
         /// Index of refraction.
         ior: f32,
-        /// Factor of the transmitted radiance, per channel.
+        /// Colour of the specular lobe, see [`Surface::color`].
         tint: Vec3,
     },
 }
@@ -92,9 +92,9 @@ pub struct Medium {
 /// A named surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// Name in the scene's file.
+    /// Name in the file.
     pub name: String,
-    /// Scattering model.
+    /// How the surface scatters light.
     pub surface: Surface,
     /// Emitted radiance, W/(m² sr) per channel, constant over all directions of the front side. The
     /// front side of a triangle is the one from which its corners run counterclockwise; that of a
@@ -108,7 +108,7 @@ pub struct Material {
 /// solid that a path leaves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MediaTable {
-    /// Media, in the order of the materials that bound them.
+    /// The media, by index.
     pub media: Vec<Medium>,
     /// Index of the medium of each material, if it bounds a solid.
     of_materials: Vec<Option<u32>>,

@@ -43,8 +43,11 @@ pub struct Scene {
     pub hash: String,
     /// Offset subtracted from all world coordinates of the file: the centre of its geometry.
     pub center: DVec3,
+    /// Triangles of all meshes.
     pub triangles: Vec<Triangle>,
+    /// Exact spheres.
     pub spheres: Vec<Sphere>,
+    /// Materials; triangles and spheres refer to them by index.
     pub materials: Vec<Material>,
     /// Punctual lights.
     pub lights: Vec<Light>,
@@ -175,7 +178,7 @@ impl Scene {
             let list: Vec<String> =
                 self.cameras.iter().enumerate().map(|(i, camera)| format!("{i} {:?}", camera.name)).collect();
             Error::Setting {
-                name: "camera",
+                name: "picture.camera",
                 value: wanted.unwrap_or("0").to_owned(),
                 problem: format!("{} has the cameras {}", self.file_name, list.join(", ")),
             }
@@ -197,7 +200,7 @@ impl Scene {
         if self.lights.is_empty() && !self.has_emission() && self.environment.as_ref().is_none_or(Environment::is_dark)
         {
             let problem = "no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give \
-                           --env, --background or --default-light sky";
+                           `scene.environment`";
             return Err(error("scene", problem.to_owned()));
         }
         Ok(())

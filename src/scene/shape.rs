@@ -8,6 +8,7 @@ use glam::Vec3;
 /// counterclockwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
+    /// Vertices, metres.
     pub positions: [Vec3; 3],
     /// Unit vertex normals, interpolated across the face.
     pub normals: [Vec3; 3],
@@ -35,6 +36,7 @@ impl Triangle {
 /// An exact sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
+    /// Centre, metres.
     pub center: Vec3,
     /// Metres, > 0.
     pub radius: f32,
@@ -53,7 +55,9 @@ impl Sphere {
 /// Axis-aligned bounding box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
+    /// Smallest coordinates, metres.
     pub min: Vec3,
+    /// Largest coordinates, metres.
     pub max: Vec3,
 }
 

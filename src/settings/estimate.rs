@@ -8,14 +8,16 @@ use crate::{
     error::Result,
 };
 
-/// Which photons an estimate sums, and how they are found. Grid and kd-tree give the same picture but for rounding.
+/// Which photons an estimate sums, and how they are found. Grid and kd-tree give the same picture
+/// but for rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Search {
     /// The nearest, by the grid on the device.
     #[default]
     Grid,
-    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU; makes the raw estimate always.
+    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU; makes the raw estimate
+    /// always.
     KdTree,
     /// All within [`EstimateSettings::radius`], by the grid.
     Radius,
@@ -31,16 +33,19 @@ pub struct EstimateSettings {
     pub kernel: DensityKernel,
     /// Constant C of the cone filter, in [`Self::CONE_CONSTANT`].
     pub cone_constant: f32,
-    /// Bound of the search radius, metres, in [`Self::RADIUS`]; `None`: the nearest photons, however far.
+    /// Bound of the search radius, metres, in [`Self::RADIUS`]; `None`: the nearest photons,
+    /// however far.
     pub max_radius: Option<f32>,
     /// How photons are found.
     pub search: Search,
-    /// Radius of the estimate with [`Search::Radius`], metres, in [`Self::RADIUS`]; `None` with the others.
+    /// Radius of the estimate with [`Search::Radius`], metres, in [`Self::RADIUS`]; `None` with the
+    /// others.
     pub radius: Option<f32>,
-    /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the estimate of the report.
+    /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the
+    /// estimate of the report.
     pub raw: bool,
-    /// Distance within which visible points on one surface share an estimate, as a fraction of its radius, in
-    /// [`Self::SHARE_REACH`]; 0: every camera sample has its own.
+    /// Distance within which visible points on one surface share an estimate, as a fraction of its
+    /// radius, in [`Self::SHARE_REACH`]; 0: every camera sample has its own.
     pub share_reach: f32,
 }
 
@@ -64,7 +69,8 @@ impl EstimateSettings {
     pub const NEIGHBORS: Range<u32> = Range::closed(1, 1000);
     /// Range of [`Self::cone_constant`].
     pub const CONE_CONSTANT: Range<f32> = Range::at_least(1.0);
-    /// Range of [`Self::radius`] and [`Self::max_radius`], metres: the square of the largest is far from the largest float.
+    /// Range of [`Self::radius`] and [`Self::max_radius`], metres: the square of the largest is far
+    /// from the largest float.
     pub const RADIUS: Range<f32> = Range::above(0.0, 1e18);
     /// Range of [`Self::share_reach`].
     pub const SHARE_REACH: Range<f32> = Range::closed(0.0, 2.0);
@@ -80,15 +86,15 @@ impl EstimateSettings {
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        Self::NEIGHBORS.check("neighbors", self.neighbors)?;
-        Self::CONE_CONSTANT.check("cone-constant", self.cone_constant)?;
-        self.max_radius.map_or(Ok(()), |radius| Self::RADIUS.check("max-radius", radius))?;
-        Self::SHARE_REACH.check("share", self.share_reach)?;
+        Self::NEIGHBORS.check("estimate.neighbors", self.neighbors)?;
+        Self::CONE_CONSTANT.check("estimate.cone_constant", self.cone_constant)?;
+        self.max_radius.map_or(Ok(()), |radius| Self::RADIUS.check("estimate.max_radius", radius))?;
+        Self::SHARE_REACH.check("estimate.share_reach", self.share_reach)?;
         match (self.search, self.radius) {
-            (Search::Radius, None) => fail("search", "radius".to_string(), "needs a radius"),
-            (Search::Radius, Some(radius)) => Self::RADIUS.check("radius", radius),
+            (Search::Radius, None) => fail("estimate.search", "radius".to_string(), "needs a radius"),
+            (Search::Radius, Some(radius)) => Self::RADIUS.check("estimate.radius", radius),
             (_, None) => Ok(()),
-            (_, Some(radius)) => fail("radius", radius.to_string(), "goes with the search by radius only"),
+            (_, Some(radius)) => fail("estimate.radius", radius.to_string(), "goes with the search by radius only"),
         }
     }
 }

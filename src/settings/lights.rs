@@ -33,8 +33,8 @@ pub enum LightUnit {
 pub struct LightSettings {
     /// How photon paths are dealt to lights.
     pub sampling: LightSampling,
-    /// Names of lights, and the factor on the photons of each, in [`Self::PHOTON_WEIGHT`]. An emissive material or the
-    /// environment is a light of its name.
+    /// Names of lights, and the factor on the photons of each, in [`Self::PHOTON_WEIGHT`]. An
+    /// emissive material or the environment is a light of its name.
     pub photon_weights: Vec<(String, f64)>,
     /// How light intensities of the file are read.
     pub unit: LightUnit,
@@ -51,7 +51,7 @@ impl LightSettings {
     pub fn check(&self) -> Result<()> {
         let range = Self::PHOTON_WEIGHT;
         if let Some((light, weight)) = self.photon_weights.iter().find(|(_, weight)| !range.contains(*weight)) {
-            return fail("light-photons", format!("{light}={weight}"), &format!("the weight must be {range}"));
+            return fail("lights.photon_weights", format!("{light}={weight}"), &format!("the weight must be {range}"));
         }
         Ok(())
     }

@@ -58,14 +58,14 @@ impl Settings {
     }
 }
 
-/// Checks that numbers for sampling, which are counted in 32 bits over all samples of a pixel with four
-/// paths of each, suffice for a picture.
+/// Checks that numbers for sampling, which are counted in 32 bits over all samples of a pixel with
+/// four paths of each, suffice for a picture.
 pub(crate) fn check_samples(photons: &PhotonSettings, picture: &PictureSettings) -> Result<()> {
     let each = picture.light_samples.max(photons.final_gather).max(4);
     let most = (1_u64 << 32) / u64::from(each);
     if u64::from(picture.spp) > most {
         let problem = format!("must be at most {most} with these light samples and rays of final gathering");
-        return fail("spp", picture.spp.to_string(), &problem);
+        return fail("picture.spp", picture.spp.to_string(), &problem);
     }
     Ok(())
 }

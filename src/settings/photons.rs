@@ -20,7 +20,7 @@ pub enum Mode {
     Photons,
     /// 2: direct light by shadow rays only.
     DirectRays,
-    /// 3: light straight from the lights or through delta surfaces only, by photons.
+    /// 3: light straight from the lights or through specular surfaces only, by photons.
     DirectPhotons,
     /// 4: what mode 0 takes from photons. The only one that does not show what shines.
     IndirectPhotons,
@@ -72,7 +72,8 @@ impl Mode {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Emission {
-    /// Towards the scene, for the global map; and apart from that towards mirrors and glass, for the caustic map.
+    /// Towards the scene, for the global map; and apart from that towards mirrors and glass, for
+    /// the caustic map.
     #[default]
     Aimed,
     /// Wherever the lights shine, for both maps at once.
@@ -90,7 +91,8 @@ pub enum Sampler {
     Random,
 }
 
-/// What photon maps are traced by. Pictures made of the maps use the same mode, bound, sampler and seed.
+/// What photon maps are traced by. Pictures made of the maps use the same mode, bound, sampler and
+/// seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PhotonSettings {
@@ -100,21 +102,21 @@ pub struct PhotonSettings {
     pub global: u32,
     /// Photons that the caustic map can hold, in [`Self::CAPACITY`].
     pub caustic: u32,
-    /// Photon paths emitted at most, in [`Self::MAX_PATHS`], for each map by itself unless emission is unaimed; `None`:
-    /// 100 times the larger capacity.
+    /// Photon paths emitted at most, in [`Self::MAX_PATHS`], for each map by itself unless emission
+    /// is unaimed; `None`: 100 times the larger capacity.
     pub max_paths: Option<u64>,
     /// Where photon paths are sent.
     pub emission: Emission,
-    /// Longest photon path and longest delta chain of a camera path, surfaces, in [`Self::MAX_BOUNCES`]; 0:
-    /// roulette alone ends paths.
+    /// Longest photon path and longest specular chain of a camera path, surfaces, in
+    /// [`Self::MAX_BOUNCES`]; 0: roulette alone ends paths.
     pub max_bounces: u32,
     /// Numbers for sampling.
     pub sampler: Sampler,
     /// Decides all randomness.
     pub seed: u32,
-    /// Rays of final gathering per visible point, in [`Self::FINAL_GATHER`]: light that comes over another surface is what they see of
-    /// the global map there, not what that map holds at the point itself; 0: without. In the modes hybrid and
-    /// indirect-photons.
+    /// Rays of final gathering per visible point, in [`Self::FINAL_GATHER`]: light that comes over
+    /// another surface is what they see of the global map there, not what that map holds at the
+    /// point itself; 0: without. In the modes hybrid and indirect-photons.
     pub final_gather: u32,
 }
 
@@ -144,8 +146,8 @@ impl PhotonSettings {
     /// Range of [`Self::final_gather`], rays.
     pub const FINAL_GATHER: Range<u32> = Range::closed(0, 65_536);
 
-    /// The global map stores photons that come straight from a light (LD): as the mode says, and for rays of final
-    /// gathering.
+    /// The global map stores photons that come straight from a light (LD): as the mode says, and
+    /// for rays of final gathering.
     #[must_use]
     pub fn stores_direct(&self) -> bool {
         self.mode.stores_direct() || self.final_gather > 0
@@ -162,13 +164,14 @@ impl PhotonSettings {
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        Self::FINAL_GATHER.check("final-gather", self.final_gather)?;
+        Self::FINAL_GATHER.check("photons.final_gather", self.final_gather)?;
         if self.final_gather > 0 && !matches!(self.mode, Mode::Hybrid | Mode::IndirectPhotons) {
             let problem = format!("goes with the modes hybrid and indirect-photons, not {}", self.mode.name());
-            return fail("final-gather", self.final_gather.to_string(), &problem);
+            return fail("photons.final_gather", self.final_gather.to_string(), &problem);
         }
-        Self::CAPACITY.check("photons", self.global.min(self.caustic))?;
-        Self::MAX_BOUNCES.check("max-bounces", self.max_bounces)?;
-        self.max_paths.map_or(Ok(()), |paths| Self::MAX_PATHS.check("max-paths", paths))
+        Self::CAPACITY.check("photons.global", self.global)?;
+        Self::CAPACITY.check("photons.caustic", self.caustic)?;
+        Self::MAX_BOUNCES.check("photons.max_bounces", self.max_bounces)?;
+        self.max_paths.map_or(Ok(()), |paths| Self::MAX_PATHS.check("photons.max_paths", paths))
     }
 }

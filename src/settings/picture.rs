@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::{Range, fail};
 use crate::{error::Result, pixel_filter::PixelFilter};
 
-/// Part of a picture, in pixels of the whole from its upper left corner; at least one pixel each way.
+/// Part of a picture, in pixels of the whole from its upper left corner; at least one pixel each
+/// way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Crop {
     /// Column of the upper left pixel, from 0.
@@ -31,20 +32,22 @@ impl Crop {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PictureSettings {
-    /// Width and height in pixels, each in [`Self::SIDE`]; `None`: 512 high, as wide as the camera's aspect says.
+    /// Width and height in pixels, each in [`Self::SIDE`]; `None`: 512 high, as wide as the
+    /// camera's aspect says.
     pub size: Option<(u32, u32)>,
     /// The part of the picture that is rendered; `None`: all.
     pub crop: Option<Crop>,
     /// Name or index of the camera in the file; `None`: the first.
     pub camera: Option<String>,
-    /// Camera samples per pixel, in [`Self::SPP`]. With light samples and final gathering the bound is lower: see
-    /// [`super::Settings::check`].
+    /// Camera samples per pixel, in [`Self::SPP`]. With light samples and final gathering the bound
+    /// is lower: see [`super::Settings::check`].
     pub spp: u32,
     /// How the light around a pixel's centre is weighed.
     pub pixel_filter: PixelFilter,
     /// Diameter of the lens, metres, in [`Self::APERTURE`]; 0: a pinhole, all is sharp.
     pub aperture: f32,
-    /// Distance of the sharp plane along the camera's axis, metres, in [`Self::FOCUS`]; with an aperture only.
+    /// Distance of the sharp plane along the camera's axis, metres, in [`Self::FOCUS`]; with an
+    /// aperture only.
     pub focus: Option<f32>,
     /// Samples of the direct light of emissive surfaces and the environment per visible point, in
     /// [`Self::LIGHT_SAMPLES`].
@@ -95,12 +98,12 @@ impl PictureSettings {
     /// # Errors
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
-        Self::SPP.check("spp", self.spp)?;
-        Self::LIGHT_SAMPLES.check("light-samples", self.light_samples)?;
-        Self::APERTURE.check("aperture", self.aperture)?;
+        Self::SPP.check("picture.spp", self.spp)?;
+        Self::LIGHT_SAMPLES.check("picture.light_samples", self.light_samples)?;
+        Self::APERTURE.check("picture.aperture", self.aperture)?;
         match self.focus {
-            None if self.aperture > 0.0 => fail("aperture", self.aperture.to_string(), "needs a focus"),
-            Some(focus) => Self::FOCUS.check("focus", focus),
+            None if self.aperture > 0.0 => fail("picture.aperture", self.aperture.to_string(), "needs a focus"),
+            Some(focus) => Self::FOCUS.check("picture.focus", focus),
             None => Ok(()),
         }
     }

@@ -24,8 +24,8 @@ macro_rules! number {
 
 number!(u32: u32::MAX, u64: u64::MAX, f32: 1e9, f64: 1e9);
 
-/// Values that a setting can have. Infinities and NaN are in no range. Displayed as `from 1 to 1000`, `at least 1`,
-/// `above 0` or `above 0, at most 1e18`.
+/// Values that a setting can have. Infinities and NaN are in no range. Displayed as
+/// `from 1 to 1000`, `at least 1`, `above 0` or `above 0, at most 1e18`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range<T> {
     least: T,
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(Range::at_least(1_u64).to_string(), "at least 1");
         assert_eq!(Range::above(0.0_f32, 1e18).to_string(), "above 0, at most 1e18");
         assert_eq!(Range::above(0.0_f64, f64::MAX).to_string(), "above 0");
-        let error = Range::at_least(1_u32).check("spp", 0).expect_err("0 is below 1").to_string();
-        assert_eq!(error, "spp 0: must be at least 1");
+        let error = Range::at_least(1_u32).check("picture.spp", 0).expect_err("0 is below 1").to_string();
+        assert_eq!(error, "picture.spp 0: must be at least 1");
     }
 }

@@ -156,7 +156,7 @@ pub(super) fn measure(
     row.seconds = mean_seconds(renders);
     row.global = map_row(measured.stats.photons.global, measured.radii[0]);
     row.caustic = map_row(measured.stats.photons.caustic, measured.radii[1]);
-    row.mean_radiance = std::array::from_fn(|c| average(renders, |frame| mean(&frame.radiance())[c]));
+    row.mean_radiance = std::array::from_fn(|c| average(renders, |frame| mean(frame.radiance())[c]));
     row.noise = noise(&frames(renders));
     row.thumbnail = Thumbnail::new(first, plan.look);
     if let Some(reference) = reference.filter(|r| (r.width, r.height) == (first.width, first.height)) {
@@ -173,9 +173,9 @@ pub(super) fn measure(
 
 fn compare(row: &mut Row, renders: &[(Frame, Measured)], reference: &Frame, look: Look) {
     let right = &reference.radiance();
-    row.rel_mse = Some(average(renders, |frame| rel_mse(&frame.radiance(), right, None)));
-    row.rmse = Some(average(renders, |frame| rmse(&frame.radiance(), right, None).powi(2)).sqrt());
-    row.flip = Some(average(renders, |frame| flip(&frame.radiance(), right, frame.width, look.exposure, look.tonemap)));
+    row.rel_mse = Some(average(renders, |frame| rel_mse(frame.radiance(), right, None)));
+    row.rmse = Some(average(renders, |frame| rmse(frame.radiance(), right, None).powi(2)).sqrt());
+    row.flip = Some(average(renders, |frame| flip(frame.radiance(), right, frame.width, look.exposure, look.tonemap)));
     let bias = bias(&frames(renders), reference);
     (row.bias, row.bias_limit) = (bias.map(|b| b.value), bias.map(|b| b.limit));
 }

@@ -30,7 +30,7 @@ pub(super) fn picture(
     progress: &dyn Progress,
 ) -> Result<(Frame, Measured)> {
     if maps.settings().final_gather > 0 {
-        let (name, value) = ("final-gather", maps.settings().final_gather.to_string());
+        let (name, value) = ("photons.final_gather", maps.settings().final_gather.to_string());
         return Err(Error::Setting { name, value, problem: "is not studied".to_string() });
     }
     let mut radii = Radii::default();

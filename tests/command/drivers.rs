@@ -66,7 +66,7 @@ impl Rendered {
         let ended = run(driver, &line, &picture);
         assert!(ended.status.success(), "{scene}: {}", String::from_utf8_lossy(&ended.stderr));
         let stats = serde_json::from_slice(&fs::read(stats).expect("stats are there")).expect("JSON");
-        Self { stats, blocks: blocks(&read_exr(&picture).expect("the picture reads").radiance()) }
+        Self { stats, blocks: blocks(read_exr(&picture).expect("the picture reads").radiance()) }
     }
 
     fn mean(&self) -> f64 {

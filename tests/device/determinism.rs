@@ -13,8 +13,8 @@ use caustica::{
     bvh::Bvh,
     layout::{self, Counters, PhotonBatch},
     scene::{Light, LightKind},
-    settings::{Mode, Sampler, Settings},
-    upload::SceneBuffers,
+    settings::{LightSettings, Mode, Sampler},
+    upload::{SceneBuffers, sampler_constant},
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -74,15 +74,14 @@ fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampl
     scene.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
     scene.lights.push(Light { kind, ..point_light(Vec3::ZERO, 1.0) });
     let bvh = Bvh::build(&scene);
-    let settings = Settings::default().with(|s| s.photons.sampler = sampler);
-    let buffers = SceneBuffers::new(gpu, &scene, &bvh, &settings.lights).expect("the scene fits");
-    let emit = buffers.kernel(gpu, "emit_photons");
+    let buffers = SceneBuffers::new(gpu, &scene, &bvh, &LightSettings::default()).expect("the scene fits");
+    let emit = buffers.kernel_with(gpu, "emit_photons", &[sampler_constant(sampler)]);
     let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns, target_count: 1, ..Default::default() };
     let batch = batch.starting_at(first);
     let uniform = gpu.uniform("batch", &batch);
     let paths = gpu.storage::<layout::Path>("paths", u64::from(count)).expect("fits");
     let queue = gpu.storage::<u32>("queue", u64::from(count)).expect("fits");
-    let counts = gpu.storage::<u32>("counts", u64::from(count)).expect("fits");
+    let counts = gpu.storage::<u32>("counts", u64::from(count * layout::MAP_KINDS)).expect("fits");
     let counters = gpu.storage::<Counters>("counters", 1).expect("fits");
     let bindings = emit.bind(
         gpu,

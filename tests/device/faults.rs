@@ -90,7 +90,7 @@ fn a_lost_device_is_an_error_at_any_stage() {
         let error = render_losing(&gpu, stage).expect_err("the device is lost");
         assert!(matches!(error, Error::Lost { .. }), "{stage:?}: {error}");
         let text = error.to_string();
-        assert!(text.contains("--device") && text.contains(&gpu.name) && !text.contains('\n'), "{text}");
+        assert!(text.contains("`device`") && text.contains(&gpu.name) && !text.contains('\n'), "{text}");
         let error = render(&gpu, &room(), &small(), &Silent).expect_err("it stays lost");
         assert!(matches!(error, Error::Lost { .. }), "{stage:?}, again: {error}");
     }
@@ -109,7 +109,7 @@ fn what_finds_no_memory_is_named() {
         let Error::Memory { needed: Some(needed), used, .. } = error else { panic!("{error}") };
         assert!(used + needed > limit, "{used} + {needed} bytes of {limit}");
         let text = error.to_string();
-        assert!(["--photons", "--device", &gpu.name].iter().all(|said| text.contains(said)), "{text}");
+        assert!(["`photons.global`", "`device`", &gpu.name].iter().all(|said| text.contains(said)), "{text}");
     }
     gpu.memory.set_limit(u64::MAX);
     assert_eq!(picture().expect("it goes on when there is enough again"), peak);

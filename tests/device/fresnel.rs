@@ -21,7 +21,7 @@ fn error(factor: f64) -> f64 {
 
 /// Reflectance of unpolarised light at the cosine of incidence, from the angles (Fresnel 1823); 1
 /// where no angle exists.
-fn closed_form(cos_i: f64, eta: f64) -> f64 {
+pub fn closed_form(cos_i: f64, eta: f64) -> f64 {
     let angle = cos_i.acos();
     let sine = angle.sin() / eta;
     if sine >= 1.0 {

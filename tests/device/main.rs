@@ -1,5 +1,6 @@
 //! The device and the kernels on it: search, traversal, sampling, limits, faults, equal bits.
 
+mod bsdf;
 mod chi_square;
 mod determinism;
 mod emitter_sampling;

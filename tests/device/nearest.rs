@@ -91,7 +91,7 @@ fn differences(
         let radiance = estimate((places, fluxes), &found, &expected, settings.density, EMITTED, side_test);
         !agrees(&answer.gathered[i], &answer.radiance[i], &found, radiance)
     };
-    points.iter().enumerate().filter(|(_, p)| p.valid != 0).filter(|p| wrong(*p)).count()
+    points.iter().enumerate().filter(|(_, p)| p.next_map != 0).filter(|p| wrong(*p)).count()
 }
 
 fn agrees(gathered: &Gathered, radiance: &[f32; 4], found: &Found, expected: [f64; 3]) -> bool {
@@ -110,7 +110,7 @@ fn check(bench: &mut Bench, photons: &[Photon], points: &[VisiblePoint], setting
     let wrong = differences(&answer, (&places, &fluxes), points, settings, side_test);
     assert_eq!(wrong, 0, "{} photons, {settings:?}, side test {side_test}", photons.len());
     if photons.len() > 1 && settings.radius.or(settings.max_radius).is_none() {
-        let last = points.iter().rfind(|p| p.valid != 0).unwrap();
+        let last = points.iter().rfind(|p| p.next_map != 0).unwrap();
         let distance = |p: &PhotonPlace| Vec3::from(p.position).distance(last.position.into());
         let lost = (0..places.len())
             .filter(|&i| !side_test || usable(&places[i], last))

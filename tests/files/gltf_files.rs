@@ -52,7 +52,7 @@ fn buffers_lie_in_the_folder_of_the_scene_unless_all_is_allowed() {
         &format!("file://{absolute}"),
     ] {
         let said = message(read(outside, false));
-        let expected = "leads out of the scene's folder, which only --allow-outside permits";
+        let expected = "leads out of the scene's folder, which only `load.allow_outside` permits";
         assert_eq!(said, format!("buffers[0].uri: {outside:?} {expected}"));
         assert!(read(outside, true).is_ok(), "{outside}: {said}");
     }

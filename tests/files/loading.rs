@@ -26,7 +26,7 @@ fn faults_are_named_with_their_place() {
     check(|g| g["asset"]["minVersion"] = "2.1".into(), "asset.minVersion: the file needs glTF 2.1, only 2.0 is read");
     check(
         |g| g["extensionsRequired"] = json!(["KHR_lights_punctual", "FAKE_thing"]),
-        "extensionsRequired[1]: FAKE_thing is not supported; --ignore-required FAKE_thing reads the file without it",
+        "extensionsRequired[1]: FAKE_thing is not supported; `load.ignore_required` FAKE_thing reads the file without it",
     );
     check(|g| g["scene"] = 3.into(), "scene: 3 of 1");
     check(|g| g["nodes"][0]["mesh"] = 7.into(), "nodes[0].mesh: 7 of 1");
@@ -81,7 +81,7 @@ fn faults_are_named_with_their_place() {
     check(|g| g["buffers"][0]["byteLength"] = 45.into(), "buffers[0]: byteLength is 45, but there are 44 bytes");
     check(
         |g| g["buffers"][0]["uri"] = "../secret.bin".into(),
-        r#"buffers[0].uri: "../secret.bin" leads out of the scene's folder, which only --allow-outside permits"#,
+        r#"buffers[0].uri: "../secret.bin" leads out of the scene's folder, which only `load.allow_outside` permits"#,
     );
     check(
         |g| g["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"] = json!(-1),
@@ -235,8 +235,8 @@ fn scenes_without_light_or_shape_say_what_they_hold() {
         error.split_once("test.gltf: ").expect("the file is named").1.to_owned()
     };
     assert!(loaded(&triangle()).check_renderable().is_ok());
-    let dark = "scene: no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give --env, \
-                --background or --default-light sky";
+    let dark = "scene: no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give \
+                `scene.environment`";
     let mut gltf = triangle();
     gltf["scenes"][0]["nodes"] = json!([0, 2]);
     assert_eq!(refused(&gltf), dark);

@@ -176,7 +176,7 @@ fn cameras_are_found_by_name_and_number_and_made_if_missing() {
     assert_eq!((camera.forward, camera.up, camera.right), (Vec3::Z, Vec3::Y, -Vec3::X));
     assert_eq!(scene.camera(Some("view")).expect("by name"), scene.camera(Some("0")).expect("by number"));
     let error = scene.camera(Some("1")).expect_err("only one").to_string();
-    assert_eq!(error, r#"camera 1: test.gltf has the cameras 0 "view""#);
+    assert_eq!(error, r#"picture.camera 1: test.gltf has the cameras 0 "view""#);
 
     gltf["scenes"][0]["nodes"] = json!([0, 1]);
     let scene = loaded(&gltf);
@@ -240,13 +240,13 @@ fn scenes_of_a_file_are_chosen_by_name_or_number() {
     assert_eq!((default.triangles.len(), default.lights.len()), (1, 1));
     // What is kept under a scene's hash is not found under another's.
     assert_ne!(scene("1").expect("it loads").hash, default.hash);
-    let expected = r#"scene 4: test.gltf has the scenes 0, 1 "lamp only", 2 "0", 3"#;
+    let expected = r#"load.scene 4: test.gltf has the scenes 0, 1 "lamp only", 2 "0", 3"#;
     assert_eq!(message(scene("4")), expected);
     gltf.as_object_mut().expect("an object").remove("scenes");
     gltf.as_object_mut().expect("an object").remove("scene");
     assert_eq!(loaded(&gltf).triangles.len(), 1, "without scenes all nodes are shown");
     let options = LoadOptions { scene: Some("0".into()), ..LoadOptions::default() };
-    assert_eq!(message(read_with(&gltf, &options)), "scene 0: test.gltf has no scenes");
+    assert_eq!(message(read_with(&gltf, &options)), "load.scene 0: test.gltf has no scenes");
 }
 
 #[test]
@@ -283,8 +283,7 @@ fn what_the_format_allows_is_read_whatever_else_the_file_holds() {
         let options = LoadOptions { ignore_required: vec![name.into()], ..LoadOptions::default() };
         read_with(&gltf, &options)
     };
-    let refused =
-        "extensionsRequired[0]: FAKE_thing is not supported; --ignore-required FAKE_thing reads the file without it";
+    let refused = "extensionsRequired[0]: FAKE_thing is not supported; `load.ignore_required` FAKE_thing reads the file without it";
     assert_eq!(message(ignoring("FAKE_other")), refused);
     let read = ignoring("FAKE_thing").unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(read.warnings[0], "extension FAKE_thing is required, but not read");

@@ -50,7 +50,7 @@ fn twins() -> Vec<Twin> {
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
         Path { origin, history, direction, bounces, beta, media_count, media }
         Photon { position, wi, flux, normal }
-        VisiblePoint { position, valid, weight, offset, ng, media_outer, ns, media_inner }
+        VisiblePoint { position, next_map, weight, offset, ng, media_outer, ns, media_inner }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, turns, first_turn, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
         Store { staged, first_photon, photons, kind }
@@ -63,9 +63,9 @@ fn twins() -> Vec<Twin> {
         PhotonPlace { position, wi }
         PhotonFlux { flux, normal }
         MapInfo { count, levels, split, pad }
-        GatherInfo { count, first, neighbors, takes_all, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, turn, pad0, pad1 }
+        GatherInfo { count, first, neighbors, fixed_radius, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, map_number, pad0, pad1 }
         Gathered { radius_squared, count, fingerprint }
-        ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, turn }
+        ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, map_number }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
         KeyStep { count, window_first, window_count, fine }
@@ -124,6 +124,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         RADIX_DIGITS,
         SCAN_SPAN,
         BOUND_LANES,
+        LAYER_ROWS,
         SEARCH_STATE_BYTES,
         GATHER_STATE_BYTES,
         MAX_WORKGROUPS,
@@ -173,7 +174,7 @@ fn disagreements(wgsl: &str) -> Vec<String> {
 }
 
 /// Structs that kernels take from the texels of tables.
-const IN_TABLES: [&str; 2] = ["Material", "Normals"];
+const IN_TABLES: [&str; 3] = ["Material", "Medium", "Normals"];
 
 /// Structs that lie in storage or uniform buffers, also inside of others, and those in tables.
 fn bound_structs(module: &Module) -> Vec<Handle<Type>> {
@@ -282,9 +283,8 @@ fn this_test_knows_every_struct_and_constant_of_the_host() {
 
 /// Constants that no kernel names: sizes of structs; values that a kernel reads from a field or tells by the others of
 /// their kind; a bound of the host's own. Their values are not compared.
-const NOT_NAMED: [&str; 8] = [
+const NOT_NAMED: [&str; 7] = [
     "SEARCH_STATE_BYTES",
-    "DISC_BYTES",
     "GATHER_STATE_BYTES",
     "GLASS",
     "STREAM_PHOTON",

@@ -88,7 +88,7 @@ fn final_gathering_has_the_mean_of_the_estimate() {
             s.photons.final_gather = 1;
         });
         let refused = render(gpu(), &scene, &wrong, &Silent).map(drop).expect_err("the mode has no final gathering");
-        assert!(refused.to_string().contains("final-gather"), "{refused}");
+        assert!(refused.to_string().contains("photons.final_gather"), "{refused}");
     }
 }
 

@@ -63,7 +63,7 @@ fn visible(scene: &Scene, camera: &Camera, size: u32, settings: &Settings) -> Ve
         let count = tracer.point_count(&tile);
         let points: Vec<VisiblePoint> = gpu().read(&tracer.points, 0, count.into()).expect("points read back");
         for (i, point) in (0..).zip(&points) {
-            if let Some(pixel) = tracer.pixel(&tile, i * tile.pixels / count).filter(|_| point.valid != 0) {
+            if let Some(pixel) = tracer.pixel(&tile, i * tile.pixels / count).filter(|_| point.next_map != 0) {
                 found.push((pixel, point.position.into()));
             }
         }
@@ -272,7 +272,7 @@ fn circles_of_confusion_have_the_closed_form_s_size() {
     assert!(sharp < 1e-5, "control: the sharp plane is blurred by {sharp}");
     let orthographic = Scene { cameras: vec![parallel_camera(1.0)], ..plane(-1.0) };
     let refused = render(gpu(), &orthographic, &lens.with(|s| s.picture.size = Some((8, 8))), &Silent);
-    assert!(matches!(refused, Err(Error::Setting { name: "aperture", .. })), "{refused:?}");
+    assert!(matches!(refused, Err(Error::Setting { name: "picture.aperture", .. })), "{refused:?}");
 }
 
 #[test]
@@ -332,7 +332,7 @@ fn a_crop_has_the_bits_of_the_whole() {
     assert!(!same(6), "control: it agrees one pixel farther too");
     for (column, row, width, height) in [(30, 0, 11, 1), (0, 40, 1, 1), (0, 0, 1, 0), (u32::MAX, 0, 2, 1)] {
         let refused = picture(Some(Crop { column, row, width, height }));
-        assert!(matches!(refused, Err(Error::Setting { name: "crop", .. })), "{column},{row},{width},{height}");
+        assert!(matches!(refused, Err(Error::Setting { name: "picture.crop", .. })), "{column},{row},{width},{height}");
     }
 }
 

@@ -43,7 +43,7 @@ fn means(name: &str) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let sum = |image: &[[f32; 3]]| image.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
     let scene = Scene::load(&folder.join(format!("{name}.glb"))).expect("the scene loads");
-    let reference = sum(&read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance());
+    let reference = sum(read_exr(&folder.join(format!("{name}_128.exr"))).expect("the reference reads").radiance());
     let mut ratios = [0.0; 2];
     for seed in 0..4 {
         let settings = settings(Mode::Hybrid, 200_000, 128).with(|s| {
@@ -55,7 +55,7 @@ fn means(name: &str) {
         for (ratio, neighbors) in ratios.iter_mut().zip([100, 10]) {
             let estimate = EstimateSettings { neighbors, ..settings.estimate.clone() };
             let picture = session.picture(&maps, &estimate, &settings.picture, &Silent);
-            *ratio += sum(&picture.expect("a picture").frame.radiance()) / reference / 4.0;
+            *ratio += sum(picture.expect("a picture").frame.radiance()) / reference / 4.0;
         }
     }
     for (ratio, neighbors) in ratios.into_iter().zip([100, 10]) {
@@ -65,7 +65,7 @@ fn means(name: &str) {
         s.photons.max_bounces = 6;
         s.estimate.neighbors = 10;
     });
-    let ratio = sum(&render_scene(&scene, &short).frame.radiance()) / reference;
+    let ratio = sum(render_scene(&scene, &short).frame.radiance()) / reference;
     assert!((ratio - 1.0).abs() > 0.005, "control: {name} with at most 6 bounces has the mean {ratio}");
 }
 

@@ -63,7 +63,7 @@ impl CameraKernels {
 pub struct CameraTracer {
     kernels: CameraKernels,
     wavefront: Wavefront,
-    /// A [`VisiblePoint`] per place for a path, some of them not valid.
+    /// A [`VisiblePoint`] per path slot, some without a point.
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
     pub radiance: Buffer,
@@ -292,7 +292,7 @@ fn view(
     let parallel = matches!(camera.projection, Projection::Orthographic { .. });
     if parallel && picture.aperture > 0.0 {
         let problem = "needs a perspective camera; this one is orthographic".to_owned();
-        return Err(Error::Setting { name: "aperture", value: picture.aperture.to_string(), problem });
+        return Err(Error::Setting { name: "picture.aperture", value: picture.aperture.to_string(), problem });
     }
     let half_height = camera.half_height_at(1.0, (width, height));
     let half_width = half_height * width as f32 / height as f32;

@@ -21,7 +21,7 @@ pub struct FinalGather {
     start: Kernel,
     trace: Kernel,
     rays: u32,
-    /// A [`VisiblePoint`] per visible point of the camera, whose weight brings its light to the camera; some are not valid.
+    /// A [`VisiblePoint`] per visible point of the camera, whose weight brings its light to the camera; some slots have no point.
     pub seen: Buffer,
 }
 

@@ -179,7 +179,7 @@ impl<'s> Gather<'s> {
     }
 
     /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to `radiance` (`array<vec4f>`), and writes the
-    /// radius and number of photons of each valid one to `gathered` (`array<Gathered>`).
+    /// radius and number of photons of each to `gathered` (`array<Gathered>`).
     ///
     /// # Errors
     /// [`crate::Error::Stopped`] when `progress` says so, [`crate::Error::Gpu`] if the driver fails.
@@ -194,21 +194,21 @@ impl<'s> Gather<'s> {
         results: (&Buffer, &Buffer),
         progress: &dyn Progress,
     ) -> Result<GatherStats> {
-        self.run_turn(gpu, map, points, (count, u32::MAX), settings, results, progress)
+        self.run_waiting(gpu, map, points, (count, u32::MAX), settings, results, progress)
     }
 
-    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of a turn; see
-    /// [`crate::layout::VisiblePoint::valid`].
+    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of a map, given by its number; see
+    /// [`crate::layout::VisiblePoint::next_map`].
     ///
     /// # Errors
     /// As [`Self::run`].
     #[allow(clippy::too_many_arguments)]
-    pub fn run_turn(
+    pub fn run_waiting(
         &mut self,
         gpu: &Gpu,
         map: &PhotonMap,
         points: &Buffer,
-        (count, turn): (u32, u32),
+        (count, map_number): (u32, u32),
         settings: &GatherSettings,
         (radiance, gathered): (&Buffer, &Buffer),
         progress: &dyn Progress,
@@ -227,10 +227,10 @@ impl<'s> Gather<'s> {
                 count: BATCH.min(count - first),
                 first,
                 neighbors: settings.neighbors,
-                takes_all: u32::from(settings.radius.is_some()),
+                fixed_radius: u32::from(settings.radius.is_some()),
                 max_radius_squared: settings.radius.or(settings.max_radius).map_or(-1.0, |r| r * r),
                 per_path: (1.0 / map.emitted().max(1) as f64) as f32,
-                turn,
+                map_number,
                 kernel_mean: polynomial.mean() as f32,
                 kernel: first_four,
                 kernel_fifth: fifth,

@@ -35,10 +35,11 @@ pub struct SharedPoints<'a> {
 /// Points at which estimates are asked for.
 #[derive(Debug)]
 pub struct EstimateRequest<'a> {
-    /// [`VisiblePoint`]s, of which those take part that wait for the turn.
+    /// [`VisiblePoint`]s, of which those take part that wait for the map.
     pub points: &'a Buffer,
     pub count: u32,
-    pub turn: u32,
+    /// Number of the map gathered, from 1.
+    pub map_number: u32,
     /// What the estimates are added to, `vec4f`, and what is said of them,
     /// [`Gathered`](crate::layout::Gathered).
     pub radiance: &'a Buffer,
@@ -79,11 +80,11 @@ impl EstimateSharing {
     }
 
     /// Adds the light of a map's photons to the radiance of the tile's points: by queries in large cells of pixels, then in
-    /// smaller ones for the points that are left, and at last by a query for each point. Maps are gathered in turns from 1.
+    /// smaller ones for the points that are left, and at last by a query for each point. Maps are numbered from 1.
     ///
     /// # Errors
     /// Those of `estimates`.
-    pub fn run(&mut self, gpu: &Gpu, turn: u32, tile: &SharedPoints, estimates: &mut Estimates) -> Result<()> {
+    pub fn run(&mut self, gpu: &Gpu, map_number: u32, tile: &SharedPoints, estimates: &mut Estimates) -> Result<()> {
         let count = tile.pixels * tile.samples * tile.branches;
         for cell_pixels in ROUNDS {
             if self.reach == 0.0 || cell_pixels * tile.samples < LEAST_CELL {
@@ -100,14 +101,14 @@ impl EstimateSharing {
                 branches: tile.branches,
                 reach_squared: self.reach * self.reach,
                 points: count,
-                turn,
+                map_number,
             };
             self.run_round(gpu, &round, tile, estimates)?;
         }
         estimates(&EstimateRequest {
             points: tile.points,
             count,
-            turn,
+            map_number,
             radiance: tile.radiance,
             gathered: tile.gathered,
         })
@@ -140,7 +141,7 @@ impl EstimateSharing {
         gpu.submit(encoder);
         // There are fewer queries than points.
         let (radiance, gathered) = (&scratch.irradiance, tile.gathered);
-        estimates(&EstimateRequest { points: &scratch.queries, count: queries, turn: 1, radiance, gathered })?;
+        estimates(&EstimateRequest { points: &scratch.queries, count: queries, map_number: 1, radiance, gathered })?;
         let mut encoder = gpu.encoder();
         self.share.dispatch(&mut encoder, &self.share.bind(gpu, &buffers), round.points.into());
         gpu.submit(encoder);

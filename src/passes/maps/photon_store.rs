@@ -108,7 +108,7 @@ pub(super) fn too_many(gpu: &Gpu, count: u64) -> Error {
         limit: "maxStorageBufferRange",
         adapter: gpu.name.clone(),
         allowed: most_photons(gpu.max_binding()),
-        advice: "ask for fewer --photons or use another --device".to_string(),
+        advice: "ask for fewer `photons.global` or use another `device`".to_string(),
     }
 }
 

@@ -32,7 +32,7 @@ pub(super) fn check(used: &[String], required: &[String], ignored: &[String], no
     let unsupported = |name: &&String| !SUPPORTED.contains(&name.as_str());
     for (i, name) in required.iter().enumerate().filter(|(_, name)| unsupported(name)) {
         if !ignored.contains(name) {
-            let problem = format!("{name} is not supported; --ignore-required {name} reads the file without it");
+            let problem = format!("{name} is not supported; `load.ignore_required` {name} reads the file without it");
             return fault(format!("extensionsRequired[{i}]"), problem);
         }
         notes.add(format!("extension {name} is required, but not read"));

@@ -92,6 +92,6 @@ fn is_scheme(text: &str) -> bool {
 }
 
 fn outside<T>(uri: &str, place: &str) -> Read<T> {
-    let what = "leads out of the scene's folder, which only --allow-outside permits";
+    let what = "leads out of the scene's folder, which only `load.allow_outside` permits";
     fault(place, format!("{uri:?} {what}"))
 }

@@ -69,7 +69,7 @@ pub(super) fn choose_scene(root: &json::Root, wanted: Option<&str>, file_name: &
         let list: Vec<String> =
             root.scenes.iter().enumerate().map(|(i, scene)| format!("{i}{}", name(scene))).collect();
         let list = if list.is_empty() { "no scenes".to_owned() } else { format!("the scenes {}", list.join(", ")) };
-        Error::Setting { name: "scene", value: wanted.to_owned(), problem: format!("{file_name} has {list}") }
+        Error::Setting { name: "load.scene", value: wanted.to_owned(), problem: format!("{file_name} has {list}") }
     })
 }
 

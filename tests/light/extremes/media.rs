@@ -108,7 +108,8 @@ fn emitters_start_in_what_is_around_them() {
         SceneBuffers::new(gpu(), &scene, &Bvh::build(&scene), &LightSettings::default()).expect("the scene fits");
     let lights = &buffers.lights.table.lights;
     let found: Vec<_> = lights.iter().map(|light| (light.media, light.back_media)).collect();
-    let (none, water, glow) = ([0; 4], [1, 2, 0, 0], [1, glowing + 1, 0, 0]);
+    // Media are numbered in the order of the materials that bound them: box, ball, glowing glass.
+    let (none, water, glow) = ([0; 4], [1, 2, 0, 0], [1, 3, 0, 0]);
     let glass = [1, 0, 0, 0];
     // The point light, the bulbs, the panel's two triangles, and glass that shines both ways; a bulb's inside is never left.
     let fronts: Vec<_> = found.iter().map(|(front, _)| *front).collect();

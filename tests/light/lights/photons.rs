@@ -222,7 +222,7 @@ fn photons_go_to_lights_as_asked() {
     assert!(within(weighted, plain, 0.05), "mean {weighted} with other shares, {plain} without");
     let error = run(LightSampling::Power, &[("moon", 2.0)]).expect_err("there is no moon");
     let Error::Setting { name, problem, .. } = &error else { panic!("{error}") };
-    assert!(*name == "light-photons" && problem.contains("\"lamp\", \"panel\""), "{error}");
+    assert!(*name == "lights.photon_weights" && problem.contains("\"lamp\", \"panel\""), "{error}");
 }
 
 #[test]

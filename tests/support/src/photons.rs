@@ -81,7 +81,7 @@ pub fn point(random: &mut Random, invalid: bool) -> VisiblePoint {
     let ng = random.direction();
     VisiblePoint {
         position: random.vector().into(),
-        valid: u32::from(!invalid),
+        next_map: u32::from(!invalid),
         weight: (random.vector() + 0.1).into(),
         ng: ng.into(),
         ns: (ng + 0.3 * random.direction()).normalize().into(),

@@ -135,7 +135,7 @@ fn floor(scene: &mut Scene, height: f32, half: f32) {
 fn at(position: Vec3, normal: Vec3) -> VisiblePoint {
     VisiblePoint {
         position: position.into(),
-        valid: 1,
+        next_map: 1,
         weight: [1.0; 3],
         offset: 4e-6,
         ng: normal.into(),
