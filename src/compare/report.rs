@@ -11,13 +11,19 @@ use crate::stats::{DeviceStats, Stats};
 /// The file `report.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
+    /// Device on which the grid was built and queried.
     pub device: DeviceStats,
     /// Number of queries of each side: visible points times photon maps.
     pub queries: u64,
+    /// Agreement of the summed photons.
     pub neighbors: Neighbors,
+    /// Difference of the estimates' radii.
     pub radius: RelativeDifference,
+    /// Difference of the estimates' radiance.
     pub radiance: RelativeDifference,
+    /// Cost of the grid.
     pub grid: GridSide,
+    /// Cost of the kd-tree.
     pub kdtree: KdTreeSide,
 }
 
@@ -34,7 +40,9 @@ pub struct Neighbors {
 /// that of the worst channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RelativeDifference {
+    /// Maximum over the queries, ≥ 0.
     pub max_relative_difference: f64,
+    /// Mean over the queries, ≥ 0.
     pub mean_relative_difference: f64,
 }
 
@@ -43,6 +51,7 @@ pub struct RelativeDifference {
 pub struct GridSide {
     /// Sorting the photons and building the grids, once the kernels are compiled.
     pub build_seconds: f64,
+    /// Queries divided by the seconds of all gathers.
     pub queries_per_second: f64,
     /// Photons and grids.
     pub bytes: u64,
@@ -53,6 +62,7 @@ pub struct GridSide {
 pub struct KdTreeSide {
     /// Balancing the photons.
     pub build_seconds: f64,
+    /// Queries divided by the seconds of all gathers.
     pub queries_per_second: f64,
     /// Photons and trees.
     pub bytes: u64,
@@ -63,8 +73,11 @@ pub struct KdTreeSide {
 /// A row of the table of both sides.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
+    /// Name of the quantity.
     pub what: &'static str,
+    /// Value of the grid, with its unit.
     pub grid: String,
+    /// Value of the kd-tree, with its unit.
     pub kdtree: String,
 }
 

@@ -9,7 +9,9 @@ use super::{Figure, Question, Row, findings};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
+    /// The claim held.
     Holds,
+    /// The claim did not hold.
     DoesNotHold,
     /// The rows do not suffice to decide.
     Unknown,
@@ -18,11 +20,15 @@ pub enum Verdict {
 /// Answer to a question: a claim, the measurement, and whether they agree.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Claim {
+    /// Question that was asked of the figure.
     pub question: Question,
+    /// Claim as one sentence.
     pub claim: &'static str,
+    /// Measurement in words.
     pub measured: String,
     /// What had to be measured for the claim to hold.
     pub rule: &'static str,
+    /// Result of applying the rule to the measurement.
     pub verdict: Verdict,
 }
 

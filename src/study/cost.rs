@@ -30,6 +30,7 @@ pub struct State {
 
 /// Observer of a study. Its methods are called often and must return at once.
 pub trait Watch: Sync {
+    /// Receives the current progress.
     fn report(&self, state: &State);
     /// Whether the study should stop as soon as possible; finished cells are kept.
     fn stop_requested(&self) -> bool;

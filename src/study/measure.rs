@@ -25,33 +25,40 @@ use crate::{
 /// all are zero or missing if it failed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// File name.
+    /// File name of the scene.
     pub scene: String,
+    /// Mode of illumination.
     pub mode: Mode,
     /// Capacity of each map, photons. Like `neighbors`, it has no meaning where the mode traces no
     /// photons.
     pub photons: u32,
+    /// Photons per radiance estimate, k.
     pub neighbors: u32,
     /// Seed of the first repeat.
     pub seed: u32,
+    /// Number of repeats, each with its own seed.
     pub repeats: u32,
-    /// Pixels.
+    /// Width of the picture, pixels.
     pub width: u32,
+    /// Height of the picture, pixels.
     pub height: u32,
+    /// Samples per pixel.
     pub spp: u32,
     /// Seconds by stage. Those of `bvh`, `photons` and `grid` are common to all combinations of the
     /// same photons.
     pub seconds: Seconds,
+    /// Global photon map.
     pub global: MapRow,
+    /// Caustic photon map.
     pub caustic: MapRow,
-    /// Of each channel over all pixels, W/(m² sr).
+    /// Mean radiance of each channel over all pixels, W/(m² sr).
     pub mean_radiance: [f64; 3],
     /// Standard deviation between the repeats, root of the mean over pixels and channels, W/(m²
     /// sr); from two repeats.
     pub noise: Option<f64>,
-    /// Against the reference, over all pixels and channels.
+    /// Relative mean square error against the reference, over all pixels and channels.
     pub rel_mse: Option<f64>,
-    /// W/(m² sr).
+    /// Root mean square error against the reference, W/(m² sr).
     pub rmse: Option<f64>,
     /// Mean FLIP error of the tone-mapped pictures, 0 to 1.
     pub flip: Option<f64>,
@@ -64,7 +71,7 @@ pub struct Row {
     pub corner_ratio: Option<f64>,
     /// Error message of a failed combination.
     pub error: Option<String>,
-    /// Of the first repeat.
+    /// Picture of the first repeat.
     #[serde(skip)]
     pub(super) thumbnail: Thumbnail,
 }
@@ -212,6 +219,7 @@ fn mean_in(frame: &Frame, region: &[bool]) -> Option<f64> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Thumbnail {
     pub width: u32,
+    /// Height of the picture, pixels.
     pub height: u32,
     pub pixels: Vec<Rgb8>,
 }

@@ -15,27 +15,35 @@ use crate::{
 pub struct Plan {
     /// Title of the page.
     pub title: String,
+    /// Scenes and their references.
     pub subjects: Vec<Subject>,
     /// Combinations, each listed once.
     pub combinations: Vec<Combination>,
+    /// Figures, in the order in which they are shown.
     pub figures: Vec<Figure>,
+    /// Display of the pictures.
     pub look: Look,
 }
 
 /// A scene and the reference for its pictures.
 #[derive(Clone, Debug)]
 pub struct Subject {
+    /// Scene to render.
     pub scene: Scene,
+    /// Reference for the errors of its pictures.
     pub reference: Reference,
 }
 
 /// Reference for the error of a picture.
 #[derive(Clone, Debug)]
 pub enum Reference {
+    /// No reference: errors are not measured.
     None,
     /// A given picture, for all modes.
     Picture {
+        /// Name of the picture in the results.
         name: String,
+        /// Reference picture, of the size of the renders.
         frame: Box<Frame>,
     },
     /// Finer renders made by the study, one for all modes that show the same light.
@@ -47,7 +55,9 @@ pub enum Reference {
 pub struct Finer {
     /// Capacity of each map, photons.
     pub photons: u32,
+    /// Photons per radiance estimate, k.
     pub neighbors: u32,
+    /// Samples per pixel in each pass.
     pub spp: u32,
     /// Number of passes, each with its own seed.
     pub passes: u32,
@@ -82,10 +92,13 @@ pub struct Combination {
 /// Combinations in rows and columns, shown together on the contact sheet and the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
+    /// Heading of the figure.
     pub title: String,
+    /// Headings of the columns.
     pub columns: Vec<String>,
     /// Rows: a label, and for each column an index into [`Plan::combinations`].
     pub rows: Vec<(String, Vec<Option<usize>>)>,
+    /// Questions that the figure's rows answer.
     pub questions: Vec<Question>,
     /// Whether the figure is a plane with n in rows and k in columns, which is plotted.
     pub plane: bool,
@@ -103,6 +116,7 @@ impl Figure {
 pub struct Look {
     /// Exposure of the displayed pictures, stops.
     pub exposure: f32,
+    /// Tone curve of the displayed pictures.
     pub tonemap: Tonemap,
 }
 

@@ -7,9 +7,11 @@ use crate::layout::Gathered;
 /// Radii of one map's estimates, metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Radii {
+    /// Minimum, metres.
     pub min: f32,
     /// Median, to within 0.1 %, metres.
     pub median: f32,
+    /// Maximum, metres.
     pub max: f32,
 }
 

@@ -26,6 +26,7 @@ use crate::{
 /// Results of a study.
 #[derive(Clone, Debug)]
 pub struct Results {
+    /// Device on which the cells were rendered.
     pub device: DeviceStats,
     /// Rows in the order of [`Plan::combinations`].
     pub rows: Vec<Row>,

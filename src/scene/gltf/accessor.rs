@@ -1,4 +1,5 @@
-//! Accessors: every offset, stride, count and index is checked against the bytes that are there before any is used.
+//! Accessors: every offset, stride, count and index is checked against the available bytes before
+//! use.
 
 use std::collections::HashMap;
 
@@ -16,9 +17,9 @@ use super::meshopt;
 pub(super) struct Document<'a> {
     pub(super) root: &'a json::Root,
     buffers: Buffers<'a>,
-    /// What compressed bufferViews hold.
+    /// Decoded contents of compressed bufferViews.
     views: Vec<Option<Vec<u8>>>,
-    /// What compressed primitives hold, by accessor.
+    /// Decoded contents of compressed primitives, by accessor.
     unpacked: HashMap<usize, Unpacked>,
 }
 
@@ -36,14 +37,15 @@ impl<'a> Elements<'a> {
         &self.bytes[i * self.stride..][..self.size]
     }
 
-    /// All bytes, where there are none between the elements.
+    /// All bytes, if the elements are contiguous.
     fn tight(&self) -> Option<&'a [u8]> {
         (self.stride == self.size).then(|| &self.bytes[..self.count * self.size])
     }
 
-    /// The first element that holds a float that is none.
+    /// First element that holds a non-finite float.
     fn first_not_finite(&self) -> Option<usize> {
-        // Without a branch per float this is as quick as memory, for a file may have many accessors over the same bytes.
+        // Without a branch per float, the check runs at memory speed; a file may have many
+        // accessors over the same bytes.
         let largest = |bytes: &[u8]| bytes.chunks_exact(4).fold(0, |max, x| float32(x).abs().to_bits().max(max));
         if self.tight().is_some_and(|bytes| largest(bytes) <= f32::MAX.to_bits()) {
             return None;
@@ -52,7 +54,7 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// Elements that replace others.
+/// Sparse elements, which replace others.
 #[derive(Clone, Copy, Debug)]
 struct Sparse<'a> {
     /// Ascending, once [`Document::check`] has seen them.
@@ -66,7 +68,7 @@ impl<'a> Sparse<'a> {
         unsigned(self.indices.get(i), self.component)
     }
 
-    /// The element that replaces element `i`.
+    /// Element that replaces element `i`.
     fn get(&self, i: usize) -> Option<&'a [u8]> {
         let (mut low, mut high) = (0, self.indices.count);
         while low < high {
@@ -81,12 +83,12 @@ impl<'a> Sparse<'a> {
     }
 }
 
-/// The elements of one accessor, decoded one by one when they are asked for. Needs [`Document::check`].
+/// Elements of one accessor, each decoded on access. Needs [`Document::check`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Column<'a> {
     pub(super) format: Format,
     pub(super) count: usize,
-    /// Zeros where there are none.
+    /// Stored elements; zeros without them.
     dense: Option<Elements<'a>>,
     sparse: Option<Sparse<'a>>,
 }
@@ -116,7 +118,7 @@ impl Column<'_> {
         self.bytes(i).map_or(0, |bytes| unsigned(&bytes[at..], self.format.component))
     }
 
-    /// The largest first component, as an unsigned integer; none of no elements.
+    /// Maximum of the first components as unsigned integers; `None` without elements.
     pub(super) fn max_unsigned(&self) -> Option<u32> {
         let component = self.format.component;
         match (self.dense, self.sparse) {
@@ -137,7 +139,7 @@ impl Column<'_> {
         }
     }
 
-    /// All elements are zero, whatever their number.
+    /// Whether the accessor stores no data, so that all elements are zero.
     pub(super) fn is_zero(&self) -> bool {
         self.dense.is_none() && self.sparse.is_none()
     }
@@ -154,19 +156,20 @@ impl Column<'_> {
 }
 
 impl<'a> Document<'a> {
-    /// Decodes the compressed bufferViews. Compressed primitives wait for [`Self::with_primitives`].
+    /// Decodes the compressed bufferViews. [`Self::with_primitives`] decodes compressed primitives.
     pub(super) fn new(root: &'a json::Root, buffers: Buffers<'a>) -> Read<Self> {
         let views = meshopt::decode(root, &buffers)?;
         Ok(Self { root, buffers, views, unpacked: HashMap::new() })
     }
 
-    /// Gives the accessors of compressed primitives their elements, as `decode` reads them.
+    /// Sets the elements of the accessors of compressed primitives to those that `decode` returns.
     pub(super) fn with_primitives(mut self, decode: fn(&Self) -> Read<HashMap<usize, Unpacked>>) -> Read<Self> {
         self.unpacked = decode(&self)?;
         Ok(self)
     }
 
-    /// Checks all views and accessors, also those that nothing uses: ranges, references, and that floats are finite.
+    /// Checks all views and accessors, including unused ones: ranges, references, and that floats
+    /// are finite.
     pub(super) fn check(&self) -> Read<()> {
         for i in 0..self.root.buffer_views.len() {
             self.view(i, "")?;

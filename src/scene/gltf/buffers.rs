@@ -1,4 +1,4 @@
-//! Bytes of the buffers: the GLB's chunk, data URIs, and files beside the scene.
+//! Contents of buffers: the GLB's chunk, data URIs, and files beside the scene.
 
 use std::borrow::Cow;
 
@@ -13,7 +13,7 @@ use super::files::Resources;
 /// Bytes of each buffer, exactly `byteLength` of them; `None` where the file gives no data.
 pub(super) type Buffers<'a> = Vec<Option<Cow<'a, [u8]>>>;
 
-/// What is said of a buffer whose bytes are nowhere.
+/// Error message for a buffer without data.
 const NO_DATA: &str = "has no uri, and there is no binary chunk for it";
 
 /// Reads all buffers; `hash` takes the bytes of the files among them.
@@ -51,7 +51,7 @@ pub(super) fn read<'a>(root: &json::Root, resources: &Resources<'a>, hash: &mut 
     Ok(buffers)
 }
 
-/// Bytes of a buffer that something refers to.
+/// Bytes of a referenced buffer.
 pub(super) fn slice<'b>(
     buffers: &'b Buffers<'_>,
     buffer: usize,

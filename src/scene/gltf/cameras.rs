@@ -1,4 +1,4 @@
-//! Cameras of nodes. Positions are still the world's, in f64.
+//! Cameras of nodes, in world space and f64, before the scene's centre is subtracted.
 
 use std::f32::consts::PI;
 
@@ -11,7 +11,7 @@ use super::fault::{Read, fault};
 use super::nodes::PlacedNode;
 use crate::scene::{Camera, Projection};
 
-/// The camera that a node carries, with its number in the file and its place in the world.
+/// Camera of a node, with its index in the file and its world position.
 pub(super) fn read(root: &json::Root, placed: &PlacedNode) -> Read<Option<(usize, DVec3, Camera)>> {
     let node = &root.nodes[placed.node];
     let Some(index) = node.camera.map(|camera| camera.value()) else { return Ok(None) };
@@ -26,7 +26,8 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode) -> Read<Option<(usize
     Ok(Some((index, placed.world.w_axis.truncate(), camera)))
 }
 
-/// What the camera at `place` sees, and the picture's width over its height where the file says.
+/// Projection of the camera at JSON path `place`, and the aspect ratio (width over height) if the
+/// file gives one.
 fn projection(camera: &json::Camera, place: &str) -> Read<(Projection, Option<f32>)> {
     let positive = |x: f32| x.is_normal() && x > 0.0;
     let view = match (&camera.type_, &camera.perspective, &camera.orthographic) {
@@ -59,7 +60,7 @@ fn projection(camera: &json::Camera, place: &str) -> Read<(Projection, Option<f3
     Ok(view)
 }
 
-/// Unit axes of a camera: right, up and the direction of view. None where the transform leaves no direction.
+/// Unit axes of a camera: right, up and the view direction. `None` if the transform is degenerate.
 fn axes(world: DMat4) -> Option<[Vec3; 3]> {
     let (forward, up) = (-world.z_axis.truncate().normalize_or_zero(), world.y_axis.truncate());
     let right = forward.cross(up.normalize_or_zero()).normalize_or_zero();

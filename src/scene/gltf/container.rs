@@ -1,4 +1,4 @@
-//! The container: a GLB's chunks, or plain JSON.
+//! Container: the chunks of a GLB, or plain JSON.
 
 use super::fault::{Read, fault};
 
@@ -12,7 +12,7 @@ pub(super) fn split(bytes: &[u8]) -> Read<(&[u8], Option<&[u8]>)> {
     }
 }
 
-/// Chunks of a GLB; unknown ones are skipped, as the format asks.
+/// Chunks of a GLB; unknown chunks are skipped, as the format requires.
 fn split_glb(bytes: &[u8]) -> Read<(&[u8], Option<&[u8]>)> {
     let word = |at: usize| -> Option<u32> { bytes.get(at..at + 4)?.try_into().ok().map(u32::from_le_bytes) };
     let (Some(version), Some(length)) = (word(4), word(8)) else {

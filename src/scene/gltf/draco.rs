@@ -15,21 +15,21 @@ use super::format::{Format, MAX_ZEROS, Unpacked};
 
 const NAME: &str = "KHR_draco_mesh_compression";
 
-/// What attributes begin with that are read.
+/// Prefixes of the names of attributes that are read.
 const READ: [&str; 4] = ["POSITION", "NORMAL", "JOINTS_", "WEIGHTS_"];
 
-/// Bytes of attributes that a vertex may have: those of glTF take less than 200.
+/// Maximum size of a vertex's attributes, bytes; those of glTF take less than 200.
 const BYTES_PER_VERTEX: u64 = 1024;
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Compressed {
     buffer_view: usize,
-    /// The stream's own numbers of the attributes, by their names.
+    /// Attribute identifiers in the stream, by attribute name.
     attributes: HashMap<String, u32>,
 }
 
-/// Vertices and indices per byte of the file's buffers, once there are many.
+/// Maximum number of vertices and indices per byte of the file's buffers, for large counts.
 const MAX_RATIO: u64 = 64;
 
 /// A primitive to decode.
@@ -39,17 +39,17 @@ struct CompressedPrimitive<'a> {
     place: String,
 }
 
-/// The elements of all accessors that compressed primitives hold.
+/// Elements of all accessors of compressed primitives.
 pub(super) fn decode(document: &Document<'_>) -> Read<HashMap<usize, Unpacked>> {
     let mut unpacked = HashMap::new();
     let mut origins: HashMap<usize, usize> = HashMap::new();
-    // A stream of a few bytes may hold millions of equal vertices, hence a bound on what all claim together.
+    // A stream of a few bytes may hold millions of equal vertices, hence the limit on the total.
     let mut left = MAX_ZEROS.max(MAX_RATIO * document.held());
     for (i, mesh) in document.root.meshes.iter().enumerate() {
         for (j, primitive) in mesh.primitives.iter().enumerate() {
             let Some(packed) = packed(document, primitive, format!("meshes[{i}].primitives[{j}]"))? else { continue };
             let view = packed.compressed.buffer_view;
-            // Primitives that share accessors share the stream.
+            // Primitives with the same accessors must have the same stream.
             if let Some(indices) = primitive.indices.and_then(|indices| origins.insert(indices.value(), view)) {
                 if indices != view {
                     return fault(packed.place, "its indices come out of another bufferView too");
@@ -62,7 +62,7 @@ pub(super) fn decode(document: &Document<'_>) -> Read<HashMap<usize, Unpacked>> 
     Ok(unpacked)
 }
 
-/// What a primitive says of its stream; none where it is not compressed, or comes uncompressed as well.
+/// Stream of a primitive; `None` if it is not compressed, or also stored uncompressed.
 fn packed<'a>(
     document: &Document<'a>,
     primitive: &'a Primitive,
@@ -116,7 +116,7 @@ impl CompressedPrimitive<'_> {
         Ok(())
     }
 
-    /// How many vertices the accessors of the compressed attributes have.
+    /// Number of vertices by the accessors of the compressed attributes.
     fn vertices(&self, document: &Document<'_>) -> Read<u64> {
         let mut vertices = None;
         for name in self.compressed.attributes.keys() {
@@ -146,7 +146,7 @@ impl CompressedPrimitive<'_> {
         Ok(Unpacked { bytes, format })
     }
 
-    /// An attribute in the type that its accessor says.
+    /// Attribute in the component type of its accessor.
     fn attribute(
         &self,
         document: &Document<'_>,

@@ -1,4 +1,4 @@
-//! The extensions that a file may use or require.
+//! Extensions that a file may use or require.
 
 use std::collections::HashSet;
 
@@ -9,7 +9,7 @@ use super::fault::{Notes, Read, fault};
 /// Compressed bufferViews.
 pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
 
-/// Extensions that are read, or that change nothing which is read.
+/// Extensions that are read, or that do not affect what is read.
 const SUPPORTED: [&str; 13] = [
     "EXT_mesh_gpu_instancing",
     MESHOPT,
@@ -26,7 +26,8 @@ const SUPPORTED: [&str; 13] = [
     "KHR_texture_transform",
 ];
 
-/// Refuses by name what is required and not supported, unless it is among the `ignored`, and names what else is not read.
+/// Refuses required unsupported extensions by name, unless they are among the `ignored`, and notes
+/// other extensions that are not read.
 pub(super) fn check(used: &[String], required: &[String], ignored: &[String], notes: &mut Notes) -> Read<()> {
     let unsupported = |name: &&String| !SUPPORTED.contains(&name.as_str());
     for (i, name) in required.iter().enumerate().filter(|(_, name)| unsupported(name)) {
@@ -43,7 +44,7 @@ pub(super) fn check(used: &[String], required: &[String], ignored: &[String], no
     Ok(())
 }
 
-/// A buffer has no bytes of its own because all views of it are compressed.
+/// Whether a buffer has no data because all its views are compressed.
 pub(super) fn is_fallback(buffer: &json::Buffer) -> bool {
     buffer.extensions.as_ref().is_some_and(|extensions| extensions.others.contains_key(MESHOPT))
 }

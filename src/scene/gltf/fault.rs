@@ -1,4 +1,4 @@
-//! What is wrong with a file, before the file's name is known, and what was ignored in it.
+//! Faults of a file, independent of the file's name, and notes on ignored parts.
 
 use std::{collections::HashSet, path::Path};
 
@@ -20,13 +20,14 @@ pub(crate) fn fault<T>(place: impl Into<String>, problem: impl Into<String>) -> 
 }
 
 impl Fault {
-    /// The error that a user sees.
+    /// Converts the fault to the error that a user sees.
     pub(crate) fn of(self, path: &Path) -> Error {
         Error::Scene { path: path.to_owned(), place: one_line(&self.place), problem: one_line(&self.problem) }
     }
 }
 
-/// What was ignored or read in a special way: each line once, in the order of its first appearance.
+/// Notes on parts that were ignored or read in a special way: each line once, in the order of first
+/// appearance.
 #[derive(Debug, Default)]
 pub(crate) struct Notes {
     lines: Vec<String>,

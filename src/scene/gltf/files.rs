@@ -1,4 +1,4 @@
-//! Files that a scene names by URI: where they may lie, and how they are opened.
+//! Files that a scene names by URI: permitted locations, and reading.
 
 use std::fs::{self, File};
 use std::io::{self, Read as _};
@@ -8,18 +8,18 @@ use gltf::json;
 
 use super::fault::{Read, fault};
 
-/// Where the bytes of buffers come from.
+/// Sources of buffer data.
 pub(super) struct Resources<'a> {
     /// The binary chunk of a GLB.
     pub(super) bin: Option<&'a [u8]>,
     /// Folder of the scene's file.
     pub(super) folder: &'a Path,
-    /// Files may lie outside of the folder.
+    /// Whether files outside the folder are permitted.
     pub(super) allow_outside: bool,
 }
 
-/// The first `most` bytes of a file, or all if it is shorter. Pipes and devices are refused: they may never end, or never
-/// begin.
+/// Reads the first `most` bytes of a file, or all if it is shorter. Pipes and devices are refused,
+/// as reading them may block or never end.
 pub(super) fn read_regular(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let metadata = fs::metadata(path)?;
     if metadata.is_dir() {
@@ -67,7 +67,7 @@ impl Resources<'_> {
         let encoded = match scheme.as_deref() {
             None => rest,
             Some("file") => rest.strip_prefix("//localhost").or(rest.strip_prefix("//")).unwrap_or(rest),
-            // The drive of a path of Windows.
+            // Drive letter of a Windows path.
             Some(drive) if drive.len() == 1 => uri,
             Some(_) => return fault(place, format!("{uri:?}: only data URIs and files are read")),
         };

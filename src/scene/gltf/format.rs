@@ -1,14 +1,15 @@
-//! Format of an accessor's elements, and numbers out of their bytes.
+//! Format of an accessor's elements, and conversion of their bytes to numbers.
 
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 
 use super::fault::{Read, fault};
 
-/// Elements that an accessor without a bufferView (all zeros but for sparse ones) may have.
+/// Maximum number of elements in an accessor without a bufferView (zeros except for sparse
+/// elements).
 pub(super) const MAX_ZEROS: u64 = 1 << 24;
 
-/// Elements of an accessor that come out of a compressed primitive, one after the other.
+/// Contiguous elements of an accessor, decoded from a compressed primitive.
 #[derive(Debug)]
 pub(super) struct Unpacked {
     pub(super) bytes: Vec<u8>,
@@ -31,7 +32,8 @@ impl Format {
         Ok(Self { kind, component: component.0, normalized: accessor.normalized })
     }
 
-    /// Bytes of one element. Matrices of small integers, whose columns are padded, are read by nobody.
+    /// Size of one element, bytes. Matrices of small integers, whose columns are padded, are not
+    /// read.
     pub(super) fn size(self) -> usize {
         self.component.size() * self.kind.multiplicity()
     }
@@ -56,7 +58,7 @@ pub(super) fn float32(bytes: &[u8]) -> f32 {
     f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
 }
 
-/// A number of any type; normalised integers are spread over 0..1 or -1..1 (glTF 2.0, 3.11).
+/// Number of any component type; normalised integers map to 0..1 or -1..1 (glTF 2.0, 3.11).
 pub(super) fn number(bytes: &[u8], format: Format) -> f32 {
     let (value, max) = match format.component {
         ComponentType::F32 => return float32(bytes),

@@ -10,7 +10,7 @@ use super::fault::{Read, fault};
 
 const NAME: &str = "EXT_mesh_gpu_instancing";
 
-/// Where the instances of one node stand relative to it.
+/// Transforms of the instances of one node relative to it.
 #[derive(Clone, Debug)]
 pub(super) struct Instances<'d> {
     pub(super) count: usize,
@@ -20,7 +20,7 @@ pub(super) struct Instances<'d> {
     place: String,
 }
 
-/// The instances of a node; none where its mesh stands there once.
+/// Instances of a node; `None` if the node does not use the extension.
 pub(super) fn read<'d>(document: &'d Document<'_>, index: usize) -> Read<Option<Instances<'d>>> {
     let extensions = document.root.nodes[index].extensions.as_ref();
     let Some(extension) = extensions.and_then(|extensions| extensions.others.get(NAME)) else { return Ok(None) };

@@ -1,4 +1,5 @@
-//! Lights of nodes (KHR_lights_punctual). Positions are still the world's, in f64.
+//! Lights of nodes (KHR_lights_punctual), in world space and f64, before the scene's centre is
+//! subtracted.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
@@ -12,10 +13,10 @@ use super::fault::{Notes, Read, fault};
 use super::nodes::{self, PlacedNode};
 use crate::scene::{Light, LightKind};
 
-/// A light and its place in the world; a directional one has none.
+/// A light and its world position; a directional light has none.
 pub(super) type PlacedLight = (Option<DVec3>, Light);
 
-/// The light that a node carries, unless it is dark.
+/// Light of a node, unless it is dark.
 pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) -> Read<Option<PlacedLight>> {
     let node = &root.nodes[placed.node];
     let Some(reference) = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref())
@@ -65,7 +66,7 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
     Ok(Some((position, Light { name, kind, position: Vec3::ZERO, direction, intensity })))
 }
 
-/// The cones of the spot light at `place`.
+/// Cones of the spot light at JSON path `place`.
 fn spot(spot: Option<&Spot>, name: &str, place: &str, notes: &mut Notes) -> Read<LightKind> {
     let (inner, outer) = spot.map_or((0.0, FRAC_PI_4), |spot| (spot.inner_cone_angle, spot.outer_cone_angle));
     if !(outer > 0.0 && outer <= FRAC_PI_2) {
@@ -76,7 +77,8 @@ fn spot(spot: Option<&Spot>, name: &str, place: &str, notes: &mut Notes) -> Read
         return fault(format!("{place}.spot.innerConeAngle"), problem);
     }
     if inner == outer {
-        // The specification wants them apart, but exporters write this for an edge without falloff.
+        // The specification requires distinct angles, but exporters write equal ones for an edge
+        // without falloff.
         notes.add(format!("light {name:?}: inner and outer cone are equal; the falloff between them is very narrow"));
         return Ok(LightKind::Spot { inner: outer.next_down(), outer });
     }

@@ -1,4 +1,4 @@
-//! Materials: read as the nearest of the four surfaces, and what that loses is said.
+//! Materials: each is approximated by the nearest of the four surface models, and losses are noted.
 
 use glam::Vec3;
 use gltf::json;
@@ -7,10 +7,10 @@ use json::validation::Checked;
 use super::fault::{Notes, Read, fault};
 use crate::scene::{Material, Surface};
 
-/// Below this roughness, a lobe is narrower than a pixel and read as a single direction.
+/// Roughness below which a lobe is narrower than a pixel and is read as specular.
 const DELTA_ROUGHNESS: f32 = 0.03;
 
-/// glTF's index of refraction where the file says none.
+/// Default index of refraction in glTF.
 const DEFAULT_IOR: f32 = 1.5;
 
 /// Name of a file's material.
@@ -36,7 +36,7 @@ pub(super) fn read(root: &json::Root, index: usize, notes: &mut Notes) -> Read<M
     Ok(Material { name, surface, emission, double_sided: material.double_sided })
 }
 
-/// The surface that comes nearest.
+/// Nearest surface model.
 fn surface(material: &json::Material, name: &str, place: &str, notes: &mut Notes) -> Read<Surface> {
     let pbr = &material.pbr_metallic_roughness;
     let (metallic, roughness) = (pbr.metallic_factor.0, pbr.roughness_factor.0);
@@ -87,7 +87,7 @@ fn surface(material: &json::Material, name: &str, place: &str, notes: &mut Notes
     Ok(Surface::Diffuse { albedo: color })
 }
 
-/// Says what becomes of the roughness of a mirror or glass.
+/// Notes how the roughness of a mirror or glass is approximated.
 fn note_roughness(roughness: f32, name: &str, notes: &mut Notes) {
     if roughness >= DELTA_ROUGHNESS {
         notes.add(format!("material {name:?}: roughness {roughness} is read as 0 until rough materials come"));
@@ -101,7 +101,8 @@ fn specular_factor(material: &json::Material) -> f32 {
     specular.map_or(1.0, |specular| specular.specular_factor.0)
 }
 
-/// Index of refraction, ≥ 1; or 0, for which Fresnel's equations are to give 1 (KHR_materials_ior).
+/// Index of refraction, ≥ 1; or 0, for which the Fresnel reflectance is defined as 1
+/// (KHR_materials_ior).
 fn ior(material: &json::Material, place: &str) -> Read<f32> {
     let ior = material.extensions.as_ref().and_then(|extensions| extensions.ior.as_ref());
     let ior = ior.map_or(DEFAULT_IOR, |ior| ior.ior.0);
@@ -115,7 +116,7 @@ fn ior(material: &json::Material, place: &str) -> Read<f32> {
     }
 }
 
-/// Radiance that the surface sends out: its factor times its strength, nits read as W/(m² sr).
+/// Emitted radiance: emissive factor times strength, with nits read as W/(m² sr).
 fn emission(material: &json::Material, name: &str, place: &str, notes: &mut Notes) -> Read<Vec3> {
     let factor = Vec3::from_array(material.emissive_factor.0);
     if !factor.is_finite() || factor.min_element() < 0.0 {
@@ -138,7 +139,7 @@ fn emission(material: &json::Material, name: &str, place: &str, notes: &mut Note
     Ok(emission)
 }
 
-/// Names what the material has beyond its factors.
+/// Notes the properties of the material beyond its factors.
 fn note_unread(material: &json::Material, notes: &mut Notes) {
     let pbr = &material.pbr_metallic_roughness;
     let extensions = material.extensions.as_ref();

@@ -1,15 +1,16 @@
-//! How large a scene may be: known before any of it is allocated.
+//! Limits of a scene's size, checked before allocation.
 
 use super::fault::{Read, fault};
 use crate::memory::available;
 
-/// Triangles that a scene may have, so that numbers of nodes and primitives fit into 28 bits, and those of corners into 32.
+/// Maximum number of triangles, with which indices of nodes and primitives fit into 28 bits, and
+/// those of corners into 32.
 const MAX_TRIANGLES: usize = 100_000_000;
 
-/// Memory that a triangle takes from mesh to hierarchy, bytes.
+/// Memory per triangle from mesh to hierarchy, bytes.
 const BYTES_PER_TRIANGLE: u64 = 400;
 
-/// Refuses more triangles than can be held.
+/// Refuses more triangles than the limits permit.
 pub(super) fn check(triangles: usize) -> Read<()> {
     if triangles > MAX_TRIANGLES {
         return fault("scene", format!("{triangles} triangles, at most {MAX_TRIANGLES} are read"));

@@ -1,4 +1,4 @@
-//! Meshes shown by nodes: each read once for all nodes that make the same of it.
+//! Meshes shown by nodes: each is read once for all nodes with the same deformation.
 
 use std::collections::{HashMap, hash_map::Entry::Vacant};
 
@@ -25,24 +25,25 @@ pub(super) struct MeshInstance<'a> {
 }
 
 impl MeshInstance<'_> {
-    /// How many times the mesh is there.
+    /// Number of copies of the mesh.
     pub(super) fn copies(&self) -> usize {
         self.instances.map_or(1, |instances| instances.count)
     }
 
-    /// The transform of copy `i` into the world, unless a skin moves it.
+    /// World transform of copy `i`, unless it has a skin.
     pub(super) fn world(&self, i: usize) -> Read<DMat4> {
         self.instances.map_or(Ok(self.world), |instances| Ok(self.world * instances.local(i)?))
     }
 
-    /// The transform of a vertex of a primitive into the world: `otherwise` where no skin moves it.
+    /// World transform of a vertex of a primitive: `otherwise` without a skin.
     pub(super) fn matrix(&self, primitive: &MeshPrimitive, vertex: usize, otherwise: DMat4) -> DMat4 {
         let Some(influences) = primitive.influences.get(vertex) else { return otherwise };
         influences.iter().fold(DMat4::ZERO, |sum, held| sum + self.pose[held.joint as usize] * held.weight)
     }
 }
 
-/// Meshes, instances and skin poses of all nodes of a scene; a mesh that several nodes deform alike is read once.
+/// Meshes, instances and skin poses of all nodes of a scene; a mesh that several nodes deform
+/// equally is read once.
 #[derive(Debug, Default)]
 pub(super) struct MeshCache<'d> {
     entries: Vec<Entry<'d>>,
@@ -59,11 +60,13 @@ struct Entry<'d> {
     skin: Option<usize>,
 }
 
-/// How a mesh is read: its number, the node whose own weights it has, and the joints of its skin.
+/// Key of a mesh: its index, the node whose own weights it has, and the number of joints of its
+/// skin.
 type MeshKey = (usize, Option<usize>, Option<usize>);
 
 impl<'d> MeshCache<'d> {
-    /// Reads the meshes of the nodes. Needs [`meshes::check`], whose `shapes` these are, and [`skins::check`].
+    /// Reads the meshes of the nodes. Needs [`meshes::check`], whose `shapes` these are, and
+    /// [`skins::check`].
     pub(super) fn read(
         document: &'d Document<'_>,
         placed: &[PlacedNode],

@@ -1,4 +1,4 @@
-//! Meshes in their own coordinates: the triangles that a node shows, with its morph targets applied.
+//! Meshes in object space: the triangles that a node shows, with its morph targets applied.
 
 use glam::Vec3;
 use gltf::json;
@@ -12,39 +12,41 @@ use super::topology::corners;
 /// Triangles that share vertices and a material.
 #[derive(Debug, Default)]
 pub(super) struct MeshPrimitive {
-    /// Those that a corner is at; all finite.
+    /// Positions of the vertices in use; all finite.
     pub(super) positions: Vec<Vec3>,
-    /// One for each position, of any length; `None` where the file has none.
+    /// Normals, one per position, of any length; `None` if the file has none.
     pub(super) normals: Option<Vec<Vec3>>,
     /// Indices into the positions, all valid.
     pub(super) corners: Vec<[u32; 3]>,
-    /// Triangles that the file has, also those left out because two of their corners are at one place.
+    /// Number of triangles in the file, including those left out because two of their corners
+    /// coincide.
     pub(super) claimed: usize,
-    /// Index into the file's materials, valid; `None` for the default one.
+    /// Valid index into the file's materials; `None` for the default material.
     pub(super) material: Option<usize>,
-    /// What moves each position, where a skin does; else empty.
+    /// Joint influences per position; empty without a skin.
     pub(super) influences: Vec<Vec<Influence>>,
 }
 
-/// A joint's hold on a vertex.
+/// Influence of a joint on a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Influence {
     /// Index into the joints of the skin, valid.
     pub(super) joint: u32,
-    /// > 0; those of a vertex sum to 1.
+    /// Weight > 0; the weights of a vertex sum to 1.
     pub(super) weight: f64,
 }
 
-/// What a node makes of a mesh.
+/// Deformation of a mesh by a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Deformation<'a> {
-    /// A factor for each morph target; all 0 if empty.
+    /// Weights of the morph targets; all 0 if empty.
     pub(super) weights: &'a [f32],
-    /// Number of joints, where a skin moves it.
+    /// Number of joints, if the node has a skin.
     pub(super) joints: Option<usize>,
 }
 
-/// The primitives of all meshes that have triangles, by mesh and primitive; those that no node shows are checked too.
+/// Primitives with triangles of all meshes, by mesh and primitive; those that no node shows are
+/// checked too.
 pub(super) fn check(document: &Document<'_>, notes: &mut Notes) -> Read<Vec<Vec<Option<Shape>>>> {
     let mut checker = Checker::new(document);
     let mut meshes = Vec::with_capacity(document.root.meshes.len());
@@ -59,7 +61,7 @@ pub(super) fn check(document: &Document<'_>, notes: &mut Notes) -> Read<Vec<Vec<
     Ok(meshes)
 }
 
-/// As many weights as morph targets, where there are any.
+/// Checks that there are as many weights as morph targets, if there are weights.
 pub(super) fn check_weights(primitive: &Primitive, weights: Option<&[f32]>, place: &str) -> Read<()> {
     let targets = primitive.targets.as_ref().map_or(0, Vec::len);
     match weights {
@@ -136,10 +138,10 @@ fn read_part(
     Ok(part)
 }
 
-/// The vertices that some corner is at, in the order of their first appearance.
+/// Vertices in use, in the order of their first appearance.
 struct Vertices {
-    /// For each vertex its number among the used ones plus one; 0 for the others. A list of zeros costs no memory where it
-    /// is not written, however many vertices the file claims.
+    /// For each vertex its index among those in use plus one; 0 for unused vertices. Pages of zeros
+    /// that are never written take no memory, however many vertices the file claims.
     slots: Vec<u32>,
     used: Vec<u32>,
 }
@@ -155,14 +157,14 @@ impl Vertices {
     }
 }
 
-/// A morph target and its factor.
+/// A morph target and its weight.
 struct Morph<'a> {
     weight: f32,
     positions: Option<Column<'a>>,
     normals: Option<Column<'a>>,
 }
 
-/// The targets that move something.
+/// Morph targets of non-zero weight that displace the attribute.
 fn morphs<'d>(document: &'d Document<'_>, primitive: &Primitive, weights: &[f32], place: &str) -> Read<Vec<Morph<'d>>> {
     let mut morphs = Vec::new();
     for (target, weight) in primitive.targets.iter().flatten().zip(weights).filter(|(_, weight)| **weight != 0.0) {
@@ -174,7 +176,7 @@ fn morphs<'d>(document: &'d Document<'_>, primitive: &Primitive, weights: &[f32]
     Ok(morphs)
 }
 
-/// A vector of a vertex plus what the morph targets add to it (glTF 2.0, 3.7.2.2).
+/// Vertex attribute plus its morph displacements (glTF 2.0, 3.7.2.2).
 fn morphed<'d>(
     base: &Column<'_>,
     morphs: &'d [Morph<'d>],
@@ -188,7 +190,7 @@ fn morphed<'d>(
         .fold(base.vector(vertex), |sum, added| sum + added)
 }
 
-/// The joints that move each of the vertices, with weights that sum to 1.
+/// Joint influences of each of the vertices, with weights that sum to 1.
 fn influences(
     document: &Document<'_>,
     primitive: &Primitive,
@@ -209,7 +211,8 @@ fn influences(
         let mut influences: Vec<Influence> =
             pairs.filter(|(_, weight)| *weight > 0.0).map(|(joint, weight)| Influence { joint, weight }).collect();
         if influences.is_empty() {
-            // Illegal, but common: such a vertex goes with its first joint, as in other renderers.
+            // Zero weights are invalid but common: the vertex follows its first joint, as in other
+            // renderers.
             influences.push(Influence { joint: sets[0].0.unsigned(*vertex as usize, 0), weight: 1.0 });
         }
         if let Some(beyond) = influences.iter().find(|influence| influence.joint as usize >= joints) {

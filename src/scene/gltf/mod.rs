@@ -1,8 +1,8 @@
 //! glTF reader, the only user of the gltf crate.
 //!
-//! The crate parses the JSON and validates nothing. What is read from it is checked here before it indexes anything,
-//! in this order: container, JSON, graph, buffers, accessors, skins, meshes; then what the nodes of the scene show is decoded
-//! and placed.
+//! The crate parses the JSON without validation. This module checks every value before its use as
+//! an index, in this order: container, JSON, graph, buffers, accessors, skins, meshes. Then the
+//! contents of the scene's nodes are decoded and transformed to the world.
 
 use std::path::Path;
 
@@ -79,7 +79,7 @@ fn parse<'a>(bytes: &'a [u8], options: &LoadOptions, notes: &mut Notes) -> Read<
     Ok((root, bin))
 }
 
-/// Reads all that the chosen scene shows. `hash` has taken the file's own bytes.
+/// Reads everything that the chosen scene shows. `hash` has taken the file's own bytes.
 fn assemble(
     root: &json::Root,
     chosen: usize,
@@ -123,8 +123,8 @@ fn assemble(
     Ok(scene)
 }
 
-/// Reads the materials that something shows. Returns for each of the file's, and for the default one after them, its
-/// index in the scene.
+/// Reads the materials in use. Returns the index in the scene for each of the file's materials,
+/// followed by that of the default material.
 fn read_materials(
     root: &json::Root,
     instances: &[MeshInstance<'_>],
@@ -152,7 +152,7 @@ fn read_materials(
 #[derive(Default)]
 struct NodeContents {
     lights: Vec<PlacedLight>,
-    /// With the number in the file, which decides their order.
+    /// With the index in the file, which determines their order.
     cameras: Vec<(usize, DVec3, Camera)>,
     spheres: Vec<PlacedSphere>,
 }
@@ -169,7 +169,7 @@ impl NodeContents {
         Ok(contents)
     }
 
-    /// Moves lights and cameras into the scene; a framing camera stands in where there is none.
+    /// Moves lights and cameras into the scene; without a camera, adds one that frames the scene.
     fn finish(self, scene: &mut Scene, notes: &mut Notes) {
         let center = scene.center;
         let at = |position: DVec3| (position - center).as_vec3();

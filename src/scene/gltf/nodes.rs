@@ -1,4 +1,5 @@
-//! The graph of nodes: checked for cycles, flattened in the order of the file, transforms accumulated in f64.
+//! Node graph: checked for cycles, flattened in the order of the file, with transforms accumulated
+//! in f64.
 
 use glam::{DMat4, DQuat, DVec3};
 use gltf::json;
@@ -7,14 +8,14 @@ use json::scene::Node;
 use super::fault::{Read, fault};
 use crate::{Error, Result};
 
-/// A node with its place in the world.
+/// A node with its transform to the world.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlacedNode {
     pub(super) node: usize,
     pub(super) world: DMat4,
 }
 
-/// Checks what nodes and scenes refer to, and that the nodes are a forest.
+/// Checks the references of nodes and scenes, and that the nodes form a forest.
 pub(super) fn check(root: &json::Root) -> Read<()> {
     let known = |index: Option<usize>, count: usize, place: &dyn Fn() -> String| match index {
         Some(index) if index >= count => fault(place(), format!("{index} of {count}")),
@@ -41,7 +42,7 @@ pub(super) fn check(root: &json::Root) -> Read<()> {
     }
     known(root.scene.map(|scene| scene.value()), root.scenes.len(), &|| "scene".to_owned())?;
 
-    // With one parent each, the nodes that no root reaches are those of cycles.
+    // As each node has at most one parent, the nodes that no root reaches belong to cycles.
     let mut reached: Vec<bool> = parents.iter().map(|count| *count == 0).collect();
     let mut open: Vec<usize> = (0..root.nodes.len()).filter(|i| reached[*i]).collect();
     while let Some(node) = open.pop() {
@@ -56,8 +57,9 @@ pub(super) fn check(root: &json::Root) -> Read<()> {
     }
 }
 
-/// Index of the scene to show: the one of that name, else of that number; the default one, else the first, if none is
-/// asked for. Needs [`check`]. A file without scenes has 0, which [`flatten`] reads as all of its nodes.
+/// Index of the scene to show: the one of that name, else of that index. Without a choice, it is
+/// the default scene, else the first. Needs [`check`]. For a file without scenes it is 0, which
+/// [`flatten`] reads as all nodes.
 pub(super) fn choose_scene(root: &json::Root, wanted: Option<&str>, file_name: &str) -> Result<usize> {
     let Some(wanted) = wanted else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
     let named = root.scenes.iter().position(|scene| scene.name.as_deref() == Some(wanted));
@@ -71,7 +73,7 @@ pub(super) fn choose_scene(root: &json::Root, wanted: Option<&str>, file_name: &
     })
 }
 
-/// The transform of every node in the world, whether a scene shows it or not. Needs [`check`].
+/// World transform of every node, whether a scene shows it or not. Needs [`check`].
 pub(super) fn worlds(root: &json::Root) -> Read<Vec<DMat4>> {
     let mut worlds = vec![DMat4::IDENTITY; root.nodes.len()];
     let mut open = roots(root);
@@ -95,7 +97,8 @@ fn roots(root: &json::Root) -> Vec<usize> {
     (0..root.nodes.len()).filter(|i| is_root[*i]).collect()
 }
 
-/// Nodes of a scene (all of them where the file has no scenes) that carry something, parents first. Needs [`check`].
+/// Nodes of a scene that have contents, parents first; of all nodes if the file has no scenes.
+/// Needs [`check`].
 pub(super) fn flatten(root: &json::Root, scene: usize, worlds: &[DMat4]) -> Read<Vec<PlacedNode>> {
     let mut open: Vec<usize> = match root.scenes.get(scene) {
         Some(scene) => scene.nodes.iter().rev().map(|node| node.value()).collect(),
@@ -119,7 +122,7 @@ pub(super) fn flatten(root: &json::Root, scene: usize, worlds: &[DMat4]) -> Read
     Ok(placed)
 }
 
-/// A node's own transform.
+/// Local transform of a node.
 fn local(node: &Node, index: usize) -> Read<DMat4> {
     if let Some(matrix) = node.matrix {
         return Ok(DMat4::from_cols_array(&matrix.map(f64::from)));
@@ -134,7 +137,7 @@ fn local(node: &Node, index: usize) -> Read<DMat4> {
     Ok(DMat4::from_scale_rotation_translation(scale, rotation / length, translation))
 }
 
-/// What to call a node in messages and lists.
+/// Name of a node for messages and lists.
 pub(super) fn name(node: &Node, fallback: &str, index: usize) -> String {
     node.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("{fallback} {index}"))
 }

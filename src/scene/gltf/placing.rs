@@ -1,4 +1,4 @@
-//! Meshes placed in the world by their nodes, in f64 until the middle of the scene is subtracted.
+//! Meshes transformed to the world by their nodes, in f64 until the scene's centre is subtracted.
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
@@ -7,13 +7,13 @@ use super::mesh_cache::MeshInstance;
 use super::meshes::MeshPrimitive;
 use crate::scene::Triangle;
 
-/// Size that a scene may have, metres.
+/// Maximum size of a scene, metres.
 pub(super) const MAX_EXTENT: f64 = 1e18;
 
-/// What is said of a larger one.
+/// Error message for a larger scene.
 pub(super) const TOO_FAR: &str = "lies too far away to compute with: more than 1e18 m from the rest";
 
-/// Box in the world around points.
+/// Bounding box of points, world space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WorldBounds {
     min: DVec3,
@@ -29,13 +29,13 @@ impl WorldBounds {
         self.max = self.max.max(point + radius);
     }
 
-    /// Whether areas within the box can be computed in f32.
+    /// Whether areas within the box are representable in f32.
     pub(super) fn fits(&self) -> bool {
         let extent = self.max - self.min;
         self.min.x > self.max.x || extent.max_element() < MAX_EXTENT
     }
 
-    /// Middle of the box; the origin for the empty one.
+    /// Centre of the box; the origin if it is empty.
     pub(super) fn center(&self) -> DVec3 {
         if self.min.x <= self.max.x { 0.5 * (self.min + self.max) } else { DVec3::ZERO }
     }
@@ -102,7 +102,7 @@ fn total(primitives: &[MeshPrimitive], of: impl Fn(&MeshPrimitive) -> usize) -> 
     primitives.iter().map(of).sum()
 }
 
-/// The triangles of one primitive that have an area.
+/// Triangles of one primitive with non-zero area.
 fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, material: u32, triangles: &mut Vec<Triangle>) {
     let linear = DMat3::from_mat4(to_scene);
     let mirrored = linear.determinant() < 0.0;
@@ -119,7 +119,7 @@ fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, material: u32, triang
     add_triangles(primitive, |_| mirrored, of, material, triangles);
 }
 
-/// The same where joints move each vertex in its own way.
+/// The same for a skin, whose joints transform each vertex separately.
 fn place_skinned(
     instance: &MeshInstance<'_>,
     primitive: &MeshPrimitive,
@@ -143,7 +143,8 @@ fn place_skinned(
     add_triangles(primitive, mirrored, of, material, triangles);
 }
 
-/// Adds the triangles of a primitive that have an area. `of` gives their corners' positions and normals.
+/// Adds the triangles of a primitive with non-zero area. `of` gives their corners' positions and
+/// normals.
 fn add_triangles(
     primitive: &MeshPrimitive,
     mirrored: impl Fn(usize) -> bool,
@@ -152,7 +153,8 @@ fn add_triangles(
     triangles: &mut Vec<Triangle>,
 ) {
     for &[a, b, c] in &primitive.corners {
-        // A mirroring transform turns the winding round; swapping two corners keeps the outside outside.
+        // A mirroring transform reverses the winding; swapping two corners preserves the front
+        // side.
         let corners = if mirrored(a as usize) { [a, c, b] } else { [a, b, c] }.map(|corner| corner as usize);
         let (positions, normals) = of(corners);
         let mut triangle = Triangle { positions, normals: [Vec3::ZERO; 3], material };
@@ -166,7 +168,8 @@ fn add_triangles(
     }
 }
 
-/// Matrix that takes normals along: the inverse transpose up to a positive factor, also where there is no inverse.
+/// Normal matrix: the inverse transpose up to a positive factor, defined also for singular
+/// matrices.
 fn cofactors(m: DMat3, mirrored: bool) -> DMat3 {
     let sign = if mirrored { -1.0 } else { 1.0 };
     DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis)) * sign

@@ -1,4 +1,4 @@
-//! What a primitive refers to: every accessor checked, none decoded.
+//! References of a primitive: every accessor is checked, none is decoded.
 
 use std::collections::HashMap;
 
@@ -12,18 +12,18 @@ use super::fault::{Notes, Read, fault};
 use super::format::Format;
 use super::topology::triangle_count;
 
-/// Sets of four joints that a vertex may have.
+/// Maximum number of sets of four joints of a vertex.
 const MAX_JOINT_SETS: u32 = 8;
 
 /// A primitive that has triangles.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shape {
     pub(super) mode: Mode,
-    /// As the indices or vertices say; many may have no area.
+    /// Number of triangles by the indices or vertices, including those of zero area.
     pub(super) triangles: usize,
 }
 
-/// Checks primitives; remembers what several of them share.
+/// Checker of primitives, which caches results common to several of them.
 pub(super) struct Checker<'a> {
     document: &'a Document<'a>,
     quantized: bool,
@@ -37,7 +37,7 @@ impl<'a> Checker<'a> {
         Self { document, quantized, largest: HashMap::new() }
     }
 
-    /// Checks a primitive and says what is not read of it; none if it has no triangles.
+    /// Checks a primitive and notes its unread parts; `None` if it has no triangles.
     pub(super) fn check(&mut self, primitive: &Primitive, place: &str, notes: &mut Notes) -> Read<Option<Shape>> {
         let materials = self.document.root.materials.len();
         if let Some(material) = primitive.material.map(|material| material.value()).filter(|i| *i >= materials) {
@@ -75,7 +75,8 @@ impl<'a> Checker<'a> {
         Ok(triangles.map(|triangles| Shape { mode, triangles }))
     }
 
-    /// All attributes of a primitive have as many elements as there are vertices, which is returned.
+    /// Checks that all attributes of a primitive have equally many elements, and returns that
+    /// number of vertices.
     fn check_attributes(&self, primitive: &Primitive, place: &str) -> Read<usize> {
         let mut vertices = None;
         for (semantic, accessor) in &primitive.attributes {
@@ -114,8 +115,9 @@ impl<'a> Checker<'a> {
         Ok(())
     }
 
-    /// Three numbers a vertex: floats, or integers where KHR_mesh_quantization is in use, which lets unsigned ones be
-    /// positions only as they are and not as what morph targets add.
+    /// Checks an attribute of three numbers per vertex: floats, or integers with
+    /// KHR_mesh_quantization, which permits unsigned integers for base positions but not for morph
+    /// displacements.
     fn check_vectors(&self, accessor: usize, unsigned: bool, place: &str) -> Read<usize> {
         let (count, format) = self.document.shape(accessor, place)?;
         let component = match format.component {
@@ -131,7 +133,7 @@ impl<'a> Checker<'a> {
         Ok(count)
     }
 
-    /// Indices of vertices, all below `vertices`; returns how many.
+    /// Checks that all indices are below `vertices`; returns their number.
     fn check_indices(&mut self, accessor: usize, vertices: usize, place: &str) -> Read<usize> {
         let column = self.document.column(accessor, place)?;
         let format = column.format;
@@ -154,7 +156,7 @@ pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<usi
     primitive.attributes.get(&Checked::Valid(semantic)).map(|accessor| accessor.value())
 }
 
-/// The sets of joints and weights that a primitive has.
+/// Sets of joints and weights of a primitive.
 pub(super) fn joint_sets<'d>(
     document: &'d Document<'_>,
     primitive: &Primitive,

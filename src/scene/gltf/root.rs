@@ -1,4 +1,4 @@
-//! The JSON part of a file, read element by element, so that what is wrong is named with its place.
+//! JSON part of a file, read element by element, so that errors name the element.
 
 use gltf::json;
 use serde_json::{Map, Value};
@@ -7,11 +7,11 @@ use super::extensions;
 use super::fault::{Notes, Read, fault};
 use super::strict_json::{elements, member, objects, parse, read_element};
 
-/// Materials that a file may have.
+/// Maximum number of materials in a file.
 const MAX_MATERIALS: usize = 1 << 16;
 
-/// Parses the JSON text; refuses versions and required extensions that are not read, by name. What is never used
-/// (textures, samplers, animations, and of images all but their files' names) is left out.
+/// Parses the JSON text. Unsupported versions and required extensions are refused by name. Unused
+/// parts are left out: textures, samplers, animations, and of images all but the file names.
 pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<json::Root> {
     let Value::Object(mut file) = parse(text)? else { return fault("JSON", "is not an object") };
     let asset = read_asset(&mut file)?;
@@ -45,7 +45,7 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
     })
 }
 
-/// An image of which nothing is known but its file.
+/// An image of which only the file name is read.
 fn named_image(image: &Value) -> json::Image {
     json::Image {
         buffer_view: None,
@@ -57,7 +57,7 @@ fn named_image(image: &Value) -> json::Image {
     }
 }
 
-/// The head of a file, looked at before the rest: other versions may be shaped differently.
+/// Version of a file, checked before the rest, whose structure depends on it.
 fn read_asset(file: &mut Map<String, Value>) -> Read<json::Asset> {
     let Some(asset) = member::<json::Asset>(file, "asset")? else { return fault("asset", "is missing") };
     if asset.version.split('.').next() != Some("2") {
@@ -71,7 +71,7 @@ fn read_asset(file: &mut Map<String, Value>) -> Read<json::Asset> {
     }
 }
 
-/// The scenes. One without nodes is legal, but the crate wants the list.
+/// Reads the scenes. The `nodes` list is optional in glTF but required by the crate.
 fn read_scenes(file: &mut Map<String, Value>) -> Read<Vec<json::Scene>> {
     let mut scenes = Vec::new();
     for (i, mut scene) in objects(file, "scenes")?.into_iter().enumerate() {
@@ -83,7 +83,7 @@ fn read_scenes(file: &mut Map<String, Value>) -> Read<Vec<json::Scene>> {
     Ok(scenes)
 }
 
-/// The materials, whose number is bounded because each takes much more memory than text.
+/// Reads the materials. Their number is bounded, as each takes much more memory than text.
 fn read_materials(file: &mut Map<String, Value>) -> Read<Vec<json::Material>> {
     match file.get("materials").and_then(Value::as_array).map_or(0, Vec::len) {
         count if count > MAX_MATERIALS => {

@@ -1,4 +1,4 @@
-//! Skins: where the joints stand in the file.
+//! Skins: transforms of the joints as posed in the file.
 
 use glam::DMat4;
 use gltf::json;
@@ -8,7 +8,7 @@ use super::accessor::Document;
 use super::fault::{Read, fault};
 use super::format::Format;
 
-/// Checks what all skins refer to.
+/// Checks the references of all skins.
 pub(super) fn check(document: &Document<'_>) -> Read<()> {
     let nodes = document.root.nodes.len();
     for (i, skin) in document.root.skins.iter().enumerate() {
@@ -28,8 +28,8 @@ pub(super) fn check(document: &Document<'_>) -> Read<()> {
     Ok(())
 }
 
-/// For each joint of a skin the transform from the mesh to the world (glTF 2.0, 3.7.3.3), with the nodes as they stand in
-/// the file. Needs [`check`].
+/// Transform from the mesh to the world for each joint of a skin (glTF 2.0, 3.7.3.3), with the
+/// nodes as posed in the file. Needs [`check`].
 pub(super) fn pose(document: &Document<'_>, skin: usize, worlds: &[DMat4]) -> Read<Vec<DMat4>> {
     let place = format!("skins[{skin}]");
     let skin = &document.root.skins[skin];

@@ -1,4 +1,4 @@
-//! Exact spheres of nodes. Positions are still the world's, in f64.
+//! Exact spheres of nodes, in world space and f64, before the scene's centre is subtracted.
 
 use glam::{DMat4, DVec3};
 use gltf::json;
@@ -16,7 +16,7 @@ const UNIFORM: f64 = 1e-4;
 pub(super) struct PlacedSphere {
     pub(super) center: DVec3,
     pub(super) radius: f64,
-    /// Index into the file's materials, valid; `None` for the default one.
+    /// Valid index into the file's materials; `None` for the default material.
     pub(super) material: Option<usize>,
 }
 
@@ -40,7 +40,7 @@ impl Default for Ball {
     }
 }
 
-/// Radius of a sphere where the draft's file says none, metres.
+/// Default radius of a sphere in the draft extension, metres.
 fn default_radius() -> f64 {
     0.5
 }
@@ -50,7 +50,7 @@ struct Extras {
     material: Option<usize>,
 }
 
-/// The exact sphere that a node carries (draft extension KHR_implicit_shapes).
+/// Exact sphere of a node (draft extension KHR_implicit_shapes).
 pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) -> Read<Option<PlacedSphere>> {
     const NAME: &str = "KHR_implicit_shapes";
     let node = &root.nodes[placed.node];
@@ -76,7 +76,7 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
         return fault(at, "scales its sphere differently along its axes, or not at all; spheres take a uniform scale");
     };
     let radius = scale * shape.sphere.radius;
-    // In f32, as it is rendered: neither zero nor infinite.
+    // The radius is rendered in f32, where it must be neither zero nor infinite.
     if !(radius as f32).is_normal() || radius < 0.0 {
         return fault(format!("{place}.sphere.radius"), format!("{} is not a positive number", shape.sphere.radius));
     }
@@ -93,7 +93,7 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
     Ok(Some(PlacedSphere { center: placed.world.w_axis.truncate(), radius, material }))
 }
 
-/// Factor of a transform that scales alike in all directions, mirrored or not.
+/// Scale factor of a uniform transform, mirrored or not.
 fn uniform_scale(world: DMat4) -> Option<f64> {
     let axes = [world.x_axis, world.y_axis, world.z_axis].map(|axis| axis.truncate());
     let [x, y, z] = axes;

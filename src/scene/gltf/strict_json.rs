@@ -1,4 +1,5 @@
-//! JSON as glTF wants it: UTF-8, no name twice in an object, whole numbers as integers however they are written.
+//! JSON as glTF requires it: UTF-8 without duplicate names in an object. Integral numbers in any
+//! notation are read as integers.
 
 use std::fmt;
 
@@ -7,7 +8,7 @@ use serde_json::{Map, Value};
 
 use super::fault::{Read, fault};
 
-/// Largest integer up to which all are doubles too.
+/// Largest integer up to which all integers are exact in f64.
 const MAX_EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// Parses a whole text. Nesting is limited by serde_json, to 128 levels.
@@ -52,7 +53,7 @@ pub(super) fn member<T: DeserializeOwned>(object: &mut Map<String, Value>, name:
     T::deserialize(value).map(Some).or_else(|error| fault(name, error.to_string()))
 }
 
-/// A value whose objects name each member once.
+/// Value whose objects have no duplicate names.
 struct Strict(Value);
 
 impl<'de> Deserialize<'de> for Strict {

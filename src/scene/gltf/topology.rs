@@ -2,7 +2,7 @@
 
 use gltf::json::mesh::Mode;
 
-/// How many triangles `count` vertices make; none for points and lines.
+/// Number of triangles of `count` vertices; none for points and lines.
 pub(super) fn triangle_count(mode: Mode, count: usize) -> Option<usize> {
     match mode {
         Mode::Triangles => Some(count / 3),
@@ -11,7 +11,7 @@ pub(super) fn triangle_count(mode: Mode, count: usize) -> Option<usize> {
     }
 }
 
-/// The vertices of triangle `i`, in an order that keeps its outside.
+/// Vertices of triangle `i`, in an order that preserves its front side.
 pub(super) fn corners(mode: Mode, i: usize) -> [usize; 3] {
     match mode {
         Mode::TriangleStrip => [i, i + 1 + i % 2, i + 2 - i % 2],

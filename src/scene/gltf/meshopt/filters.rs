@@ -1,6 +1,7 @@
-//! What is undone after a stream of vertices was decoded (EXT_meshopt_compression, appendix A, filters).
+//! Filters that are reversed after a stream of vertices was decoded (EXT_meshopt_compression,
+//! appendix A, filters).
 
-/// Unit vectors of `BYTES` bytes a component, signed and normalised: on an octahedron, whose faces fold out into a square.
+/// Unit vectors in octahedral encoding, of `BYTES` bytes per component, signed and normalised.
 pub(super) fn octahedral<const BYTES: usize>(data: &mut [u8]) {
     let max = if BYTES == 1 { 127.0_f32 } else { 32767.0 };
     for element in data.chunks_exact_mut(4 * BYTES) {
@@ -11,7 +12,7 @@ pub(super) fn octahedral<const BYTES: usize>(data: &mut [u8]) {
         let (x, y) = (unfold(x), unfold(y));
         let length = (x * x + y * y + z * z).sqrt();
         for (c, v) in [x, y, z].into_iter().enumerate() {
-            // A vector without length becomes zero: what is no number is 0 as an integer.
+            // A vector of zero length stays zero: NaN converts to integer 0.
             let rounded = (v * (max / length)).round() as i16;
             element[c * BYTES..][..BYTES].copy_from_slice(&rounded.to_le_bytes()[..BYTES]);
         }
@@ -26,7 +27,7 @@ fn short(element: &[u8], c: usize) -> i16 {
     i16::from_le_bytes([element[2 * c], element[2 * c + 1]])
 }
 
-/// Quaternions of four 16-bit components, of which the largest was left out.
+/// Quaternions in 16-bit components, without the largest, which is reconstructed.
 pub(super) fn quaternion(data: &mut [u8]) {
     for element in data.chunks_exact_mut(8) {
         let last = short(element, 3);
@@ -41,7 +42,7 @@ pub(super) fn quaternion(data: &mut [u8]) {
     }
 }
 
-/// Floats of a signed exponent in 8 bits and a signed mantissa in 24, a whole number.
+/// Floats of a signed 8-bit exponent and a signed 24-bit integer mantissa.
 pub(super) fn exponential(data: &mut [u8]) {
     for word in data.chunks_exact_mut(4) {
         let (a, b, c, exponent) = (word[0], word[1], word[2], word[3] as i8);

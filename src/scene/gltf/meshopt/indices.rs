@@ -1,8 +1,9 @@
-//! Streams of indices (EXT_meshopt_compression, appendix A, mode 1: triangles, and mode 2: indices).
+//! Streams of indices (EXT_meshopt_compression, appendix A, mode 1: triangles, and mode 2:
+//! indices).
 
 use super::vertices::Input;
 
-/// The last 16 things that were pushed, the latest first.
+/// FIFO of the last 16 items, the latest first.
 struct Recent<T> {
     items: [T; 16],
     next: usize,
@@ -28,9 +29,9 @@ struct Triangles<'a> {
     data: Input<'a>,
     edges: Recent<[u32; 2]>,
     vertices: Recent<u32>,
-    /// The lowest vertex that was not there yet.
+    /// Lowest vertex index not used yet.
     fresh: u32,
-    /// What indices in the data are differences to.
+    /// Base of the differences that encode explicit indices.
     last: u32,
 }
 
@@ -81,10 +82,10 @@ enum Corner {
     InData,
 }
 
-/// `count` indices, a multiple of 3; none where the stream is damaged.
+/// Decodes `count` indices, a multiple of 3; `None` if the stream is damaged.
 pub(super) fn decode_triangles(bytes: &[u8], count: usize) -> Option<Vec<u32>> {
     let mut input = Input(bytes);
-    // Before version 1, codes 13 and 14 were ages like others.
+    // Before version 1, codes 13 and 14 are ages like the others.
     let explicit = match input.byte()? {
         0xe0 => 15,
         0xe1 => 13,
@@ -137,14 +138,14 @@ pub(super) fn decode_triangles(bytes: &[u8], count: usize) -> Option<Vec<u32>> {
     state.data.0.is_empty().then_some(out)
 }
 
-/// `count` indices in any order; none where the stream is damaged.
+/// Decodes `count` indices in any order; `None` if the stream is damaged.
 pub(super) fn decode_sequence(bytes: &[u8], count: usize) -> Option<Vec<u32>> {
     let mut input = Input(bytes);
     if !matches!(input.byte()?, 0xd0 | 0xd1) {
         return None;
     }
     let mut data = Input(input.take(input.0.len().checked_sub(4)?)?);
-    // Each index takes a byte at least.
+    // Each index takes at least one byte.
     if count > data.0.len() {
         return None;
     }
@@ -159,7 +160,7 @@ pub(super) fn decode_sequence(bytes: &[u8], count: usize) -> Option<Vec<u32>> {
     data.0.is_empty().then_some(out)
 }
 
-/// A number of one to five bytes, seven bits in each from the lowest up.
+/// Variable-length integer of one to five bytes, seven bits in each, lowest first.
 fn read_number(input: &mut Input<'_>) -> Option<u32> {
     let mut number = 0;
     for shift in [0, 7, 14, 21, 28] {

@@ -1,4 +1,5 @@
-//! Compressed bufferViews (EXT_meshopt_compression): what they say is checked, then decoded in safe code.
+//! Compressed bufferViews (EXT_meshopt_compression): properties are checked, then data is decoded
+//! in safe code.
 
 use gltf::json;
 use serde::Deserialize;
@@ -12,7 +13,7 @@ mod filters;
 mod indices;
 mod vertices;
 
-/// Bytes that all views of a file may take together whatever their buffers hold, and per byte of these.
+/// Maximum decoded size of all views of a file: a constant, plus a factor per byte of the buffers.
 const MAX_BYTES: u64 = 1 << 26;
 const MAX_RATIO: u64 = 64;
 
@@ -30,7 +31,7 @@ struct Compressed {
     filter: Option<String>,
 }
 
-/// The decoded bytes of each view; none for those that are not compressed.
+/// Decoded bytes of each view; `None` for uncompressed views.
 pub(super) fn decode(root: &json::Root, buffers: &Buffers<'_>) -> Read<Vec<Option<Vec<u8>>>> {
     let held: usize = buffers.iter().flatten().map(|bytes| bytes.len()).sum();
     let mut left = MAX_BYTES.max(MAX_RATIO * held as u64);

@@ -1,14 +1,15 @@
-//! Streams of vertices (EXT_meshopt_compression, appendix A, mode 0: attributes; version 1 is KHR_meshopt_compression's).
+//! Streams of vertices (EXT_meshopt_compression, appendix A, mode 0: attributes; version 1 is
+//! KHR_meshopt_compression's).
 
-/// Bytes of a block of vertices, and vertices in it, at most.
+/// Maximum size of a block of vertices, in bytes and in vertices.
 const BLOCK_BYTES: usize = 8192;
 const BLOCK_VERTICES: usize = 256;
-/// Bytes that share a width.
+/// Number of bytes in a group, which have a common bit width.
 const GROUP: usize = 16;
-/// Bits of each byte of a group by the group's selector: of version 0, and of the two tables of version 1.
+/// Bit width of a group by its selector: for version 0, and for the two tables of version 1.
 const WIDTHS: [[u32; 4]; 3] = [[0, 2, 4, 8], [0, 1, 2, 4], [1, 2, 4, 8]];
 
-/// Bytes that are taken from the front, as long as there are any.
+/// Byte stream, read from the front.
 pub(super) struct Input<'a>(pub(super) &'a [u8]);
 
 impl<'a> Input<'a> {
@@ -23,7 +24,8 @@ impl<'a> Input<'a> {
     }
 }
 
-/// `count` vertices of `stride` bytes, a multiple of 4 up to 256; none where the stream is damaged.
+/// Decodes `count` vertices of `stride` bytes, a multiple of 4 up to 256; `None` if the stream is
+/// damaged.
 pub(super) fn decode(bytes: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
     let mut input = Input(bytes);
     let version = match input.byte()? {
@@ -31,7 +33,8 @@ pub(super) fn decode(bytes: &[u8], count: usize, stride: usize) -> Option<Vec<u8
         0xa1 => 1,
         _ => return None,
     };
-    // The tail holds what the first vertex is a difference to, and in version 1 how differences are made.
+    // The tail holds the base of the first vertex's differences, and in version 1 the kinds of
+    // difference.
     let channels = if version == 0 { 0 } else { stride / 4 };
     let tail = stride + channels;
     let padded = tail.max(if version == 0 { 32 } else { 24 });
@@ -67,7 +70,7 @@ pub(super) fn decode(bytes: &[u8], count: usize, stride: usize) -> Option<Vec<u8
     input.0.is_empty().then_some(out)
 }
 
-/// One byte of each vertex of a block.
+/// Decodes one byte of each vertex of a block.
 fn read_plane(input: &mut Input<'_>, selector: Option<u8>, plane: &mut [u8]) -> Option<()> {
     let widths = match selector {
         None => WIDTHS[0],
@@ -89,7 +92,8 @@ fn read_plane(input: &mut Input<'_>, selector: Option<u8>, plane: &mut [u8]) -> 
     Some(())
 }
 
-/// Sixteen bytes of `width` bits each; the largest number of narrow ones says that the byte follows whole.
+/// Decodes sixteen bytes of `width` bits each. The largest value of a narrow width marks a full
+/// byte that follows.
 fn read_group(input: &mut Input<'_>, width: u32) -> Option<[u8; GROUP]> {
     let mut values = [0; GROUP];
     if width == 0 {
@@ -100,7 +104,7 @@ fn read_group(input: &mut Input<'_>, width: u32) -> Option<[u8; GROUP]> {
     for (i, value) in values.iter_mut().enumerate() {
         let bit = i as u32 * width;
         let byte = u32::from(packed[(bit / 8) as usize]);
-        // Single bits lie from the lowest up, wider numbers from the highest down.
+        // Single bits are packed from the lowest bit, wider numbers from the highest.
         let shift = if width == 1 { bit % 8 } else { 8 - width - bit % 8 };
         let number = byte >> shift & mask;
         *value = if width < 8 && number == mask { input.byte()? } else { number as u8 };
@@ -108,7 +112,8 @@ fn read_group(input: &mut Input<'_>, width: u32) -> Option<[u8; GROUP]> {
     Some(values)
 }
 
-/// What `word` makes of the `previous` four bytes: differences of bytes, of 16 bits, or of all bits by exclusive or.
+/// Applies difference `word` to the `previous` four bytes: differences of bytes, of 16 bits, or of
+/// all bits by exclusive or.
 fn add(previous: u32, word: u32, channel: u8) -> Option<u32> {
     match channel & 3 {
         0 => Some(u32::from_le_bytes(std::array::from_fn(|j| {
