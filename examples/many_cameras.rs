@@ -1,4 +1,5 @@
-//! Pictures by three cameras from the same photons: `cargo run --release --example many_cameras [FOLDER]`.
+//! Pictures by three cameras from the same photons:
+//! `cargo run --release --example many_cameras [FOLDER]`.
 
 use std::{env, path::PathBuf};
 

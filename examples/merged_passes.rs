@@ -1,4 +1,5 @@
-//! Passes with seeds of their own, merged: `cargo run --release --example merged_passes [PICTURE.png]`.
+//! Passes with seeds of their own, merged:
+//! `cargo run --release --example merged_passes [PICTURE.png]`.
 //!
 //! The photons of each pass are gone before the next, so that memory does not grow with the passes.
 

@@ -1,4 +1,5 @@
-//! One picture, and how far it is: `cargo run --release --example one_picture [SCENE [PICTURE.exr]]`.
+//! One picture, and how far it is:
+//! `cargo run --release --example one_picture [SCENE [PICTURE.exr]]`.
 
 use std::{env, path::Path};
 

@@ -14,7 +14,8 @@ pub enum Error {
         /// The system's error.
         source: std::io::Error,
     },
-    /// A scene file that cannot be rendered: `place` names the element, as a JSON path where there is one.
+    /// A scene file that cannot be rendered: `place` names the element, as a JSON path where there
+    /// is one.
     #[error("{}: {place}: {problem}", path.display())]
     Scene {
         /// The file.
@@ -79,7 +80,8 @@ pub enum Error {
     /// A setting outside its range.
     #[error("{name} {value}: {problem}")]
     Setting {
-        /// Path of the setting in [`crate::Settings`], such as `picture.spp`, or the name of another input.
+        /// Path of the setting in [`crate::Settings`], such as `picture.spp`, or the name of
+        /// another input.
         name: &'static str,
         /// Its value.
         value: String,

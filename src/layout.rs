@@ -1,8 +1,9 @@
 //! Every struct that crosses to the GPU, in one file.
 //!
-//! Each struct here has a twin of the same name in `shaders/`; `tests/house/layouts.rs` reflects the shaders and compares
-//! names, order, offsets and sizes. Vectors are arrays so that `repr(C)` and WGSL agree on alignment: a `[f32; 3]`
-//! is followed by a 4-byte field, as WGSL places a `vec3f`.
+//! Each struct here has a twin of the same name in `shaders/`; `tests/house/layouts.rs` reflects
+//! the shaders and compares names, order, offsets and sizes. Vectors are arrays so that `repr(C)`
+//! and WGSL agree on alignment: a `[f32; 3]` is followed by a 4-byte field, as WGSL places a
+//! `vec3f`.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -14,41 +15,48 @@ pub const BVH_INDEX_BITS: u32 = 28;
 pub const MAX_WORKGROUPS: u32 = 65_535;
 /// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.
 pub const BVH_STACK: usize = 48;
-/// Bound of the weight by which an interpolated normal changes flux that grazes the geometric surface.
+/// Bound of the weight by which an interpolated normal changes flux that grazes the geometric
+/// surface.
 pub const MAX_NORMAL_WEIGHT: f32 = 8.0;
-/// Rounding of a hit point, as a fraction of the largest coordinate that it is computed from: 2^-19.
+/// Rounding of a hit point, as a fraction of the largest coordinate that it is computed from:
+/// 2^-19.
 pub const OFFSET_SCALE: f32 = 1.907_348_6e-6;
 /// Media that a path can be inside of at once.
 pub const MEDIA_DEPTH: usize = 4;
 
-/// One interior node of the BVH: its children's boxes and what they are, four words at a time as software Vulkan reads
-/// them fastest. Interior children come before leaves and lie side by side, as do the primitives of all its leaves. Made
-/// by `BvhNode::new` in `src/bvh/node.rs`.
+/// One interior node of the BVH: its children's boxes and what they are, four words at a time as
+/// software Vulkan reads them fastest. Interior children come before leaves and lie side by side,
+/// as do the primitives of all its leaves. Made by `BvhNode::new` in `src/bvh/node.rs`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct BvhNode {
-    /// Bits of the lower corner of the box around all children, metres; then the shape: for each axis eight bits, the exponent of
-    /// a unit as in a float's bits, and from bit 24 two bits for each child, the primitives of a leaf less one.
+    /// Bits of the lower corner of the box around all children, metres; then the shape: for each
+    /// axis eight bits, the exponent of a unit as in a float's bits, and from bit 24 two bits for
+    /// each child, the primitives of a leaf less one.
     pub grid: [u32; 4],
-    /// For each axis the lower bounds of the children's boxes, eight bits each, in units from the corner; then the first
-    /// interior child in 28 bits and how many there are.
+    /// For each axis the lower bounds of the children's boxes, eight bits each, in units from the
+    /// corner; then the first interior child in 28 bits and how many there are.
     pub low: [u32; 4],
-    /// The upper bounds; then the leaves' first primitive in 28 bits and the number of all children.
+    /// The upper bounds; then the leaves' first primitive in 28 bits and the number of all
+    /// children.
     pub high: [u32; 4],
 }
 
 /// Set in [`Primitive::material`] when the primitive is a sphere.
 pub const SPHERE_BIT: u32 = 0x8000_0000;
 
-/// Set there when the primitive's material is a mirror or glass: where surfaces coincide, the others are met first.
+/// Set there when the primitive's material is a mirror or glass: where surfaces coincide, the
+/// others are met first.
 pub const DELTA_BIT: u32 = 0x4000_0000;
 
-/// A triangle `v0, v0 + e1, v0 + e2`, or a sphere with centre `v0` and radius `e1.x`, in the order of the BVH's leaves.
+/// A triangle `v0, v0 + e1, v0 + e2`, or a sphere with centre `v0` and radius `e1.x`, in the order
+/// of the BVH's leaves.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Primitive {
     pub v0: [f32; 3],
-    /// Index into the materials, with [`SPHERE_BIT`] for a sphere, and on the device [`DELTA_BIT`] for a delta surface.
+    /// Index into the materials, with [`SPHERE_BIT`] for a sphere, and on the device [`DELTA_BIT`]
+    /// for a delta surface.
     pub material: u32,
     pub e1: [f32; 3],
     /// Index of the primitive in the scene before the BVH reordered it.
@@ -58,14 +66,16 @@ pub struct Primitive {
     pub emitter: u32,
 }
 
-/// Interpolated normals of a triangle's corners, octahedral (see [`octahedral`]); unused for spheres.
+/// Interpolated normals of a triangle's corners, octahedral (see [`octahedral`]); unused for
+/// spheres.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Normals {
     pub n0: u32,
     pub n1: u32,
     pub n2: u32,
-    /// 1 if the corners' normals all equal the geometric one: the surface is flat and the rest need not be read.
+    /// 1 if the corners' normals all equal the geometric one: the surface is flat and the rest need
+    /// not be read.
     pub flat_shaded: u32,
 }
 
@@ -84,7 +94,8 @@ pub const PANE: u32 = 3;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Material {
-    /// Diffuse: albedo. Mirror: tint of the reflection. Glass, pane: tint of what is transmitted. Each 0..1.
+    /// Diffuse: albedo. Mirror: tint of the reflection. Glass, pane: tint of what is transmitted.
+    /// Each 0..1.
     pub color: [f32; 3],
     /// One of [`DIFFUSE`], [`MIRROR`], [`GLASS`], [`PANE`].
     pub kind: u32,
@@ -118,8 +129,8 @@ pub const SPHERE_LIGHT: u32 = 4;
 /// and what comes from all around.
 pub const ENVIRONMENT_LIGHT: u32 = 5;
 
-/// Anything that shines: a punctual light, an emissive triangle or sphere, or the environment. Its power is
-/// `emission · area · solid_angle`, but for directional lights and the environment.
+/// Anything that shines: a punctual light, an emissive triangle or sphere, or the environment. Its
+/// power is `emission · area · solid_angle`, but for directional lights and the environment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Light {
@@ -127,22 +138,25 @@ pub struct Light {
     pub position: [f32; 3],
     /// One of [`POINT_LIGHT`] … [`ENVIRONMENT_LIGHT`].
     pub kind: u32,
-    /// Spot, directional: unit direction in which it shines. Triangle: edge to the second corner. Sphere: (radius, 0, 0).
+    /// Spot, directional: unit direction in which it shines. Triangle: edge to the second corner.
+    /// Sphere: (radius, 0, 0).
     pub e1: [f32; 3],
     /// What a user calls one light: all that shines by one material is a group.
     pub group: u32,
-    /// Spot: 1 − cos of the outer angle, and width in cosines of the falloff. Triangle: edge to the third corner.
+    /// Spot: 1 − cos of the outer angle, and width in cosines of the falloff. Triangle: edge to the
+    /// third corner.
     pub e2: [f32; 3],
-    /// Integral over all directions of the share of `emission` that goes there, sr: point 4π, spot as its falloff says,
-    /// surfaces π for the front alone and 2π for both sides.
+    /// Integral over all directions of the share of `emission` that goes there, sr: point 4π, spot
+    /// as its falloff says, surfaces π for the front alone and 2π for both sides.
     pub solid_angle: f32,
-    /// Point, spot: radiant intensity (on the axis), W/sr. Directional: irradiance of a surface that faces it, W/m².
-    /// Triangle, sphere: radiance, W/(m² sr). Environment: 1, a factor on its pixels.
+    /// Point, spot: radiant intensity (on the axis), W/sr. Directional: irradiance of a surface
+    /// that faces it, W/m². Triangle, sphere: radiance, W/(m² sr). Environment: 1, a factor on its
+    /// pixels.
     pub emission: [f32; 3],
     /// Area of a surface, m²; 1 without one.
     pub area: f32,
-    /// Media in which paths start on the front, and on the back of a surface: their indices, each plus one, outermost first; 0 for
-    /// none. See [`crate::bvh::MediaProbe`].
+    /// Media in which paths start on the front, and on the back of a surface: their indices, each
+    /// plus one, outermost first; 0 for none. See [`crate::bvh::MediaProbe`].
     pub media: [u32; MEDIA_DEPTH],
     pub back_media: [u32; MEDIA_DEPTH],
 }
@@ -183,12 +197,14 @@ pub struct EnvironmentInfo {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Path {
     pub origin: [f32; 3],
-    /// What is remembered of the path, by accessors of its kind in `shaders/lib/transport/path.wesl`.
+    /// What is remembered of the path, by accessors of its kind in
+    /// `shaders/lib/transport/path.wesl`.
     pub history: u32,
     pub direction: [f32; 3],
     /// Surfaces met so far.
     pub bounces: u32,
-    /// Flux in W of a photon (before the division by the number of paths), or weight of a camera path.
+    /// Flux in W of a photon (before the division by the number of paths), or weight of a camera
+    /// path.
     pub beta: [f32; 3],
     /// Depth of the stack of media.
     pub media_count: u32,
@@ -224,16 +240,17 @@ pub struct VisiblePoint {
     pub offset: f32,
     /// Geometric normal, unit, on the viewer's side.
     pub ng: [f32; 3],
-    /// Media around the point as in [`Light::media`], 16 bits each: the two outermost, and below the others. 0 and 0 for none, and
-    /// where one of them is not among the first 65,535.
+    /// Media around the point as in [`Light::media`], 16 bits each: the two outermost, and below
+    /// the others. 0 and 0 for none, and where one of them is not among the first 65,535.
     pub media_outer: u32,
     /// Interpolated normal, unit, on the viewer's side of the geometric one.
     pub ns: [f32; 3],
     pub media_inner: u32,
 }
 
-/// What happens to a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^18 paths of at most 4095 bounces, so that
-/// what is counted once a bounce stays below 2^30; the host adds batches up in 64 bits.
+/// What happens to a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^18
+/// paths of at most 4095 bounces, so that what is counted once a bounce stays below 2^30; the host
+/// adds batches up in 64 bits.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Counters {
@@ -252,7 +269,8 @@ pub struct Counters {
     pub media_overflows: u32,
     /// Rays given up after the loop budget.
     pub unfinished: u32,
-    /// Infinite or undefined numbers that were left out, each with the path or sample that it belonged to.
+    /// Infinite or undefined numbers that were left out, each with the path or sample that it
+    /// belonged to.
     pub non_finite: u32,
     /// High word of `lost`.
     pub lost_high: u32,
@@ -285,12 +303,13 @@ pub struct PhotonBatch {
     pub paths: u32,
     /// Entries of the table of lights.
     pub light_count: u32,
-    /// The range of random numbers that choose lights is cut into this many parts, dealt to the paths in turn; and the
-    /// part of the first path.
+    /// The range of random numbers that choose lights is cut into this many parts, dealt to the
+    /// paths in turn; and the part of the first path.
     pub turns: u32,
     pub first_turn: u32,
     pub max_bounces: u32,
-    /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`], [`AIM`], [`CAUSTICS_APART`].
+    /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`], [`AIM`],
+    /// [`CAUSTICS_APART`].
     pub rules: u32,
     pub staging_capacity: u32,
     pub lost_scale: f32,
@@ -304,7 +323,8 @@ pub struct PhotonBatch {
 }
 
 impl PhotonBatch {
-    /// The same batch with its first path at that place among all paths of its kind, which are dealt to `turns` in turn.
+    /// The same batch with its first path at that place among all paths of its kind, which are
+    /// dealt to `turns` in turn.
     #[must_use]
     pub fn starting_at(self, path: u64) -> Self {
         let (round, turn) = (path / u64::from(self.turns), path % u64::from(self.turns));
@@ -325,21 +345,21 @@ pub const STORE_CAUSTIC: u32 = 4;
 pub const FOLLOW_DIFFUSE: u32 = 8;
 /// Lights outside of the targets send paths towards them only.
 pub const AIM: u32 = 16;
-/// Caustic photons are those that come from a light through delta surfaces only; what a diffuse surface scattered
-/// before belongs to the global map.
+/// Caustic photons are those that come from a light through delta surfaces only; what a diffuse
+/// surface scattered before belongs to the global map.
 pub const CAUSTICS_APART: u32 = 32;
 
 /// Targets that caustic paths are aimed at, at most.
 pub const MAX_TARGETS: u32 = 32;
 
-/// Kinds of photon maps, as the shaders know [`MapKind`](crate::map_kind::MapKind), and how many there
-/// are.
+/// Kinds of photon maps, as the shaders know [`MapKind`](crate::map_kind::MapKind), and how many
+/// there are.
 pub const GLOBAL_MAP: u32 = 0;
 pub const CAUSTIC_MAP: u32 = 1;
 pub const MAP_KINDS: u32 = 2;
 
-/// Key of a staged photon: the low bits are the path within its batch; from the shift on the photon's
-/// number on its path, as many bits as the mask has; then the kind of the map.
+/// Key of a staged photon: the low bits are the path within its batch; from the shift on the
+/// photon's number on its path, as many bits as the mask has; then the kind of the map.
 pub const PATH_MASK: u32 = 0x3_ffff;
 pub const PLACE_SHIFT: u32 = 18;
 pub const PLACE_MASK: u32 = 0xfff;
@@ -360,7 +380,8 @@ pub struct Store {
 pub const SAMPLER_RANDOM: u32 = 0;
 pub const SAMPLER_SOBOL: u32 = 1;
 
-/// A camera and the part of its samples that one tile holds; see `shaders/lib/camera/camera_tile.wesl`.
+/// A camera and the part of its samples that one tile holds; see
+/// `shaders/lib/camera/camera_tile.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct CameraTile {
@@ -383,7 +404,8 @@ pub struct CameraTile {
     pub first_sample: u32,
     pub samples: u32,
     pub max_bounces: u32,
-    /// Places for paths of a sample: both ways are followed at its first log2(branches) dielectric interfaces.
+    /// Places for paths of a sample: both ways are followed at its first log2(branches) dielectric
+    /// interfaces.
     pub branches: u32,
     /// Pixels of the tile, in Morton order.
     pub pixels: u32,
@@ -417,8 +439,8 @@ pub struct FirstHit {
 /// Rows of four numbers that a camera sample writes for the output layers: those of [`FirstHit`].
 pub const LAYER_ROWS: usize = 2;
 
-/// Sums over a tile's samples of one pixel, by rows: radiance with the number of samples that are not
-/// in its sum, as it would not be finite with them; then the rows of the samples.
+/// Sums over a tile's samples of one pixel, by rows: radiance with the number of samples that are
+/// not in its sum, as it would not be finite with them; then the rows of the samples.
 pub type PixelSums = [[f32; 4]; LAYER_ROWS + 1];
 
 /// Which punctual light `light_directly` takes.
@@ -471,14 +493,16 @@ pub const FIRST_PILOT_STRIDE: u32 = 64;
 /// Rays that survey one disc at most.
 pub const MOST_RAYS: u32 = 150;
 
-/// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert curve, or
-/// [`CELL_FAN`] cells of the next finer level. Cells lie level by level, the coarsest, which is one cell, first.
+/// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert
+/// curve, or [`CELL_FAN`] cells of the next finer level. Cells lie level by level, the coarsest,
+/// which is one cell, first.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Cell {
     /// Smallest box around the photons, metres.
     pub lo: [f32; 3],
-    /// Box around the directions to where the photons came from: x, y, z in 8 bits each, signed normalised.
+    /// Box around the directions to where the photons came from: x, y, z in 8 bits each, signed
+    /// normalised.
     pub wi_lo: u32,
     pub hi: [f32; 3],
     pub wi_hi: u32,
@@ -537,10 +561,12 @@ pub struct GatherInfo {
     pub stride: u32,
     /// Mean of the kernel over the disc.
     pub kernel_mean: f32,
-    /// Coefficients of the kernel's polynomial from the rim, see [`crate::density`]: the first four, and the fifth.
+    /// Coefficients of the kernel's polynomial from the rim, see [`crate::density`]: the first
+    /// four, and the fifth.
     pub kernel: [f32; 4],
     pub kernel_fifth: f32,
-    /// Number of the map gathered, from 1. Points take part whose [`VisiblePoint::next_map`] is not 0 and at most this.
+    /// Number of the map gathered, from 1. Points take part whose [`VisiblePoint::next_map`] is not
+    /// 0 and at most this.
     pub map_number: u32,
     pub pad0: u32,
     pub pad1: u32,
@@ -550,7 +576,8 @@ pub struct GatherInfo {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Gathered {
-    /// Square of the radius of the estimate, m²: of the nearest photon that is not summed, or the largest radius.
+    /// Square of the radius of the estimate, m²: of the nearest photon that is not summed, or the
+    /// largest radius.
     pub radius_squared: f32,
     /// Photons summed.
     pub count: u32,
@@ -573,13 +600,15 @@ pub struct ShareRound {
     pub cell_pixels: u32,
     /// Samples of each pixel in the tile.
     pub samples: u32,
-    /// The samples of a pixel of which a query is chosen, and in which of the cell's pixels: every step-th.
+    /// The samples of a pixel of which a query is chosen, and in which of the cell's pixels: every
+    /// step-th.
     pub candidates: u32,
     pub step: u32,
     /// Cells of the tile's margin that take part.
     pub margin: u32,
     pub branches: u32,
-    /// Square of the distance within which a point takes a query's estimate, over that of the estimate's radius.
+    /// Square of the distance within which a point takes a query's estimate, over that of the
+    /// estimate's radius.
     pub reach_squared: f32,
     /// Visible points of the tile, without its margin.
     pub points: u32,
@@ -669,9 +698,9 @@ pub const SEARCH_STATE_BYTES: usize = 112;
 /// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
 pub const GATHER_STATE_BYTES: usize = 1072;
 
-/// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al. 2014, "A Survey of
-/// Efficient Representations for Independent Unit Vectors"); x in the low half. Twin of `encode_octahedral` in
-/// `shaders/lib/core/octahedral.wesl`.
+/// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al.
+/// 2014, "A Survey of Efficient Representations for Independent Unit Vectors"); x in the low half.
+/// Twin of `encode_octahedral` in `shaders/lib/core/octahedral.wesl`.
 #[must_use]
 pub fn octahedral(v: glam::Vec3) -> u32 {
     let p = v / (v.x.abs() + v.y.abs() + v.z.abs());

@@ -41,7 +41,8 @@ pub struct LightStats {
     pub name: String,
     /// `point`, `spot`, `directional`, `surface` or `environment`.
     pub kind: String,
-    /// W in each channel; of directional lights and environments what the sphere around the scene catches.
+    /// W in each channel; of directional lights and environments what the sphere around the scene
+    /// catches.
     pub power: [f64; 3],
     /// Photons of it in both maps.
     pub photons: u64,
@@ -61,7 +62,8 @@ pub struct PhotonStats {
     pub lights: Vec<LightStats>,
 }
 
-/// Infinite or undefined numbers that a stage made. What they belonged to was left out of the picture.
+/// Infinite or undefined numbers that a stage made. What they belonged to was left out of the
+/// picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NonFinite {
     /// Photon paths.

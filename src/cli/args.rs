@@ -79,7 +79,8 @@ pub struct RenderArgs {
     #[arg(required_if_eq("search", "radius"))]
     pub radius: Option<f32>,
 
-    /// Rays of final gathering per visible point: light over other surfaces is what these see of the global map; 0 is none
+    /// Rays of final gathering per visible point: light over other surfaces is what these see of
+    /// the global map; 0 is none
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole(PhotonSettings::FINAL_GATHER))]
     #[arg(help_heading = "Estimate")]
     pub final_gather: u32,
@@ -91,7 +92,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "F", default_value_t = 2.0, value_parser = share_reach, help_heading = "Estimate")]
     pub share: f32,
 
-    /// Write what happened as JSON: device, seconds by stage, photons, rays, peak device memory, warnings
+    /// Write what happened as JSON: device, seconds by stage, photons, rays, peak device memory,
+    /// warnings
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     pub stats: Option<PathBuf>,
 }

@@ -1,5 +1,5 @@
-//! A bug ends the program like any other failure, with one line: nobody who renders should have to read a backtrace.
-//! `RUST_BACKTRACE=1` shows it to those who look for one.
+//! A bug ends the program like any other failure, with one line: nobody who renders should have to
+//! read a backtrace. `RUST_BACKTRACE=1` shows it to those who look for one.
 
 use std::{
     env,

@@ -7,8 +7,9 @@ use std::{
 
 use caustica::{Error, Result, image::check_output, scene::Scene};
 
-/// Files that a run uses, each under the one name that all ways to write its path have in common. A hard link is a file of
-/// its own: an output takes the place of its name and leaves the other one alone.
+/// Files that a run uses, each under the one name that all ways to write its path have in common. A
+/// hard link is a file of its own: an output takes the place of its name and leaves the other one
+/// alone.
 #[derive(Default)]
 pub struct Files {
     /// With what they are.
@@ -34,7 +35,8 @@ impl Files {
         scene.files.iter().try_for_each(|path| self.read(path, "a file of the scene"))
     }
 
-    /// Finds out before the work that an output can be written, and that it is no other file of the run.
+    /// Finds out before the work that an output can be written, and that it is no other file of the
+    /// run.
     pub fn write(&mut self, path: &Path) -> Result<()> {
         let identity = identity(path);
         let input = self.read.iter().find(|(other, _)| *other == identity).map(|(_, what)| *what);

@@ -13,7 +13,8 @@ pub struct LoadingOptions {
     #[arg(long, help_heading = "Scene")]
     pub allow_outside: bool,
 
-    /// Read the file although it requires this extension, which is not supported; may be given several times
+    /// Read the file although it requires this extension, which is not supported; may be given
+    /// several times
     #[arg(long, value_name = "EXTENSION", help_heading = "Scene")]
     pub ignore_required: Vec<String>,
 }

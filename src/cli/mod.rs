@@ -28,8 +28,8 @@ use clap::Parser;
 
 use args::{Args, Command};
 
-/// Does what the arguments say. Exit codes: 0 success, 1 failure of the work, 2 wrong usage, 128 + signal when
-/// stopped.
+/// Does what the arguments say. Exit codes: 0 success, 1 failure of the work, 2 wrong usage, 128 +
+/// signal when stopped.
 pub fn run() -> ExitCode {
     let args = Args::parse();
     if let Command::Render(args) = &args.command {

@@ -52,15 +52,16 @@ pub struct RenderOptions {
     pub shared: SharedOptions,
 }
 
-/// Options of all work on a scene that makes pictures: what is rendered, how, and what is said of it meanwhile.
+/// Options of all work on a scene that makes pictures: what is rendered, how, and what is said of
+/// it meanwhile.
 #[derive(Debug, clap::Args)]
 pub struct SharedOptions {
     /// How photon paths are dealt to lights
     #[arg(long, value_name = "HOW", value_enum, default_value = "power", help_heading = "Light")]
     pub light_sampling: LightSamplingArg,
 
-    /// Multiplies the share of a light's photons, by the name of the light, emissive material or environment; may be given
-    /// several times
+    /// Multiplies the share of a light's photons, by the name of the light, emissive material or
+    /// environment; may be given several times
     #[arg(long, value_name = "NAME=WEIGHT", value_parser = light_weight, help_heading = "Light")]
     pub light_photons: Vec<(String, f64)>,
 
@@ -83,8 +84,8 @@ pub struct SharedOptions {
     #[command(flatten)]
     pub loading: LoadingOptions,
 
-    /// Photon paths emitted at most, for each map by itself unless --emission unaimed [default: 100 times the larger
-    /// capacity]
+    /// Photon paths emitted at most, for each map by itself unless --emission unaimed [default: 100
+    /// times the larger capacity]
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true, help_heading = "Photons")]
     pub max_paths: Option<u64>,
 
@@ -105,7 +106,8 @@ pub struct SharedOptions {
     #[arg(long, value_name = "C", default_value_t = 2.0, value_parser = cone_constant, help_heading = "Estimate")]
     pub cone_constant: f32,
 
-    /// Count photons of neighbouring surfaces and take the disc for whole: bright corners, dark edges, as in the report
+    /// Count photons of neighbouring surfaces and take the disc for whole: bright corners, dark
+    /// edges, as in the report
     #[arg(long, help_heading = "Estimate")]
     pub raw_estimate: bool,
 
@@ -117,7 +119,8 @@ pub struct SharedOptions {
     #[arg(long, value_name = "N", value_parser = whole(PictureSettings::SPP), help_heading = "Picture")]
     pub spp: Option<u32>,
 
-    /// Size in pixels; the vertical angle of view stays [default: 512 high, as wide as the camera says or square]
+    /// Size in pixels; the vertical angle of view stays [default: 512 high, as wide as the camera
+    /// says or square]
     #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true, help_heading = "Picture")]
     pub size: Option<(u32, u32)>,
 
@@ -158,8 +161,8 @@ pub struct SharedOptions {
     #[arg(value_parser = whole(SEED))]
     pub seed: u32,
 
-    /// Adapter, by a part of its name or by the index that `caustica devices` shows [default: the best real GPU,
-    /// else software]
+    /// Adapter, by a part of its name or by the index that `caustica devices` shows [default: the
+    /// best real GPU, else software]
     #[arg(long, value_name = "NAME|INDEX", env = "CAUSTICA_DEVICE", hide_env_values = true, help_heading = "Run")]
     pub device: Option<String>,
 
@@ -186,7 +189,8 @@ impl RenderOptions {
 }
 
 impl SharedOptions {
-    /// The library's settings that these arguments ask for; mode, photons and neighbours are the defaults.
+    /// The library's settings that these arguments ask for; mode, photons and neighbours are the
+    /// defaults.
     pub fn settings(&self) -> Settings {
         let Settings { photons, estimate, picture, .. } = Settings::default();
         Settings {
@@ -289,7 +293,8 @@ value_enum!(LightSamplingArg => LightSampling {
 });
 
 value_enum!(EmissionArg => Emission {
-    /// Towards the scene for the global map, and apart from that towards mirrors and glass for the caustic map
+    /// Towards the scene for the global map, and apart from that towards mirrors and glass for the
+    /// caustic map
     Aimed,
     /// Wherever the lights shine, for both maps at once
     Unaimed,

@@ -47,7 +47,8 @@ impl Display {
         }
     }
 
-    /// A study's state in a line; on a terminal a bar shows it all the time, elsewhere it is a line when it is `new`.
+    /// A study's state in a line; on a terminal a bar shows it all the time, elsewhere it is a line
+    /// when it is `new`.
     pub fn study(&self, line: &str, done: f64, new: bool) {
         match &self.0 {
             Target::Nowhere => {}
@@ -139,7 +140,8 @@ fn name(stage: Stage) -> &'static str {
     }
 }
 
-/// What a stage of so many is counted in; `None`: it is not counted, as one or none would say nothing.
+/// What a stage of so many is counted in; `None`: it is not counted, as one or none would say
+/// nothing.
 fn unit(stage: Stage, total: u64) -> Option<&'static str> {
     let unit = if stage == Stage::Photons { "photons" } else { "tiles" };
     (total > 1 && is_counted(stage)).then_some(unit)

@@ -1,4 +1,5 @@
-//! Lines to the user. A reader that has gone away is no error: `caustica devices | head -1` ends well.
+//! Lines to the user. A reader that has gone away is no error: `caustica devices | head -1` ends
+//! well.
 
 use std::io::{self, Write};
 

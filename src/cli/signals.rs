@@ -1,4 +1,5 @@
-//! Ctrl-C, SIGTERM and the end of a terminal: ask the work to stop, and leave in time even if it does not.
+//! Ctrl-C, SIGTERM and the end of a terminal: ask the work to stop, and leave in time even if it
+//! does not.
 
 use std::{
     sync::{
@@ -13,7 +14,8 @@ use std::{
 use signal_hook::consts::{SIGHUP, SIGXFSZ};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
-/// How long the work may take to stop by itself. With the polling below the process is gone in under two seconds.
+/// How long the work may take to stop by itself. With the polling below the process is gone in
+/// under two seconds.
 const GRACE: Duration = Duration::from_millis(1500);
 const POLLING: Duration = Duration::from_millis(20);
 
@@ -26,7 +28,8 @@ pub fn watch() {
         // Fails only for signals that no process may catch.
         let _ = signal_hook::flag::register_usize(signal, Arc::clone(&SIGNAL), signal as usize);
     }
-    // Where a file may not grow as large as it would, the write is to fail, and not the process to die in the middle of it.
+    // Where a file may not grow as large as it would, the write is to fail, and not the process to
+    // die in the middle of it.
     #[cfg(unix)]
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
     thread::spawn(|| {
@@ -41,7 +44,8 @@ pub fn watch() {
     });
 }
 
-/// The signal of a terminal that goes away, unless it is to be ignored as under `nohup`, which Linux alone tells.
+/// The signal of a terminal that goes away, unless it is to be ignored as under `nohup`, which
+/// Linux alone tells.
 #[cfg(unix)]
 fn hangup() -> Option<i32> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -60,7 +64,8 @@ pub fn stop_requested() -> bool {
     SIGNAL.load(Ordering::Relaxed) != 0
 }
 
-/// What a shell reports of a process that the signal ended: 130 for SIGINT, 143 for SIGTERM, 129 for SIGHUP.
+/// What a shell reports of a process that the signal ended: 130 for SIGINT, 143 for SIGTERM, 129
+/// for SIGHUP.
 pub fn exit_code() -> u8 {
     128 + SIGNAL.load(Ordering::Relaxed) as u8
 }

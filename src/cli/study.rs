@@ -26,7 +26,8 @@ use super::{
 
 /// Folder of the project's scenes.
 const SCENES: &str = "scenes";
-/// Pictures of the preset, unless asked for otherwise: all of it should take minutes on software Vulkan.
+/// Pictures of the preset, unless asked for otherwise: all of it should take minutes on software
+/// Vulkan.
 const PRESET_SIZE: (u32, u32) = (256, 256);
 const PRESET_SPP: u32 = 1;
 /// Renders per combination of the preset's plane: noise needs two.

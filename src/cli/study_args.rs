@@ -57,7 +57,8 @@ pub struct StudyArgs {
     #[arg(long, value_name = "R", value_parser = whole(REPEAT), help_heading = "Study")]
     pub repeat: Option<u32>,
 
-    /// What pictures are measured against: an EXR file of their size, or auto for a much finer render [default: none]
+    /// What pictures are measured against: an EXR file of their size, or auto for a much finer
+    /// render [default: none]
     #[arg(long, value_name = "FILE.exr|auto", value_parser = reference, conflicts_with = "preset")]
     #[arg(help_heading = "Study")]
     pub reference: Option<ReferenceArg>,
@@ -76,8 +77,8 @@ pub struct StudyArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum PresetArg {
-    /// The figures of a university report on photon mapping, and its claims put to the test; 256x256 with one sample
-    /// a pixel unless --size and --spp say otherwise
+    /// The figures of a university report on photon mapping, and its claims put to the test;
+    /// 256x256 with one sample a pixel unless --size and --spp say otherwise
     Report,
 }
 

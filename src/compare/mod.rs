@@ -5,7 +5,8 @@
 //! may differ in what rounding decides: where the last photon of an estimate and the next one are
 //! tied (their squared distances differ by at most [`TIE`]), either may be summed. Such queries are
 //! counted, may differ in tied photons only, and do not enter the differences of radius and
-//! radiance. Both make the report's raw estimate, whatever [`crate::settings::EstimateSettings::raw`] says.
+//! radiance. Both make the report's raw estimate, whatever
+//! [`crate::settings::EstimateSettings::raw`] says.
 
 mod comparison;
 mod measure;

@@ -5,9 +5,10 @@ const STEPS: u64 = 1 << 24;
 /// Weights above 0 that a table can hold: each needs a step of its own.
 pub const MAX_CHOICES: usize = 1 << 22;
 
-/// Cumulative probabilities of `weights`, each ≥ 0: the first entry above a random number is chosen. Entries are multiples of
-/// the random numbers' step, so that the difference to its predecessor is exactly the probability with which an entry
-/// is chosen. No weight above 0 gets less than one step, none of 0 gets any, and from the last above 0 on all are 1.
+/// Cumulative probabilities of `weights`, each ≥ 0: the first entry above a random number is
+/// chosen. Entries are multiples of the random numbers' step, so that the difference to its
+/// predecessor is exactly the probability with which an entry is chosen. No weight above 0 gets
+/// less than one step, none of 0 gets any, and from the last above 0 on all are 1.
 ///
 /// # Panics
 /// If more than [`MAX_CHOICES`] weights are above 0.

@@ -1,8 +1,9 @@
 //! The environment as the device reads it: pixels, and tables by which directions are drawn.
 //!
-//! A cell has the centres of four pixels for its corners; those of the first and the last row reach from a pole to the
-//! centres of the outer pixels. It is chosen in proportion to its corners' mean luminance and its solid angle; within it the
-//! density follows the interpolated luminance (`shaders/lib/transport/environment.wesl`), so that it is above 0 wherever the radiance is.
+//! A cell has the centres of four pixels for its corners; those of the first and the last row reach
+//! from a pole to the centres of the outer pixels. It is chosen in proportion to its corners' mean
+//! luminance and its solid angle; within it the density follows the interpolated luminance
+//! (`shaders/lib/transport/environment.wesl`), so that it is above 0 wherever the radiance is.
 
 use std::f64::consts::{PI, TAU};
 

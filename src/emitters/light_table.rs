@@ -1,7 +1,9 @@
-//! All that shines in a scene, as one list for the device, and the tables by which passes choose from it.
+//! All that shines in a scene, as one list for the device, and the tables by which passes choose
+//! from it.
 //!
-//! Punctual lights come first, then emissive triangles and spheres, material by material, then the environment. What
-//! a user calls one light is a group: a punctual light, all that shines by one material, the environment.
+//! Punctual lights come first, then emissive triangles and spheres, material by material, then the
+//! environment. What a user calls one light is a group: a punctual light, all that shines by one
+//! material, the environment.
 
 use std::{
     collections::BTreeMap,
@@ -28,7 +30,8 @@ pub struct LightGroup {
     pub name: String,
     /// `point`, `spot`, `directional`, `surface` or `environment`.
     pub kind: &'static str,
-    /// W in each channel; of directional lights and environments what the sphere around the scene catches.
+    /// W in each channel; of directional lights and environments what the sphere around the scene
+    /// catches.
     pub power: DVec3,
 }
 
@@ -50,13 +53,15 @@ pub struct LightTable {
 #[derive(Clone, Debug, Default)]
 pub struct Choices {
     pub entries: Vec<LightChoice>,
-    /// Parts into which the numbers that choose are cut, dealt to the paths in turn; 0 if no light can be chosen.
+    /// Parts into which the numbers that choose are cut, dealt to the paths in turn; 0 if no light
+    /// can be chosen.
     pub turns: u32,
 }
 
 impl LightTable {
     /// # Errors
-    /// [`Error::Scene`] if more triangles shine than a table can hold; [`Error::Setting`] if `light_photons` names no light.
+    /// [`Error::Scene`] if more triangles shine than a table can hold; [`Error::Setting`] if
+    /// `light_photons` names no light.
     pub fn new(
         scene: &Scene,
         environment: Option<&EnvironmentMap>,
@@ -107,7 +112,8 @@ impl LightTable {
         self.powers.iter().sum()
     }
 
-    /// For photon paths: by power, or every group alike, times the factors that the settings ask for.
+    /// For photon paths: by power, or every group alike, times the factors that the settings ask
+    /// for.
     #[must_use]
     pub fn for_photons(&self, settings: &LightSettings) -> Choices {
         self.choices(self.powers.clone(), settings)

@@ -1,5 +1,6 @@
-//! What photon paths are aimed at: spheres around clusters of mirrors and glass, so that no path that could become a caustic
-//! is left out and few others are traced (the projection map of Jensen 2001, section 5.3, as bounding spheres).
+//! What photon paths are aimed at: spheres around clusters of mirrors and glass, so that no path
+//! that could become a caustic is left out and few others are traced (the projection map of Jensen
+//! 2001, section 5.3, as bounding spheres).
 
 use glam::Vec3;
 
@@ -78,9 +79,9 @@ pub fn scene_target(scene: &Scene) -> Target {
     Target { center, radius }
 }
 
-/// Spheres that together hold all delta surfaces, at most [`MAX_TARGETS`]; none where there are none. The largest cluster is
-/// split along its longest axis until there are as many as may be; then halves are kept only where their cross-sections
-/// together are smaller than the whole's.
+/// Spheres that together hold all delta surfaces, at most [`MAX_TARGETS`]; none where there are
+/// none. The largest cluster is split along its longest axis until there are as many as may be;
+/// then halves are kept only where their cross-sections together are smaller than the whole's.
 #[must_use]
 pub fn delta_targets(scene: &Scene) -> Vec<Target> {
     let delta = items(scene, |material| scene.materials[material as usize].surface.is_delta());

@@ -12,19 +12,22 @@ pub struct AdapterReport {
     /// `discrete`, `integrated`, `virtual`, `software` or `other`.
     pub kind: &'static str,
     pub limits: wgpu::Limits,
-    /// Invocations of the smallest and of the largest subgroup; 0 and 0 without subgroup operations.
+    /// Invocations of the smallest and of the largest subgroup; 0 and 0 without subgroup
+    /// operations.
     pub subgroup: (u32, u32),
     /// Why it cannot be used, if so.
     pub unusable: Option<String>,
     pub(super) adapter: wgpu::Adapter,
 }
 
-/// All adapters, best first: real GPUs before software, discrete before integrated, usable before others.
+/// All adapters, best first: real GPUs before software, discrete before integrated, usable before
+/// others.
 #[must_use]
 pub fn adapters() -> Vec<AdapterReport> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::PRIMARY;
-    // Indirect arguments are written by our own kernels and bounded there; wgpu's checks would cost a kernel each.
+    // Indirect arguments are written by our own kernels and bounded there; wgpu's checks would cost
+    // a kernel each.
     descriptor.flags = wgpu::InstanceFlags::default() - wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
     let instance = wgpu::Instance::new(descriptor);
     let found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
@@ -36,7 +39,8 @@ pub fn adapters() -> Vec<AdapterReport> {
 /// The adapter of that name or index, or the best one.
 ///
 /// # Errors
-/// [`Error::Device`] if there is none; the message says what to install or which adapters there are.
+/// [`Error::Device`] if there is none; the message says what to install or which adapters there
+/// are.
 pub fn choose(wanted: Option<&str>) -> Result<AdapterReport> {
     let mut all = adapters();
     if all.is_empty() {

@@ -38,13 +38,15 @@ impl MemoryCount {
         self.now.load(Ordering::Relaxed)
     }
 
-    /// The most bytes that were alive at once since the device was opened or [`Self::restart_peak`].
+    /// The most bytes that were alive at once since the device was opened or
+    /// [`Self::restart_peak`].
     #[must_use]
     pub fn peak(&self) -> u64 {
         self.peak.load(Ordering::Relaxed)
     }
 
-    /// Bytes that all buffers together may take: all that the driver gives, unless [`Self::set_limit`] was called.
+    /// Bytes that all buffers together may take: all that the driver gives, unless
+    /// [`Self::set_limit`] was called.
     #[must_use]
     pub fn limit(&self) -> u64 {
         self.limit.load(Ordering::Relaxed)
@@ -61,7 +63,8 @@ impl MemoryCount {
     }
 }
 
-/// A buffer on the device; its memory is given back when it is dropped and no submitted work needs it any more.
+/// A buffer on the device; its memory is given back when it is dropped and no submitted work needs
+/// it any more.
 #[derive(Debug)]
 pub struct Buffer {
     pub(super) inner: wgpu::Buffer,

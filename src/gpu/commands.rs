@@ -1,4 +1,5 @@
-//! Commands under way to the device: dispatches that are cut into parts, and submissions that end in time.
+//! Commands under way to the device: dispatches that are cut into parts, and submissions that end
+//! in time.
 
 use std::{
     mem,
@@ -11,8 +12,9 @@ use super::{
     timer::{Timed, Timings},
 };
 
-/// Commands that are recorded, and handed over by [`Gpu::submit`] or, where they would keep the device for too long, before.
-/// A buffer must not be written by the host between the recording of two commands that use it.
+/// Commands that are recorded, and handed over by [`Gpu::submit`] or, where they would keep the
+/// device for too long, before. A buffer must not be written by the host between the recording of
+/// two commands that use it.
 #[derive(Debug)]
 pub struct Commands<'g> {
     pub(super) gpu: &'g Gpu,
@@ -38,8 +40,8 @@ impl<'g> Commands<'g> {
         }
     }
 
-    /// Records `invocations` invocations of a kernel, part by part; `record` puts one part, of which it is told the first
-    /// invocation and the number of them, into a pass.
+    /// Records `invocations` invocations of a kernel, part by part; `record` puts one part, of
+    /// which it is told the first invocation and the number of them, into a pass.
     pub(super) fn dispatch(
         &mut self,
         stem: &'static str,

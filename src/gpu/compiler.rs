@@ -17,7 +17,8 @@ const MOST_THREADS: usize = 8;
 /// Stem and constants, these by their bits.
 type Key = (&'static str, Vec<(&'static str, u64)>);
 
-/// The programs of a device. Each is compiled once, in the order in which they are asked for, unless somebody needs it before.
+/// The programs of a device. Each is compiled once, in the order in which they are asked for,
+/// unless somebody needs it before.
 #[derive(Debug)]
 pub(super) struct Compiler {
     programs: Mutex<HashMap<Key, Arc<Program>>>,
@@ -64,7 +65,8 @@ impl Compiler {
 }
 
 impl Drop for Compiler {
-    /// Waits for the threads, for a driver that is unloaded under them ends the process; what they have not begun is left.
+    /// Waits for the threads, for a driver that is unloaded under them ends the process; what they
+    /// have not begun is left.
     fn drop(&mut self) {
         drop(self.asked.take());
         while self.waiting.lock().is_ok_and(|waiting| waiting.try_recv().is_ok()) {}

@@ -1,4 +1,5 @@
-//! What a driver reports outside of any call, kept until someone asks, and said in words with what to do next.
+//! What a driver reports outside of any call, kept until someone asks, and said in words with what
+//! to do next.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -17,8 +18,8 @@ pub(super) enum Fault {
     Lost(String),
 }
 
-/// The first fault since the last look: later ones are its consequences, but for the loss of the device, which is the
-/// cause of what was reported before.
+/// The first fault since the last look: later ones are its consequences, but for the loss of the
+/// device, which is the cause of what was reported before.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faults(Arc<Mutex<Option<Fault>>>);
 

@@ -7,7 +7,8 @@ use super::{
     shaders::{BindingKind, SHADERS, Shader, shader},
 };
 
-/// The bind group that says which part of a dispatch runs: owned here, filled for each dispatch (`shaders/bindings/dispatch.wesl`).
+/// The bind group that says which part of a dispatch runs: owned here, filled for each dispatch
+/// (`shaders/bindings/dispatch.wesl`).
 const PART_GROUP: u32 = 3;
 
 /// A compute kernel. Several that are equal share what was compiled.
@@ -22,7 +23,8 @@ pub struct Kernel {
 #[derive(Debug)]
 pub struct Bindings(Vec<(u32, wgpu::BindGroup)>);
 
-/// A kernel with its constants, compiled by whoever comes first: a thread of the [`Compiler`], or one that needs it.
+/// A kernel with its constants, compiled by whoever comes first: a thread of the [`Compiler`], or
+/// one that needs it.
 #[derive(Debug)]
 pub(super) struct Program {
     shader: &'static Shader,
@@ -91,8 +93,9 @@ impl Program {
 }
 
 impl Kernel {
-    /// The kernel `stem`, which other threads begin to compile; `overrides` sets its `override` constants. Names that only
-    /// other kernels have are passed over, so that one list serves several kernels.
+    /// The kernel `stem`, which other threads begin to compile; `overrides` sets its `override`
+    /// constants. Names that only other kernels have are passed over, so that one list serves
+    /// several kernels.
     ///
     /// # Panics
     /// If no kernel has that stem, or none a constant of one of the names.
@@ -116,7 +119,8 @@ impl Kernel {
         Self { program, tables: Vec::new() }
     }
 
-    /// The kernel with tables for all its dispatches. Names that only other kernels use are passed over.
+    /// The kernel with tables for all its dispatches. Names that only other kernels use are passed
+    /// over.
     #[must_use]
     pub fn with_tables(mut self, tables: &[(&'static str, &Table)]) -> Self {
         let binds = |name: &str| self.program.shader.bindings.iter().any(|b| b.name == name);
@@ -125,11 +129,12 @@ impl Kernel {
         self
     }
 
-    /// Binds buffers by the names of the shader's variables. Names that only other kernels use are passed over, so
-    /// that one list serves several kernels.
+    /// Binds buffers by the names of the shader's variables. Names that only other kernels use are
+    /// passed over, so that one list serves several kernels.
     ///
     /// # Panics
-    /// If a variable of the kernel has no buffer in the list, nor a table in [`Self::with_tables`], or no kernel has a variable of one of the names.
+    /// If a variable of the kernel has no buffer in the list, nor a table in [`Self::with_tables`],
+    /// or no kernel has a variable of one of the names.
     #[must_use]
     pub fn bind(&self, gpu: &Gpu, buffers: &[(&str, &Buffer)]) -> Bindings {
         for (name, _) in buffers {
@@ -162,15 +167,16 @@ impl Kernel {
         Bindings(self.program.compiled().layouts.iter().enumerate().filter_map(group).collect())
     }
 
-    /// Runs `invocations` invocations, in workgroups of [`crate::layout::WORKGROUP_SIZE`] folded to two dimensions
-    /// where one is too short, and in several dispatches where one would take too long ([`super::Pacing`]); the kernel finds its
-    /// index with `invocation_index` and must check it.
+    /// Runs `invocations` invocations, in workgroups of [`crate::layout::WORKGROUP_SIZE`] folded to
+    /// two dimensions where one is too short, and in several dispatches where one would take too
+    /// long ([`super::Pacing`]); the kernel finds its index with `invocation_index` and must check
+    /// it.
     pub fn dispatch(&self, commands: &mut Commands, bindings: &Bindings, invocations: u64) {
         self.record(commands, bindings, invocations, None);
     }
 
-    /// Runs as many workgroups as the first three `u32` of `arguments` say, which the device has written: at most those of
-    /// `most` invocations.
+    /// Runs as many workgroups as the first three `u32` of `arguments` say, which the device has
+    /// written: at most those of `most` invocations.
     pub fn dispatch_indirect(&self, commands: &mut Commands, bindings: &Bindings, arguments: &Buffer, most: u64) {
         self.record(commands, bindings, most, Some(arguments));
     }
@@ -188,7 +194,8 @@ impl Kernel {
             }
             match arguments {
                 Some(arguments) if invocations == most => pass.dispatch_workgroups_indirect(arguments, 0),
-                // How many there are in truth is known to the device alone: those beyond the end find nothing to do.
+                // How many there are in truth is known to the device alone: those beyond the end
+                // find nothing to do.
                 _ => {
                     let (x, y) = fold(invocations.div_ceil(u64::from(crate::layout::WORKGROUP_SIZE)));
                     pass.dispatch_workgroups(x, y, 1);

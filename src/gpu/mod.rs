@@ -58,11 +58,13 @@ pub struct Gpu {
     lanes: u32,
 }
 
-/// How long the device may work on what was submitted before it counts as hung. Submissions are kept far shorter than
-/// that on GPUs; software works through all of them at the pace of its processor, and cannot hang.
+/// How long the device may work on what was submitted before it counts as hung. Submissions are
+/// kept far shorter than that on GPUs; software works through all of them at the pace of its
+/// processor, and cannot hang.
 const HUNG_AFTER: Duration = Duration::from_secs(300);
 
-/// Lanes of a subgroup that share the parts of a cell at most, one each: as many as a cell has parts.
+/// Lanes of a subgroup that share the parts of a cell at most, one each: as many as a cell has
+/// parts.
 const MOST_LANES: u32 = crate::layout::CELL_FAN;
 
 impl Gpu {
@@ -74,7 +76,8 @@ impl Gpu {
         Self::open_paced(wanted, None)
     }
 
-    /// As [`Self::open`], with dispatches cut that way; `None`: by measured time, but for software not at all.
+    /// As [`Self::open`], with dispatches cut that way; `None`: by measured time, but for software
+    /// not at all.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -137,8 +140,8 @@ impl Gpu {
         16 * table::most_texels(&self.limits)
     }
 
-    /// A zeroed storage buffer of `count` elements of `T` (at least one: a binding cannot be empty), which can be
-    /// copied from and to and hold indirect arguments.
+    /// A zeroed storage buffer of `count` elements of `T` (at least one: a binding cannot be
+    /// empty), which can be copied from and to and hold indirect arguments.
     ///
     /// # Errors
     /// [`Error::Limit`] if one binding cannot hold it, [`Error::Memory`] if none is left.
@@ -169,7 +172,8 @@ impl Gpu {
         Ok(buffer)
     }
 
-    /// A uniform buffer that holds `value`. One that finds no memory left shows in the next [`Self::wait`].
+    /// A uniform buffer that holds `value`. One that finds no memory left shows in the next
+    /// [`Self::wait`].
     #[must_use]
     pub fn uniform<T: bytemuck::Pod>(&self, label: &str, value: &T) -> Buffer {
         let bytes = (size_of::<T>() as u64).next_multiple_of(16);
@@ -184,7 +188,8 @@ impl Gpu {
         Ok(Buffer { inner, memory: Arc::clone(&self.memory) })
     }
 
-    /// Makes something that takes `size` bytes of the device's memory and counts them, or says that they are not there.
+    /// Makes something that takes `size` bytes of the device's memory and counts them, or says that
+    /// they are not there.
     fn allot<T>(&self, label: &str, size: u64, create: impl FnOnce() -> T) -> Result<T> {
         let used = self.memory.now();
         let missing =

@@ -1,9 +1,11 @@
-//! How much work is handed to the device at once. Operating systems end work that keeps a GPU for too long, after about
-//! two seconds, and take the device away from the process; software has no such watchdog.
+//! How much work is handed to the device at once. Operating systems end work that keeps a GPU for
+//! too long, after about two seconds, and take the device away from the process; software has no
+//! such watchdog.
 //!
-//! Each kernel's cost per invocation is measured on the device. A dispatch that would take longer than [`MOST_PER_DISPATCH`]
-//! is cut into parts, and a submission is closed before it takes longer than [`MOST_PER_SUBMISSION`]. Nothing that reaches
-//! the picture depends on the cuts: an invocation knows its number, never its part.
+//! Each kernel's cost per invocation is measured on the device. A dispatch that would take longer
+//! than [`MOST_PER_DISPATCH`] is cut into parts, and a submission is closed before it takes longer
+//! than [`MOST_PER_SUBMISSION`]. Nothing that reaches the picture depends on the cuts: an
+//! invocation knows its number, never its part.
 
 use std::{
     collections::HashMap,
@@ -22,7 +24,8 @@ pub enum Pacing {
     Parts(u32),
 }
 
-/// The longest that a dispatch should take: a quarter of the 100 ms that it may, for the next can be four times as costly.
+/// The longest that a dispatch should take: a quarter of the 100 ms that it may, for the next can
+/// be four times as costly.
 pub const MOST_PER_DISPATCH: Duration = Duration::from_millis(25);
 /// The longest that a submission should take.
 const MOST_PER_SUBMISSION: Duration = Duration::from_millis(100);
@@ -32,7 +35,8 @@ pub(super) const LEAST_PART: u64 = 4096;
 pub(super) const UNMEASURED: u64 = 1 << 14;
 /// Invocations of a part that is timed, at least: fewer tell of latency, not of cost.
 pub(super) const LEAST_TIMED: u64 = LEAST_PART / 2;
-/// What is left of a cost that later measures fall below. Slow, for a queue of paths that dries up measures less and less.
+/// What is left of a cost that later measures fall below. Slow, for a queue of paths that dries up
+/// measures less and less.
 const DECAY: f64 = 0.98;
 
 /// What to dispatch next.
@@ -56,7 +60,8 @@ impl Pace {
         Self { pacing, costs: Mutex::default() }
     }
 
-    /// The next part of a dispatch of which `left` invocations are left. Parts but the last are multiples of a workgroup.
+    /// The next part of a dispatch of which `left` invocations are left. Parts but the last are
+    /// multiples of a workgroup.
     pub fn part(&self, stem: &str, left: u64) -> Part {
         let most = match self.pacing {
             Pacing::Whole => return Part { invocations: left, seconds: Some(0.0) },

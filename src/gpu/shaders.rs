@@ -45,7 +45,8 @@ impl Shader {
     }
 }
 
-/// What the kernels ask of a device beyond the usual limits: of each kind the most that one of them uses.
+/// What the kernels ask of a device beyond the usual limits: of each kind the most that one of them
+/// uses.
 #[must_use]
 pub fn needs() -> wgpu::Limits {
     let most = |of: &dyn Fn(&Shader) -> u32| SHADERS.iter().map(of).max().unwrap_or(0);

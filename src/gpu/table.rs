@@ -8,8 +8,8 @@ use crate::{
     layout::TABLE_COLUMNS,
 };
 
-/// An array that kernels read with `textureLoad`: texel `i` lies in column `i % TABLE_COLUMNS` of row `i / TABLE_COLUMNS`.
-/// Clones share the texture.
+/// An array that kernels read with `textureLoad`: texel `i` lies in column `i % TABLE_COLUMNS` of
+/// row `i / TABLE_COLUMNS`. Clones share the texture.
 #[derive(Clone, Debug)]
 pub struct Table(Arc<Texture>);
 
@@ -27,7 +27,8 @@ impl Drop for Texture {
 }
 
 impl Table {
-    /// A table of `data`, whose elements have 4 bytes, one texel each, or a multiple of 16, a texel for each 16.
+    /// A table of `data`, whose elements have 4 bytes, one texel each, or a multiple of 16, a texel
+    /// for each 16.
     ///
     /// # Errors
     /// [`Error::Limit`] if a texture cannot hold it, [`Error::Memory`] if none is left.

@@ -103,7 +103,8 @@ impl Timer {
         self.pending().push(Pending { times, is_there, timings });
     }
 
-    /// Tells the pace what is known by now; call it when the device has done all that was submitted.
+    /// Tells the pace what is known by now; call it when the device has done all that was
+    /// submitted.
     pub fn collect(&self, pace: &Pace) {
         for Pending { times, is_there, timings } in mem::take(&mut *self.pending()) {
             // Those of a device that was lost never come.

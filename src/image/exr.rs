@@ -1,8 +1,9 @@
 //! OpenEXR files: the frame as 32-bit floats, with all that is needed to make it again.
 //!
-//! One part with the channels `R G B A Z N.X N.Y N.Z albedo.R albedo.G albedo.B`: the plain names are the picture, a
-//! name before a dot is a layer. Every reader takes this form, whereas many read only the first of several parts. The
-//! format wants channels stored in alphabetical order; readers show R, G, B, A first whatever the order.
+//! One part with the channels `R G B A Z N.X N.Y N.Z albedo.R albedo.G albedo.B`: the plain names
+//! are the picture, a name before a dot is a layer. Every reader takes this form, whereas many read
+//! only the first of several parts. The format wants channels stored in alphabetical order; readers
+//! show R, G, B, A first whatever the order.
 
 use std::{
     collections::BTreeMap,
@@ -98,7 +99,8 @@ fn encode(frame: &Frame, provenance: &Provenance) -> exr::error::Result<Vec<u8>>
     Ok(bytes)
 }
 
-/// What the file tells of its provenance. Counts and the seed are text, for the format's integers end at 2³¹.
+/// What the file tells of its provenance. Counts and the seed are text, for the format's integers
+/// end at 2³¹.
 fn attributes(provenance: &Provenance) -> LayerAttributes {
     let (stats, settings) = (provenance.stats, provenance.settings);
     let version = env!("CARGO_PKG_VERSION");
@@ -142,8 +144,9 @@ fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }
 
-/// Sorts the attributes of a single-part file by name, in place: the writer keeps them in a hash map, whose order
-/// changes from run to run. An attribute is name, 0, type, 0, size, value; an empty name ends the header.
+/// Sorts the attributes of a single-part file by name, in place: the writer keeps them in a hash
+/// map, whose order changes from run to run. An attribute is name, 0, type, 0, size, value; an
+/// empty name ends the header.
 fn sort_attributes(file: &mut [u8]) {
     const START: usize = 8;
     let text_end = |at: usize| at + file[at..].iter().position(|&b| b == 0).expect("the writer ends its texts") + 1;
@@ -160,7 +163,8 @@ fn sort_attributes(file: &mut [u8]) {
     file[START..at].copy_from_slice(&attributes.concat());
 }
 
-/// Reads a frame: R, G, B of any sample type; A is 1 and the other channels are 0 where the file has none.
+/// Reads a frame: R, G, B of any sample type; A is 1 and the other channels are 0 where the file
+/// has none.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, is not OpenEXR or lacks one of R, G, B.

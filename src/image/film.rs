@@ -1,4 +1,5 @@
-//! The film: sums over camera samples, from which a frame is made, and what passes need to be merged.
+//! The film: sums over camera samples, from which a frame is made, and what passes need to be
+//! merged.
 
 use std::array;
 
@@ -25,8 +26,8 @@ pub struct Film {
     samples: u64,
     /// Of the layers' numbers, pixel by pixel, in the order of [`LAYERS`].
     sums: [Vec<f32>; LAYERS.len()],
-    /// Sums over the passes of the squares of their means; `None` for one pass, whose means the sums
-    /// give.
+    /// Sums over the passes of the squares of their means; `None` for one pass, whose means the
+    /// sums give.
     squares: Option<[Vec<f64>; LAYERS.len()]>,
     /// Samples that are in no sum, as it would not be finite with them.
     non_finite: u64,
@@ -60,7 +61,8 @@ impl Film {
         self.non_finite
     }
 
-    /// Adds the device's sums over `samples` samples of the pixel at a column and row of the window.
+    /// Adds the device's sums over `samples` samples of the pixel at a column and row of the
+    /// window.
     pub(crate) fn add(&mut self, (column, row): (u32, u32), sums: &PixelSums, samples: u32) {
         let pixel = row as usize * self.window.width as usize + column as usize;
         self.non_finite += sums[0][3] as u64;

@@ -98,15 +98,15 @@ impl Frame {
         self.layer("alpha")
     }
 
-    /// Distance of the first hit along the camera's axis, metres, mean over the samples that hit; 0 if
-    /// none did.
+    /// Distance of the first hit along the camera's axis, metres, mean over the samples that hit; 0
+    /// if none did.
     #[must_use]
     pub fn depth(&self) -> &[f32] {
         self.layer("depth")
     }
 
-    /// Interpolated normal of the first hit in world space, mean over the samples that hit; 0 if none
-    /// did.
+    /// Interpolated normal of the first hit in world space, mean over the samples that hit; 0 if
+    /// none did.
     #[must_use]
     pub fn normal(&self) -> &[[f32; 3]] {
         bytemuck::cast_slice(self.layer("normal"))

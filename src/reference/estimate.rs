@@ -14,13 +14,14 @@ pub fn usable(photon: &PhotonPlace, point: &VisiblePoint) -> bool {
     from_octahedral(photon.wi).dot(Vec3::from(point.ng)) > 0.0
 }
 
-/// Weight of light from `wi` in the diffuse lobe of `point`: twin of `diffuse_flux_weight` in `shaders/lib/transport/lambert.wesl`.
+/// Weight of light from `wi` in the diffuse lobe of `point`: twin of `diffuse_flux_weight` in
+/// `shaders/lib/transport/lambert.wesl`.
 fn normal_weight(point: &VisiblePoint, wi: Vec3) -> f32 {
     (wi.dot(point.ns.into()) / wi.dot(point.ng.into())).clamp(0.0, MAX_NORMAL_WEIGHT)
 }
 
-/// Radiance that leaves `point` towards the viewer: L = beta f_r / (mean π r²) Σ K(d/r) w_n Φ / paths, where
-/// the interpolated normal's w_n is 1 without the side test.
+/// Radiance that leaves `point` towards the viewer: L = beta f_r / (mean π r²) Σ K(d/r) w_n Φ /
+/// paths, where the interpolated normal's w_n is 1 without the side test.
 #[must_use]
 pub fn estimate(
     (places, fluxes): (&[PhotonPlace], &[PhotonFlux]),

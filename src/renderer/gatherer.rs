@@ -1,4 +1,5 @@
-//! Who gathers photons for a picture: the grid on the device, or the kd-tree on the CPU in its place.
+//! Who gathers photons for a picture: the grid on the device, or the kd-tree on the CPU in its
+//! place.
 
 use super::{
     maps::PhotonMaps,
@@ -64,7 +65,8 @@ impl<'a> MapGatherer<'a> {
         Ok(Self { maps, search, sharing: EstimateSharing::new(gpu, estimate.share_reach), estimate, observer })
     }
 
-    /// Adds the light of one map at the tile's points; `number`: which of the maps gathered, from 1.
+    /// Adds the light of one map at the tile's points; `number`: which of the maps gathered, from
+    /// 1.
     fn gather_map(
         &mut self,
         pass: &CameraPass,
@@ -110,8 +112,8 @@ impl<'a> MapGatherer<'a> {
 }
 
 impl Gatherer for MapGatherer<'_> {
-    /// The light of all maps; with final gathering of the caustic map alone, and of all maps where the
-    /// rays end.
+    /// The light of all maps; with final gathering of the caustic map alone, and of all maps where
+    /// the rays end.
     fn gather(&mut self, pass: &CameraPass, tile: &Tile, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
         let final_gathering = pass.final_rays() > 0;
         let gathered_here = |kind: MapKind| !final_gathering || kind == MapKind::Caustic;

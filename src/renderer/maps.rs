@@ -1,5 +1,5 @@
-//! First pass: photons leave the lights and are stored in maps, which remember what they were traced
-//! with.
+//! First pass: photons leave the lights and are stored in maps, which remember what they were
+//! traced with.
 
 use super::tally;
 use crate::{
@@ -44,8 +44,8 @@ impl PhotonMaps {
         self
     }
 
-    /// What they were traced with; pictures made of them use the same mode, bounces, sampler, seed and
-    /// rays of final gathering.
+    /// What they were traced with; pictures made of them use the same mode, bounces, sampler, seed
+    /// and rays of final gathering.
     #[must_use]
     pub fn settings(&self) -> &PhotonSettings {
         &self.settings
@@ -58,7 +58,8 @@ impl PhotonMaps {
     }
 }
 
-/// Traces the photons of a scene and sorts them into maps. `caustics`: the scene has a specular surface.
+/// Traces the photons of a scene and sorts them into maps. `caustics`: the scene has a specular
+/// surface.
 pub(super) fn trace_maps(
     gpu: &Gpu,
     scene: &SceneBuffers,

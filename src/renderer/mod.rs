@@ -1,7 +1,8 @@
 //! Two-pass photon mapping (Jensen 1996, "Global Illumination Using Photon Maps"), in one screen:
 //! [`render`].
 //!
-//! [`Session`] holds its stages one by one, for those who make several pictures of the same photons.
+//! [`Session`] holds its stages one by one, for those who make several pictures of the same
+//! photons.
 
 mod gatherer;
 mod maps;

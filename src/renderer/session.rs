@@ -28,8 +28,8 @@ pub struct Render {
     pub stats: Stats,
 }
 
-/// A scene on the device. Photons are traced once for each call of [`Self::photon_maps`]; any number
-/// of pictures can be made of the same maps.
+/// A scene on the device. Photons are traced once for each call of [`Self::photon_maps`]; any
+/// number of pictures can be made of the same maps.
 #[derive(Debug)]
 pub struct Session<'a> {
     gpu: &'a Gpu,
@@ -66,9 +66,9 @@ impl<'a> Session<'a> {
         Ok(Self { gpu, scene, buffers, camera_media, stats })
     }
 
-    /// Has the kernels compiled that a picture by these settings needs, in their order, while the first
-    /// of them run. Those of final gathering, and any that were not asked for here, are compiled when
-    /// they are needed.
+    /// Has the kernels compiled that a picture by these settings needs, in their order, while the
+    /// first of them run. Those of final gathering, and any that were not asked for here, are
+    /// compiled when they are needed.
     pub fn prefetch(&self, settings: &Settings) {
         let (gpu, scene) = (self.gpu, &self.buffers);
         let Settings { photons, estimate, picture, .. } = settings;
@@ -92,9 +92,9 @@ impl<'a> Session<'a> {
         trace_maps(self.gpu, &self.buffers, settings, self.scene.has_delta(), self.stats.clone(), progress)
     }
 
-    /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode, bounces,
-    /// sampler, seed and rays of final gathering are those that the maps were traced with. The
-    /// statistics are those of the maps and of this picture; `total` is their sum.
+    /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode,
+    /// bounces, sampler, seed and rays of final gathering are those that the maps were traced with.
+    /// The statistics are those of the maps and of this picture; `total` is their sum.
     ///
     /// # Errors
     /// As [`super::render`].

@@ -11,7 +11,8 @@ use crate::{
 const DEFAULT_HEIGHT: u32 = 512;
 /// Pixels of the largest picture.
 const MAX_PIXELS: u64 = 1 << 28;
-/// Host memory that a pixel takes: the sums of all layers, their means, and the file of these before it is written, bytes.
+/// Host memory that a pixel takes: the sums of all layers, their means, and the file of these
+/// before it is written, bytes.
 const BYTES_PER_PIXEL: u64 = 160;
 
 /// The asked size of the whole picture, or the default height at the camera's aspect.

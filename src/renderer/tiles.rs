@@ -73,8 +73,8 @@ impl<'a> CameraPass<'a> {
         })
     }
 
-    /// Renders tile by tile: camera rays to visible points, direct light, the light of photons, sums
-    /// over the samples of each pixel. One film for each of the gatherer's pictures.
+    /// Renders tile by tile: camera rays to visible points, direct light, the light of photons,
+    /// sums over the samples of each pixel. One film for each of the gatherer's pictures.
     pub fn render(
         &self,
         gatherer: &mut dyn Gatherer,
@@ -129,7 +129,8 @@ impl<'a> CameraPass<'a> {
         self.final_gather.as_ref().map_or(0, FinalGather::rays)
     }
 
-    /// Traces one ray of final gathering from each of the tile's visible points; returns what they see.
+    /// Traces one ray of final gathering from each of the tile's visible points; returns what they
+    /// see.
     pub fn trace_final(&self, tile: &Tile, ray: u32) -> Result<(&Buffer, StepCount)> {
         let gather = self.final_gather.as_ref().expect("the settings ask for it");
         Ok((&gather.seen, gather.trace(self.gpu, self.scene, &self.tracer, tile, ray)?))

@@ -1,4 +1,5 @@
-//! The lights' part of bind group 0: all that shines, the tables by which passes choose from it, targets, environment.
+//! The lights' part of bind group 0: all that shines, the tables by which passes choose from it,
+//! targets, environment.
 
 use crate::{
     bvh::{Bvh, MediaProbe, too_deep},
@@ -28,7 +29,8 @@ pub struct ChoiceBuffer {
 pub struct LightBuffers {
     /// As uploaded.
     pub table: LightTable,
-    /// For photon paths, for those aimed at mirrors and glass, and for direct light of what has an extent.
+    /// For photon paths, for those aimed at mirrors and glass, and for direct light of what has an
+    /// extent.
     pub photons: ChoiceBuffer,
     pub aimed: ChoiceBuffer,
     pub direct: ChoiceBuffer,

@@ -37,7 +37,8 @@ pub struct Browser {
 }
 
 impl Browser {
-    /// Starts it with a window of that many pixels. `None`: `CAUSTICA_NO_BROWSER=1` says to do without.
+    /// Starts it with a window of that many pixels. `None`: `CAUSTICA_NO_BROWSER=1` says to do
+    /// without.
     pub fn open(width: u32, height: u32) -> Option<Self> {
         if env::var("CAUSTICA_NO_BROWSER").is_ok_and(|v| v == "1") {
             return None;
@@ -90,7 +91,8 @@ impl Browser {
         self.command("POST", "/execute/sync", &json!({"script": script, "args": []}))
     }
 
-    /// Presses keys in the element that the CSS selector names; arrow keys are U+E012 (left) to U+E015 (down).
+    /// Presses keys in the element that the CSS selector names; arrow keys are U+E012 (left) to
+    /// U+E015 (down).
     pub fn press(&self, selector: &str, keys: &str) {
         let found = self.command("POST", "/element", &json!({"using": "css selector", "value": selector}));
         let element = found.as_object().and_then(|o| o.values().next()).and_then(Value::as_str);
@@ -114,7 +116,8 @@ impl Browser {
         serious.map(|e| e["message"].to_string()).collect()
     }
 
-    /// Addresses asked for since the last call that are neither files nor in the page or the browser itself.
+    /// Addresses asked for since the last call that are neither files nor in the page or the
+    /// browser itself.
     pub fn outside_requests(&self) -> Vec<String> {
         let entries = self.command("POST", "/se/log", &json!({"type": "performance"}));
         let address = |entry: &Value| {

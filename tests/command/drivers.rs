@@ -1,6 +1,6 @@
-//! Two unrelated drivers: the default adapter (Mesa lavapipe where there is no GPU) and SwiftShader,
-//! which comes with Debian's Chromium. Its subgroups have 4 invocations, its kernels 10 storage
-//! buffers. Left out where `CAUSTICA_NO_BROWSER` is 1.
+//! Two unrelated drivers: the default adapter (Mesa lavapipe where there is no GPU) and
+//! SwiftShader, which comes with Debian's Chromium. Its subgroups have 4 invocations, its kernels
+//! 10 storage buffers. Left out where `CAUSTICA_NO_BROWSER` is 1.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -126,7 +126,8 @@ impl Renders {
     }
 }
 
-/// Renders both scenes on both drivers and compares each with itself, and with the other as a control.
+/// Renders both scenes on both drivers and compares each with itself, and with the other as a
+/// control.
 fn agree(names: [&'static str; 2]) {
     let Some(driver) = swiftshader() else { return };
     let renders = thread::scope(|scope| {

@@ -121,7 +121,8 @@ fn rejection_directions(count: usize) -> Vec<Vec3> {
     found
 }
 
-/// Chi-square of two samples of the same size over 8 x 16 cells of equal area, and of azimuth 16 cells.
+/// Chi-square of two samples of the same size over 8 x 16 cells of equal area, and of azimuth 16
+/// cells.
 fn chi_square(a: &[Vec3], b: &[Vec3]) -> f64 {
     let cells = |sample: &[Vec3]| {
         let mut counts = vec![0.0_f64; 128];

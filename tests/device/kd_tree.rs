@@ -1,4 +1,5 @@
-//! The kd-tree of the reference finds what a search that looks at all finds, and what another tree finds.
+//! The kd-tree of the reference finds what a search that looks at all finds, and what another tree
+//! finds.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -46,7 +47,8 @@ fn differences(tree: &KdTree, positions: &[Vec3], queries: &[Vec3], k: u32, radi
     queries.iter().filter(wrong).count()
 }
 
-/// Compares over several k and bounds; then, as the control, with a photon moved that the first query uses.
+/// Compares over several k and bounds; then, as the control, with a photon moved that the first
+/// query uses.
 fn check(random: &mut Random, positions: &[Vec3]) {
     let tree = KdTree::new(positions);
     let queries = queries(random, positions);

@@ -55,7 +55,8 @@ fn what_exceeds_a_binding_is_split() {
     let settings = settings(Mode::Hybrid, 300_000, 24);
     let picture = |gpu: &Gpu| render(gpu, &scene, &settings, &Silent).map(|r| r.frame);
     let whole = picture(gpu()).expect("the scene renders");
-    // The primitives and the photons of a map need two windows each; nothing else scales with the scene.
+    // The primitives and the photons of a map need two windows each; nothing else scales with the
+    // scene.
     let split = picture(&device_with_bindings(primitives * 55 / 100)).expect("what exceeds a binding is split");
     assert!(split == whole, "the split scene gives another picture");
     let refused = picture(&device_with_bindings(primitives * 45 / 100)).expect_err("control: three windows");

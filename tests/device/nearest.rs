@@ -1,4 +1,5 @@
-//! The k nearest photons of the grid are those of a search that looks at all, at every size, density and k.
+//! The k nearest photons of the grid are those of a search that looks at all, at every size,
+//! density and k.
 
 use caustica::{
     density::{Density, DensityKernel},
@@ -71,8 +72,8 @@ fn settings(k: u32) -> GatherSettings {
     GatherSettings { neighbors: k, radius: None, max_radius: None, density: CONE }
 }
 
-/// Number of valid points whose answer differs from brute force over `photons`: in the count, in the radius (beyond
-/// rounding) or in the estimate, which a single wrong photon changes.
+/// Number of valid points whose answer differs from brute force over `photons`: in the count, in
+/// the radius (beyond rounding) or in the estimate, which a single wrong photon changes.
 fn differences(
     answer: &Answer,
     (places, fluxes): (&[PhotonPlace], &[PhotonFlux]),
@@ -101,8 +102,8 @@ fn agrees(gathered: &Gathered, radiance: &[f32; 4], found: &Found, expected: [f6
         && (0..3).all(|c| close(radiance[c].into(), expected[c], 2e-4))
 }
 
-/// Asks for `k` neighbours and compares with brute force; then, as the control, with brute force over a map
-/// that lacks the photon nearest to the last valid point.
+/// Asks for `k` neighbours and compares with brute force; then, as the control, with brute force
+/// over a map that lacks the photon nearest to the last valid point.
 fn check(bench: &mut Bench, photons: &[Photon], points: &[VisiblePoint], settings: &GatherSettings, side_test: bool) {
     let map = bench.map(photons);
     let answer = bench.ask(side_test, &map, points, settings);
@@ -262,7 +263,8 @@ fn all_photons_within_a_radius_are_summed() {
     points[1].position = [30.0, 0.0, 0.0];
     let map = bench.map(&photons);
     for radius in [1e-3, 0.1, 0.5, 100.0] {
-        // A kernel that falls to 0 at the rim weighs two or three photons by differences of nearly equal numbers.
+        // A kernel that falls to 0 at the rim weighs two or three photons by differences of nearly
+        // equal numbers.
         let last = if radius < 0.5 { DensityKernel::Gaussian } else { DensityKernel::Silverman };
         for kernel in [DensityKernel::Cone, last] {
             let density = Density { kernel, ..CONE };
@@ -280,7 +282,8 @@ fn all_photons_within_a_radius_are_summed() {
 
 #[test]
 fn each_kernel_integrates_to_1_over_its_disc() {
-    // Photons of flux 1 evenly on a unit square at y = 0, one in each cell of a grid: irradiance is their number.
+    // Photons of flux 1 evenly on a unit square at y = 0, one in each cell of a grid: irradiance is
+    // their number.
     let mut bench = Bench::open();
     let mut random = Random(13);
     let side = 200;
@@ -446,7 +449,8 @@ fn the_sort_is_stable_at_every_size() {
 
 #[test]
 fn the_estimate_is_unbiased_with_the_next_photon() {
-    // Photons of flux 1 evenly on a unit square at y = 0: irradiance is their number over the paths.
+    // Photons of flux 1 evenly on a unit square at y = 0: irradiance is their number over the
+    // paths.
     let mut bench = Bench::open();
     let mut random = Random(9);
     let count = 40_000u32;
@@ -464,9 +468,11 @@ fn the_estimate_is_unbiased_with_the_next_photon() {
     let answer = bench.ask(true, &map, &points, &settings(10));
     let even = f64::from(count) / EMITTED as f64;
     let mean = answer.radiance.iter().map(|r| f64::from(r[0])).sum::<f64>() / points.len() as f64 / even;
-    // 4000 discs of 10 photons lie beside each other: noise of the mean is about 1 / sqrt(40,000) / 2.
+    // 4000 discs of 10 photons lie beside each other: noise of the mean is about 1 / sqrt(40,000) /
+    // 2.
     assert!((mean - 1.0).abs() < 0.01, "{mean}");
-    // Control: with the radius of the k-th photon itself the mean is too bright, by weight(r) / (k - 1) / mean weight.
+    // Control: with the radius of the k-th photon itself the mean is too bright, by weight(r) / (k
+    // - 1) / mean weight.
     let (places, fluxes) = map.read(bench.gpu).unwrap();
     let positions: Vec<Vec3> = places.iter().map(|p| p.position.into()).collect();
     let with_kth = |p: &VisiblePoint| {

@@ -1,4 +1,5 @@
-//! The traversal on the device finds what brute force finds, in trees that need a short stack and in those that need a long one.
+//! The traversal on the device finds what brute force finds, in trees that need a short stack and
+//! in those that need a long one.
 
 use caustica::{
     bvh::Bvh,
@@ -12,7 +13,8 @@ use support::*;
 use super::probe::{Probe, Row};
 
 const RAYS: usize = 4096;
-/// Of [`RAYS`], those that may be decided by rounding: where outlines are grazed or two surfaces lie equally far.
+/// Of [`RAYS`], those that may be decided by rounding: where outlines are grazed or two surfaces
+/// lie equally far.
 const UNSURE: usize = 2;
 
 /// Well-spread numbers in 0..1 (PCG hash, Jarzynski and Olano 2020).

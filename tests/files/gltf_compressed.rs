@@ -9,8 +9,9 @@ fn hex(text: &str) -> Vec<u8> {
     (0..text.len() / 2).map(|i| u8::from_str_radix(&text[2 * i..2 * i + 2], 16).expect("hexadecimal")).collect()
 }
 
-/// Streams of meshoptimizer 1.0: the corners of an octahedron of radius 1000 as 16-bit integers, the same of radius 0.75 by
-/// the exponential filter and its normals by the octahedral one; its triangles, as such and as plain indices.
+/// Streams of meshoptimizer 1.0: the corners of an octahedron of radius 1000 as 16-bit integers,
+/// the same of radius 0.75 by the exponential filter and its normals by the octahedral one; its
+/// triangles, as such and as plain indices.
 const POSITIONS: &str = "a0013c000000602f013c0000000d08010fc000002f602f010fc00000060d080100f000002f600100f00000060d\
                          0000000000000000000000000000000000000000000000000000e803000000000000";
 const EXPONENTIAL: &str = "a000013c000000bf6001180000000000010fc0000060bf60010180000000000100f0000060bf010010000000\

@@ -321,7 +321,8 @@ fn absurd_counts_cost_nothing() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever happens to the bytes, the file loads or is refused; nothing panics and nothing is not a number.
+    /// Whatever happens to the bytes, the file loads or is refused; nothing panics and nothing is
+    /// not a number.
     #[test]
     fn damaged_files_never_panic(changes in prop::collection::vec((0_usize..10_000, any::<u8>()), 1..4), cut in 0_usize..20_000) {
         let mut bytes = triangle().to_string().into_bytes();

@@ -20,7 +20,8 @@ fn with_primitive(positions: &[f32], mode: u32, indices: Option<(u32, Vec<u8>, u
     gltf
 }
 
-/// Triangles as sets of corners, each starting at its smallest: equal for equal surfaces with equal outsides.
+/// Triangles as sets of corners, each starting at its smallest: equal for equal surfaces with equal
+/// outsides.
 pub fn surface(scene: &Scene) -> Vec<[[i32; 3]; 3]> {
     let corner = |p: Vec3| (p * 1000.0).round().as_ivec3().to_array();
     let mut surface: Vec<_> = scene
@@ -156,7 +157,8 @@ fn morph_targets_move_vertices_and_normals_by_default_weights() {
 #[test]
 fn skins_stand_as_their_joints_do() {
     let mut gltf = triangle();
-    // The first vertex holds to joint 0, the second to joint 1, the third to both alike, with weights that sum to 100.
+    // The first vertex holds to joint 0, the second to joint 1, the third to both alike, with
+    // weights that sum to 100.
     let joints = add_accessor(&mut gltf, &[0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0], 5121, 3, "VEC4");
     let weights = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 50.0, 50.0, 0.0, 0.0];
     let weights = add_accessor(&mut gltf, &floats(&weights), 5126, 3, "VEC4");
@@ -274,7 +276,8 @@ fn mirrored_and_stretched_solids_keep_their_outside() {
 
 #[test]
 fn normals_are_perpendicular_after_stretching() {
-    // A plane x + y = const and its normal; stretched by 4 along x, the plane's normal is (1/4, 1, 0).
+    // A plane x + y = const and its normal; stretched by 4 along x, the plane's normal is (1/4, 1,
+    // 0).
     let mut gltf = with_primitive(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0], 4, None);
     let normals = add_accessor(&mut gltf, &floats(&[1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]), 5126, 3, "VEC3");
     gltf["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals.into();

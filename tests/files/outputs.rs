@@ -1,4 +1,5 @@
-//! What is written, and what is left behind by a run that fails or is stopped: by the program, on real files.
+//! What is written, and what is left behind by a run that fails or is stopped: by the program, on
+//! real files.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -209,7 +210,8 @@ fn a_reader_that_has_gone_is_no_failure() {
     assert!(code == Some(0) && said.contains("wrote a.exr"), "control: {said}");
 }
 
-/// How it ends by itself. The promise is two seconds; a machine under load is given time, work that goes on is not.
+/// How it ends by itself. The promise is two seconds; a machine under load is given time, work that
+/// goes on is not.
 fn wait_for(child: &mut Child) -> Option<ExitStatus> {
     let deadline = Instant::now() + Duration::from_secs(30);
     while Instant::now() < deadline {
@@ -223,7 +225,8 @@ fn wait_for(child: &mut Child) -> Option<ExitStatus> {
     None
 }
 
-/// The same command, which hears the end of its terminal even where this test does not, as under nohup.
+/// The same command, which hears the end of its terminal even where this test does not, as under
+/// nohup.
 fn hearing_hangups(command: &Command) -> Command {
     let mut hearing = Command::new("env");
     hearing.arg("--default-signal=HUP").arg(command.get_program()).args(command.get_args());

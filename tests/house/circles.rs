@@ -1,8 +1,9 @@
 //! Circles of `use` between the source files, and the order of folders within a layer.
 //!
-//! An edge leads from a file to the file that defines what one of its paths names: `crate::`, `super::`, `self::` and
-//! paths that begin with a child module, groups included. A re-export resolves to the file behind it, so a `mod.rs`
-//! that only re-exports is on no circle. Unit tests are left out: they use whatever they test.
+//! An edge leads from a file to the file that defines what one of its paths names: `crate::`,
+//! `super::`, `self::` and paths that begin with a child module, groups included. A re-export
+//! resolves to the file behind it, so a `mod.rs` that only re-exports is on no circle. Unit tests
+//! are left out: they use whatever they test.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -206,8 +207,8 @@ fn circles_are_found() {
     }
 }
 
-/// The files and folders of a folder from the lowest to the highest: each uses those before it only. Its `mod.rs` may
-/// use all.
+/// The files and folders of a folder from the lowest to the highest: each uses those before it
+/// only. Its `mod.rs` may use all.
 const ORDERS: [(&str, &[&str]); 4] = [
     ("renderer", &["size", "tally", "maps", "tiles", "gatherer", "session", "render"]),
     ("passes", &["maps", "wavefront", "photons", "estimate", "camera"]),

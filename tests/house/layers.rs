@@ -242,8 +242,8 @@ fn good_sources_are_not() {
     }
 }
 
-/// Where the word `unsafe` stands in the code, and where a lint against it is lifted or a shader compiled without its
-/// checks: file and word.
+/// Where the word `unsafe` stands in the code, and where a lint against it is lifted or a shader
+/// compiled without its checks: file and word.
 fn untrusted(path: &str, source: &str) -> Vec<String> {
     let tokens = tokens(source);
     let lifts = |i: usize| {
@@ -284,8 +284,8 @@ fn unsafe_code_is_found() {
     }
 }
 
-/// What of a lock file comes from elsewhere than the registry, or without a checksum: the names of packages. Our own have
-/// neither.
+/// What of a lock file comes from elsewhere than the registry, or without a checksum: the names of
+/// packages. Our own have neither.
 fn strangers(lock: &str) -> Vec<&str> {
     let is_known = |package: &&str| {
         package.contains("\nsource = \"registry+https://github.com/rust-lang/crates.io-index\"\nchecksum = \"")

@@ -1,5 +1,6 @@
-//! Every struct that crosses to the GPU has the same fields in the same places on both sides, and every shared
-//! constant the same value: the shaders are reflected with naga and compared with `layout.rs`.
+//! Every struct that crosses to the GPU has the same fields in the same places on both sides, and
+//! every shared constant the same value: the shaders are reflected with naga and compared with
+//! `layout.rs`.
 
 use std::{any::type_name, mem::offset_of};
 
@@ -241,7 +242,8 @@ fn rust_type(module: &Module, handle: Handle<Type>) -> String {
     }
 }
 
-/// Constants and overrides of the module with their values; `None` where the value is not a literal number.
+/// Constants and overrides of the module with their values; `None` where the value is not a literal
+/// number.
 fn named_values(module: &Module) -> Vec<(String, Option<f64>)> {
     let number = |init: Handle<Expression>| match module.global_expressions[init] {
         Expression::Literal(Literal::U32(n)) => Some(f64::from(n)),
@@ -281,8 +283,8 @@ fn this_test_knows_every_struct_and_constant_of_the_host() {
     assert!(missing.is_empty(), "add to this test: {missing:?}");
 }
 
-/// Constants that no kernel names: sizes of structs; values that a kernel reads from a field or tells by the others of
-/// their kind; a bound of the host's own. Their values are not compared.
+/// Constants that no kernel names: sizes of structs; values that a kernel reads from a field or
+/// tells by the others of their kind; a bound of the host's own. Their values are not compared.
 const NOT_NAMED: [&str; 7] = [
     "SEARCH_STATE_BYTES",
     "GATHER_STATE_BYTES",

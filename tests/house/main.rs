@@ -1,4 +1,5 @@
-//! The source and the documents: layers, layouts, scenes of the repository, what the documents name.
+//! The source and the documents: layers, layouts, scenes of the repository, what the documents
+//! name.
 
 mod circles;
 mod documents;

@@ -1,4 +1,5 @@
-//! The README's two commands are what `.ci/run` and a newcomer run, and the tests that `docs/reliability.md` names are there.
+//! The README's two commands are what `.ci/run` and a newcomer run, and the tests that
+//! `docs/reliability.md` names are there.
 
 const README: &str = include_str!("../../README.md");
 const CI: &str = include_str!("../../.ci/run");

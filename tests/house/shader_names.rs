@@ -1,8 +1,10 @@
-//! Names in shaders are not mangled: a function, struct or constant of one file must not have the name of another's.
+//! Names in shaders are not mangled: a function, struct or constant of one file must not have the
+//! name of another's.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-/// Words that begin a declaration; variables with a binding belong to their kernel and are left out.
+/// Words that begin a declaration; variables with a binding belong to their kernel and are left
+/// out.
 const DECLARATIONS: [&str; 5] = ["fn ", "struct ", "const ", "override ", "alias "];
 
 /// Names declared at top level, which rustfmt-like style puts at the start of a line.

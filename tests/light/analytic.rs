@@ -60,8 +60,8 @@ fn closed_sphere_has_the_radiance_of_the_series() {
         let short = estimate(10, Sampler::Random, BOUNCES - 1);
         assert!(short.z(right) > 4.0, "control: {mode:?}: {short:?} with a bounce less");
         for neighbors in [10, 100] {
-            // Independent photons: those of a Sobol sequence keep a distance, which makes the (k+1)-th
-            // lie farther by up to 1/(2k).
+            // Independent photons: those of a Sobol sequence keep a distance, which makes the
+            // (k+1)-th lie farther by up to 1/(2k).
             let found = estimate(neighbors, Sampler::Random, BOUNCES);
             assert!(found.z(right) < 4.0, "{mode:?}, k = {neighbors}: {found:?} instead of {right}");
             // The default sampler stays within what its photons' distances may cost.
@@ -119,7 +119,8 @@ fn closed_box_stores_the_flux_of_the_series() {
         assert!(within(flux[channel], right, 0.01), "channel {channel}: {} instead of {right}", flux[channel]);
         assert!(!within(short[channel], right, 0.01), "control: channel {channel}: {} passes", short[channel]);
     }
-    // What is neither absorbed nor cut off would be missing: Σ over channels of stored · (1 − ρ) + lost = Φ.
+    // What is neither absorbed nor cut off would be missing: Σ over channels of stored · (1 − ρ) +
+    // lost = Φ.
     let absorbed: f64 = (0..3).map(|c| flux[c] * (1.0 - f64::from(albedo[c]))).sum::<f64>() / 3.0;
     assert!(within(absorbed + traced.lost, power, 0.01), "{absorbed} + {} instead of {power}", traced.lost);
     assert!(!within(absorbed, power, 0.01), "control: nothing was lost to the bounce limit");

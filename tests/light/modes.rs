@@ -144,8 +144,8 @@ fn modes_agree_on_a_smooth_shaded_ball() {
         let settings = settings(mode, 100_000, 40).with(|s| s.estimate.neighbors = 150);
         render_scene(&coarse_ball(smooth), &settings)
     };
-    // Means over blocks of 4 x 4 pixels, against noise; away from the shadow's edge, where the disc of the estimate
-    // leaves the lit surface.
+    // Means over blocks of 4 x 4 pixels, against noise; away from the shadow's edge, where the disc
+    // of the estimate leaves the lit surface.
     let blocks = |render: &Render| -> Vec<f64> {
         let block = |b: usize| {
             let pixels = (0..16).map(|i| ((b / 10) * 4 + i / 4) * 40 + (b % 10) * 4 + i % 4);

@@ -1,4 +1,5 @@
-//! Camera samples: how they are distributed, through which lens they look, and what of the light they share.
+//! Camera samples: how they are distributed, through which lens they look, and what of the light
+//! they share.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -31,7 +32,8 @@ use caustica::{
 use glam::{DVec2, Vec3, vec3};
 use support::*;
 
-/// A white square of 3 m at z = `z`, facing the camera; no larger, so that rounding of its points stays far below a pixel.
+/// A white square of 3 m at z = `z`, facing the camera; no larger, so that rounding of its points
+/// stays far below a pixel.
 fn plane(z: f32) -> Scene {
     let mut scene = scene(&[diffuse(0.5)]);
     add_quad(&mut scene, vec3(-1.5, -1.5, z), Vec3::X * 3.0, Vec3::Y * 3.0, 0);
@@ -121,7 +123,8 @@ fn every_prefix_is_fair_and_spread() {
     assert_ne!(sobol, set(Sampler::Sobol, 1000, 6));
 }
 
-/// Over 256 places the first two dimensions have one point in each of 256 equal rectangles, whatever their shape.
+/// Over 256 places the first two dimensions have one point in each of 256 equal rectangles,
+/// whatever their shape.
 #[test]
 fn two_dimensions_are_spread_together() {
     let spread = |points: &[DVec2]| {
@@ -141,8 +144,8 @@ fn two_dimensions_are_spread_together() {
     }
 }
 
-/// Columns of the matrices of x² + x + 1 and x³ + x + 1, 32 bits each, by the recurrences of Joe and Kuo 2008 from their
-/// first numbers.
+/// Columns of the matrices of x² + x + 1 and x³ + x + 1, 32 bits each, by the recurrences of Joe
+/// and Kuo 2008 from their first numbers.
 fn sobol_columns() -> Vec<[u32; 2]> {
     let mut columns = vec![[0x8000_0000, 0x8000_0000], [0xc000_0000, 0xc000_0000], [0x6000_0000, 0x2000_0000]];
     for i in 3..32 {
@@ -167,7 +170,8 @@ fn matrices_follow_from_their_polynomials() {
 
 #[test]
 fn sobol_sets_integrate_better() {
-    // Mean square error of the area of a disc and of a smooth function over 16 seeds and a prefix that is no power of two.
+    // Mean square error of the area of a disc and of a smooth function over 16 seeds and a prefix
+    // that is no power of two.
     let error = |sampler: Sampler, first_seed: u32| {
         let one = |seed| {
             let points = set(sampler, 200, seed);
@@ -254,7 +258,8 @@ fn circles_of_confusion_have_the_closed_form_s_size() {
         s.picture.focus = Some(focus);
         s.picture.spp = 1024;
     });
-    // Points of the plane seen by the one pixel of a narrow picture, about its centre: a disc, blurred by the pixel.
+    // Points of the plane seen by the one pixel of a narrow picture, about its centre: a disc,
+    // blurred by the pixel.
     let spread = |distance: f32| {
         let points = visible(&plane(-distance), &eye, 1, &lens);
         let squares = points.iter().map(|(_, p)| p.truncate().length_squared());
@@ -370,8 +375,8 @@ fn shared_estimates_err_like_those_of_every_sample() {
     assert!(error(&few) > 1.03 * error(&own), "control: half the photons err as little");
 }
 
-/// Largest change from one column of a picture to the next, root mean square over the rows of the back wall, over the median of all
-/// columns there: at the borders of tiles, every `side` pixels.
+/// Largest change from one column of a picture to the next, root mean square over the rows of the
+/// back wall, over the median of all columns there: at the borders of tiles, every `side` pixels.
 fn step_at_borders(radiance: &[[f32; 3]], width: usize, side: usize) -> f64 {
     let (rows, columns) = (width / 5..2 * width / 5, width / 5..4 * width / 5);
     let light = |x: usize, y: usize| f64::from(Vec3::from(radiance[y * width + x]).element_sum()).ln();

@@ -1,4 +1,5 @@
-//! The references at 256 x 256 and 128 x 128, made by other renderers; see `tests/references/README.md`.
+//! The references at 256 x 256 and 128 x 128, made by other renderers; see
+//! `tests/references/README.md`.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -16,7 +17,8 @@ use caustica::{
 };
 use support::*;
 
-/// relMSE and relative error of the mean of a default render against the reference of the same name.
+/// relMSE and relative error of the mean of a default render against the reference of the same
+/// name.
 fn errors(name: &str, other: &str, size: u32, most: f64) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let suffix = if size == 256 { "" } else { "_128" };

@@ -17,14 +17,16 @@ use caustica::{
 use glam::{Vec3, vec3};
 use support::*;
 
-/// Fresnel reflectance of unpolarised light from outside glass of index `n`, at the cosine of incidence.
+/// Fresnel reflectance of unpolarised light from outside glass of index `n`, at the cosine of
+/// incidence.
 fn fresnel(cos_i: f64, n: f64) -> f64 {
     let cos_t = (1.0 - (1.0 - cos_i * cos_i) / (n * n)).sqrt();
     let (s, p) = ((cos_i - n * cos_t) / (cos_i + n * cos_t), (n * cos_i - cos_t) / (n * cos_i + cos_t));
     (s * s + p * p) / 2.0
 }
 
-/// A floor whose colour changes from black to white at x = 0, seen straight down from an oblique camera.
+/// A floor whose colour changes from black to white at x = 0, seen straight down from an oblique
+/// camera.
 fn edge_scene(slab: Option<Surface>) -> Scene {
     let mut scene = scene(&[diffuse(0.0), diffuse(1.0), slab.unwrap_or(glass())]);
     add_quad(&mut scene, vec3(-9.0, 0.0, 9.0), vec3(9.0, 0.0, 0.0), vec3(0.0, 0.0, -18.0), 0);
@@ -56,7 +58,8 @@ fn a_slab_shifts_the_view_as_snell_says() {
     };
     let clear = edge_seen(None, 0.0);
     assert!((clear - 0.5).abs() < 0.02, "without glass the edge is at {clear}");
-    // Through a slab of thickness 1 a ray falls short of its aim by tan i − tan t: aim that much beyond the edge.
+    // Through a slab of thickness 1 a ray falls short of its aim by tan i − tan t: aim that much
+    // beyond the edge.
     let mut aim = 0.0_f64;
     for _ in 0..50 {
         let tan_i = (4.0 + aim) / 4.0;
@@ -104,7 +107,8 @@ fn slab_and_pane_pass_what_fresnel_leaves() {
 
 #[test]
 fn a_ball_in_glass_has_the_radiance_of_its_photons() {
-    // A small diffuse ball of radius b in the centre of a glass ball of radius R; light and camera at distance D.
+    // A small diffuse ball of radius b in the centre of a glass ball of radius R; light and camera
+    // at distance D.
     let (b, big, distance) = (0.3_f32, 1.0_f32, 4.0_f32);
     let measured = |ior: f32| {
         let mut scene = scene(&[diffuse(0.5), Surface::Glass { ior, tint: Vec3::ONE }]);
@@ -119,12 +123,14 @@ fn a_ball_in_glass_has_the_radiance_of_its_photons() {
         });
         mean(&render_scene(&scene, &settings))
     };
-    // Paraxial optics on the axis: a ray that meets the glass at height h is inclined by h/R · (1 − 1/n) − h/(g n)
-    // behind it, g = D − R being the distance from the light, and meets the ball's pole at depth R − b.
+    // Paraxial optics on the axis: a ray that meets the glass at height h is inclined by h/R · (1 −
+    // 1/n) − h/(g n) behind it, g = D − R being the distance from the light, and meets the ball's
+    // pole at depth R − b.
     let (n, gap, depth) = (1.5_f64, f64::from(distance - big), f64::from(big - b));
     let squeeze = 1.0 - depth * ((n - 1.0) / (n * f64::from(big)) - 1.0 / (gap * n));
     let irradiance = 1000.0 / gap.powi(2) * (1.0 - fresnel(1.0, n)) / squeeze.powi(2);
-    // Seen from outside: L = ρ/π · E · (1 − F) / n², the factor between radiance in glass and in air.
+    // Seen from outside: L = ρ/π · E · (1 − F) / n², the factor between radiance in glass and in
+    // air.
     let right = 0.5 / PI * irradiance * (1.0 - fresnel(1.0, n)) / (n * n);
     assert!(within(measured(1.5), right, 0.05), "{} instead of {right}", measured(1.5));
     assert!(!within(measured(1.7), right, 0.05), "control: {} in denser glass", measured(1.7));
@@ -132,8 +138,8 @@ fn a_ball_in_glass_has_the_radiance_of_its_photons() {
 
 #[test]
 fn an_air_bubble_is_a_closed_surface_of_ior_one() {
-    // A camera looks straight down, 0.4 m beside the axis of a ball in a slab, at a floor that is white on its side of
-    // the axis and black on the other.
+    // A camera looks straight down, 0.4 m beside the axis of a ball in a slab, at a floor that is
+    // white on its side of the axis and black on the other.
     let through = |ior: f32| {
         let mut scene = scene(&[diffuse(0.0), diffuse(1.0), glass(), Surface::Glass { ior, tint: Vec3::ONE }]);
         add_quad(&mut scene, vec3(-9.0, 0.0, 9.0), vec3(9.0, 0.0, 0.0), vec3(0.0, 0.0, -18.0), 0);
@@ -145,8 +151,9 @@ fn an_air_bubble_is_a_closed_surface_of_ior_one() {
         let settings = settings(Mode::DirectRays, 1000, 8).with(|s| s.picture.spp = 16);
         mean(&render_scene(&scene, &settings))
     };
-    // A bubble spreads the view away from the axis, a ball of the slab's own index leaves it: both see white, farther
-    // from the light and nearer to it. A denser ball turns the view over: black, but for stray reflections.
+    // A bubble spreads the view away from the axis, a ball of the slab's own index leaves it: both
+    // see white, farther from the light and nearer to it. A denser ball turns the view over: black,
+    // but for stray reflections.
     let (bubble, same, denser) = (through(1.0), through(1.5), through(3.0));
     assert!(bubble > 0.001 && bubble < 0.5 * same, "bubble {bubble}, same index {same}");
     assert!(denser < 0.1 * same, "control: a denser ball gives {denser}, the same index {same}");

@@ -1,5 +1,5 @@
-//! The camera pass: the picture's samples, tile by tile: camera rays to their visible points, direct light, and the
-//! sum over each pixel's samples. Memory depends on the size of a tile alone.
+//! The camera pass: the picture's samples, tile by tile: camera rays to their visible points,
+//! direct light, and the sum over each pixel's samples. Memory depends on the size of a tile alone.
 
 use super::{
     direct_light::DirectLighting,
@@ -21,11 +21,13 @@ use crate::{
 
 /// Visible points that a tile has room for, without its margin.
 const TILE_POINTS: u64 = 1 << 16;
-/// Places for paths of a sample where the scene has dielectrics: both ways are followed at the first two interfaces.
+/// Places for paths of a sample where the scene has dielectrics: both ways are followed at the
+/// first two interfaces.
 const BRANCHES: u32 = 4;
 /// Samples of one pixel that a tile holds at most.
 const PIXEL_SAMPLES: u32 = 256;
-/// Dispatches of direct light whose shadow rays are counted together: with one ray of each point they stay far below 2^32.
+/// Dispatches of direct light whose shadow rays are counted together: with one ray of each point
+/// they stay far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
 /// Pixels of a tile at least.
 const MIN_TILE_PIXELS: u32 = 64;
@@ -78,8 +80,8 @@ pub struct CameraTracer {
 }
 
 impl CameraTracer {
-    /// All rays start inside of `media`, those around the middle of the camera. `shares`: estimates are
-    /// shared among points, for which a tile needs a margin.
+    /// All rays start inside of `media`, those around the middle of the camera. `shares`: estimates
+    /// are shared among points, for which a tile needs a margin.
     ///
     /// # Errors
     /// Limits of the adapter; a lens before an orthographic camera.
@@ -117,8 +119,8 @@ impl CameraTracer {
         })
     }
 
-    /// The tiles of the whole picture that the asked part of it touches, in order: a tile is the same whatever the part, down to
-    /// the last bit.
+    /// The tiles of the whole picture that the asked part of it touches, in order: a tile is the
+    /// same whatever the part, down to the last bit.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
@@ -164,7 +166,8 @@ impl CameraTracer {
         }
     }
 
-    /// Column and row of the `i`-th pixel of a tile in the asked part of the picture; `None` outside.
+    /// Column and row of the `i`-th pixel of a tile in the asked part of the picture; `None`
+    /// outside.
     #[must_use]
     pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
         let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
@@ -186,8 +189,8 @@ impl CameraTracer {
         self.follow(gpu, scene, (&start, tile.pixels * tile.samples + self.view.margin), &trace)
     }
 
-    /// Starts paths by `start` in that many invocations and follows them by `trace`, each with its own
-    /// buffers besides the wavefront's and the tile's.
+    /// Starts paths by `start` in that many invocations and follows them by `trace`, each with its
+    /// own buffers besides the wavefront's and the tile's.
     pub(super) fn follow(
         &self,
         gpu: &Gpu,
@@ -282,7 +285,8 @@ fn margin_cells((width, height): (u32, u32)) -> u32 {
     2 * (width / MARGIN_CELL + 2) + 2 * (height / MARGIN_CELL)
 }
 
-/// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows from the aspect.
+/// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows
+/// from the aspect.
 fn view(
     camera: &Camera,
     (width, height): (u32, u32),

@@ -1,5 +1,5 @@
-//! Light that reaches visible points straight from what shines: shadow rays to each light without extent, and samples of
-//! emissive surfaces and the environment.
+//! Light that reaches visible points straight from what shines: shadow rays to each light without
+//! extent, and samples of emissive surfaces and the environment.
 
 use crate::{
     gpu::{Buffer, Commands, Gpu, Kernel},
@@ -29,7 +29,8 @@ impl DirectLighting {
         scene.lights.table.punctual as u32 + self.emitters.as_ref().map_or(0, |(_, samples)| *samples)
     }
 
-    /// Adds the light of one step to the radiance of the points. `buffers` are `tile`, `points`, `radiance` and `counters`.
+    /// Adds the light of one step to the radiance of the points. `buffers` are `tile`, `points`,
+    /// `radiance` and `counters`.
     pub fn add(
         &self,
         gpu: &Gpu,

@@ -1,5 +1,6 @@
-//! Final gathering: light that visible points get from what rays of theirs see (Jensen 2001, "Realistic Image Synthesis Using
-//! Photon Mapping", section 8.2). Kernels: `start_final_gather`, `trace_camera`.
+//! Final gathering: light that visible points get from what rays of theirs see (Jensen 2001,
+//! "Realistic Image Synthesis Using Photon Mapping", section 8.2). Kernels: `start_final_gather`,
+//! `trace_camera`.
 
 use super::{
     camera_tracer::CameraTracer,
@@ -15,13 +16,15 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Kernels, and room for what one ray of each visible point sees: memory does not grow with the rays.
+/// Kernels, and room for what one ray of each visible point sees: memory does not grow with the
+/// rays.
 #[derive(Debug)]
 pub struct FinalGather {
     start: Kernel,
     trace: Kernel,
     rays: u32,
-    /// A [`VisiblePoint`] per visible point of the camera, whose weight brings its light to the camera; some slots have no point.
+    /// A [`VisiblePoint`] per visible point of the camera, whose weight brings its light to the
+    /// camera; some slots have no point.
     pub seen: Buffer,
 }
 
@@ -63,7 +66,8 @@ impl FinalGather {
         let points = tracer.point_count(tile);
         let step = gpu.uniform("final step", &FinalStep { ray, rays: self.rays, points, pad: 0 });
         let camera = gpu.uniform("camera tile", &view);
-        // Each visible point is a sample of its own, which follows glass one way by chance: another way with each ray.
+        // Each visible point is a sample of its own, which follows glass one way by chance: another
+        // way with each ray.
         let own = gpu.uniform(
             "final gather tile",
             &CameraTile {

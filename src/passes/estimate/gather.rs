@@ -1,5 +1,5 @@
-//! Radiance from the photons around a point. Kernels: `mark_points`, `key_points`, `search_radius`, `survey_surface`,
-//! `gather`, `finish_gather`.
+//! Radiance from the photons around a point. Kernels: `mark_points`, `key_points`, `search_radius`,
+//! `survey_surface`, `gather`, `finish_gather`.
 
 use crate::{
     density::Density,
@@ -19,8 +19,9 @@ use crate::{
 const BATCH: u32 = 32_768;
 /// Bits of a point's key: the upper word of its Hilbert key.
 const POINT_KEY_BITS: u32 = 3 * layout::KEY_BITS;
-/// By how many of them, the highest, up to so many points are sorted: few points have few blocks of packets to be dealt to, and lie
-/// in the order of pixels, which near ones keep. More are sorted by all.
+/// By how many of them, the highest, up to so many points are sorted: few points have few blocks of
+/// packets to be dealt to, and lie in the order of pixels, which near ones keep. More are sorted by
+/// all.
 const FEW_SORTED_BITS: [(u32, u32); 2] = [(4096, 8), (16_384, 16)];
 /// Packets that are searched or wait together.
 const BLOCK: u64 = layout::PACKET_BLOCK as u64;
@@ -28,8 +29,8 @@ const BLOCK: u64 = layout::PACKET_BLOCK as u64;
 const PACKET: u32 = layout::QUERY_BLOCK / layout::PACKET_BLOCK;
 // The shaders hold them in the components of vectors.
 const _: () = assert!(PACKET == 4);
-/// Of how many blocks of packets one is searched in each dispatch of the search: pilots first, the others start from the radii of
-/// these.
+/// Of how many blocks of packets one is searched in each dispatch of the search: pilots first, the
+/// others start from the radii of these.
 const STRIDES: [u32; 3] = [layout::FIRST_PILOT_STRIDE, layout::PILOT_STRIDE, 1];
 
 /// The radiance estimate that is asked for.
@@ -37,7 +38,8 @@ const STRIDES: [u32; 3] = [layout::FIRST_PILOT_STRIDE, layout::PILOT_STRIDE, 1];
 pub struct GatherSettings {
     /// k, photons of an estimate, 1 to 1000.
     pub neighbors: u32,
-    /// Radius of the estimate, metres: all photons within it count, whatever `neighbors` and `max_radius` are.
+    /// Radius of the estimate, metres: all photons within it count, whatever `neighbors` and
+    /// `max_radius` are.
     pub radius: Option<f32>,
     /// Largest radius, metres.
     pub max_radius: Option<f32>,
@@ -58,7 +60,8 @@ impl From<&EstimateSettings> for GatherSettings {
 
 /// Rays that measure the area of a disc of which some is missing.
 const SURVEY_SAMPLES: usize = 24;
-/// Nodes and primitives that one of them visits at most; together they stay within what software Vulkan can loop.
+/// Nodes and primitives that one of them visits at most; together they stay within what software
+/// Vulkan can loop.
 const SURVEY_TRACE_BUDGET: u32 = 230;
 // Software Vulkan ends all loops of a subgroup after 65,535 iterations in total.
 const _: () = assert!(layout::MOST_RAYS * (SURVEY_TRACE_BUDGET + 1) < 65_535);
@@ -66,13 +69,16 @@ const _: () = assert!(layout::MOST_RAYS * (SURVEY_TRACE_BUDGET + 1) < 65_535);
 /// How the kernels are compiled; for tests and benchmarks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherOptions {
-    /// Only photons that come from the viewer's side of the surface count. Without it the interpolated normal has no say either.
+    /// Only photons that come from the viewer's side of the surface count. Without it the
+    /// interpolated normal has no say either.
     pub side_test: bool,
     /// Loop iterations after which a query goes on in the next dispatch.
     pub step_budget: u32,
-    /// Makes [`Gathered::fingerprint`]: the wrapping sum of a hash of the places in the sorted map of the photons summed.
+    /// Makes [`Gathered::fingerprint`]: the wrapping sum of a hash of the places in the sorted map
+    /// of the photons summed.
     pub fingerprint: bool,
-    /// Photons that do not lie on the point's surface, as far as it is flat and no wall stands on it, are not summed.
+    /// Photons that do not lie on the point's surface, as far as it is flat and no wall stands on
+    /// it, are not summed.
     pub rejects: bool,
     /// The estimate divides by the area of that surface that is there.
     pub corrects: bool,
@@ -178,11 +184,13 @@ impl<'s> Gather<'s> {
         self.compile(gpu, Variant::of(settings, 1));
     }
 
-    /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to `radiance` (`array<vec4f>`), and writes the
-    /// radius and number of photons of each to `gathered` (`array<Gathered>`).
+    /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to `radiance`
+    /// (`array<vec4f>`), and writes the radius and number of photons of each to `gathered`
+    /// (`array<Gathered>`).
     ///
     /// # Errors
-    /// [`crate::Error::Stopped`] when `progress` says so, [`crate::Error::Gpu`] if the driver fails.
+    /// [`crate::Error::Stopped`] when `progress` says so, [`crate::Error::Gpu`] if the driver
+    /// fails.
     #[allow(clippy::too_many_arguments)]
     pub fn run(
         &mut self,
@@ -197,8 +205,8 @@ impl<'s> Gather<'s> {
         self.run_waiting(gpu, map, points, (count, u32::MAX), settings, results, progress)
     }
 
-    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of a map, given by its number; see
-    /// [`crate::layout::VisiblePoint::next_map`].
+    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of a map,
+    /// given by its number; see [`crate::layout::VisiblePoint::next_map`].
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -248,7 +256,8 @@ impl<'s> Gather<'s> {
         Ok(stats)
     }
 
-    /// One batch: sort, then search and sum until no query is open. Returns the number of dispatches.
+    /// One batch: sort, then search and sum until no query is open. Returns the number of
+    /// dispatches.
     fn run_batch(
         &self,
         gpu: &Gpu,

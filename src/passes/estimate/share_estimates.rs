@@ -1,5 +1,6 @@
-//! Light at the visible points of a tile by fewer queries than points: where an estimate is a mean over a disc much wider than
-//! points are apart, they share it. Kernels: `choose_queries`, `share_estimates`.
+//! Light at the visible points of a tile by fewer queries than points: where an estimate is a mean
+//! over a disc much wider than points are apart, they share it. Kernels: `choose_queries`,
+//! `share_estimates`.
 
 use crate::{
     error::Result,
@@ -7,19 +8,21 @@ use crate::{
     layout::{MARGIN_CELL, MARGIN_SAMPLES, ShareRound, VisiblePoint},
 };
 
-/// Pixels of a cell in each round. A coarser cell than 8 x 8 saves little, for its points are few already; so do sizes between these,
-/// for each round costs time of its own.
+/// Pixels of a cell in each round. A coarser cell than 8 x 8 saves little, for its points are few
+/// already; so do sizes between these, for each round costs time of its own.
 const ROUNDS: [u32; 3] = [64, 4, 1];
 /// Samples that a cell has at least: of fewer, most would be queries themselves.
 const LEAST_CELL: u32 = 4;
-/// Of the pixels of a cell of the first round, one in so many has a sample from which its query is chosen.
+/// Of the pixels of a cell of the first round, one in so many has a sample from which its query is
+/// chosen.
 const FIRST_STEP: u32 = ROUNDS[0] / MARGIN_SAMPLES;
 const _: () = assert!(ROUNDS[0] == MARGIN_CELL * MARGIN_CELL);
 
 /// What of a tile is shared.
 #[derive(Debug)]
 pub struct SharedPoints<'a> {
-    /// [`VisiblePoint`]s: for each pixel, in Morton order, its samples, each with its branches; then those of the margin.
+    /// [`VisiblePoint`]s: for each pixel, in Morton order, its samples, each with its branches;
+    /// then those of the margin.
     pub points: &'a Buffer,
     /// A power of 2, at least 64.
     pub pixels: u32,
@@ -27,7 +30,8 @@ pub struct SharedPoints<'a> {
     pub branches: u32,
     /// Cells of the margin.
     pub margin: u32,
-    /// Radiance from each point, `vec4f`, and room for what gathers find, [`Gathered`](crate::layout::Gathered).
+    /// Radiance from each point, `vec4f`, and room for what gathers find,
+    /// [`Gathered`](crate::layout::Gathered).
     pub radiance: &'a Buffer,
     pub gathered: &'a Buffer,
 }
@@ -67,7 +71,8 @@ struct Scratch {
 }
 
 impl EstimateSharing {
-    /// Compiles the kernels. `reach`: distance within which points share an estimate, as a fraction of its radius; 0: none do.
+    /// Compiles the kernels. `reach`: distance within which points share an estimate, as a fraction
+    /// of its radius; 0: none do.
     #[must_use]
     pub fn new(gpu: &Gpu, reach: f32) -> Self {
         let kernel = |stem| Kernel::new(gpu, stem, &[]);
@@ -79,8 +84,9 @@ impl EstimateSharing {
         let _ = Self::new(gpu, 0.0);
     }
 
-    /// Adds the light of a map's photons to the radiance of the tile's points: by queries in large cells of pixels, then in
-    /// smaller ones for the points that are left, and at last by a query for each point. Maps are numbered from 1.
+    /// Adds the light of a map's photons to the radiance of the tile's points: by queries in large
+    /// cells of pixels, then in smaller ones for the points that are left, and at last by a query
+    /// for each point. Maps are numbered from 1.
     ///
     /// # Errors
     /// Those of `estimates`.

@@ -17,7 +17,8 @@ impl BuildGrid {
         Self(Kernel::new(gpu, "build_grid", &[]))
     }
 
-    /// The cells of `count` photons, which lie in windows of `window` each, and the number of levels.
+    /// The cells of `count` photons, which lie in windows of `window` each, and the number of
+    /// levels.
     pub(crate) fn build(&self, gpu: &Gpu, places: &[Buffer], window: u32, count: u32) -> Result<(Buffer, u32)> {
         let sizes = level_sizes(count.div_ceil(CELL_PHOTONS));
         let base = |level: usize| sizes.iter().skip(level + 1).sum::<u32>();

@@ -1,13 +1,16 @@
-//! A photon map on the device: bind group 1 of every kernel that reads one (`shaders/bindings/photon_map.wesl`).
+//! A photon map on the device: bind group 1 of every kernel that reads one
+//! (`shaders/bindings/photon_map.wesl`).
 //!
-//! Photons come unsorted in a [`PhotonStore`]: windows of `array<Photon>`, each within one binding (4,194,304 photons
-//! where a binding holds 128 MiB, so that up to that number there is one window). [`PhotonMap::build`] sorts them
-//! along a Hilbert curve of 20 bits per axis and splits them into what a search reads (`places`: position and
-//! direction, 16 bytes) and what an estimate reads besides (`fluxes`, 16 bytes); where these exceed a binding, into two windows.
+//! Photons come unsorted in a [`PhotonStore`]: windows of `array<Photon>`, each within one binding
+//! (4,194,304 photons where a binding holds 128 MiB, so that up to that number there is one
+//! window). [`PhotonMap::build`] sorts them along a Hilbert curve of 20 bits per axis and splits
+//! them into what a search reads (`places`: position and direction, 16 bytes) and what an estimate
+//! reads besides (`fluxes`, 16 bytes); where these exceed a binding, into two windows.
 //!
-//! Over the sorted photons lies the grid: a finest cell is 16 photons that follow each other on the curve, a coarser
-//! one eight finer cells, each with its exact bounds. Cells thus follow the density of the photons at every scale: a
-//! caustic has small cells, an empty region none, and photons on one spot have cells of size zero.
+//! Over the sorted photons lies the grid: a finest cell is 16 photons that follow each other on the
+//! curve, a coarser one eight finer cells, each with its exact bounds. Cells thus follow the
+//! density of the photons at every scale: a caustic has small cells, an empty region none, and
+//! photons on one spot have cells of size zero.
 
 use super::{
     build_grid::BuildGrid,
@@ -62,11 +65,12 @@ pub struct PhotonMap {
 }
 
 impl PhotonMap {
-    /// Sorts the first `count` photons of `photons` and builds the grid; `emitted` paths shot them. The same photons give the
-    /// same bits, whatever the device's schedule.
+    /// Sorts the first `count` photons of `photons` and builds the grid; `emitted` paths shot them.
+    /// The same photons give the same bits, whatever the device's schedule.
     ///
     /// # Errors
-    /// [`crate::Error::Limit`] if the map does not fit the device, [`crate::Error::Gpu`] if the driver fails.
+    /// [`crate::Error::Limit`] if the map does not fit the device, [`crate::Error::Gpu`] if the
+    /// driver fails.
     pub fn build(gpu: &Gpu, kernels: &MapKernels, photons: PhotonStore, count: u32, emitted: u64) -> Result<Self> {
         let window = kernels.window;
         if count.div_ceil(window) as usize > MAX_WINDOWS {

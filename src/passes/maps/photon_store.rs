@@ -84,7 +84,8 @@ pub(super) fn window_elements<T>(gpu: &Gpu) -> u32 {
     elements_within::<T>(gpu.max_binding())
 }
 
-/// The same for bindings of that many bytes. Photons are counted in 31 bits: a window has no more than 2^29.
+/// The same for bindings of that many bytes. Photons are counted in 31 bits: a window has no more
+/// than 2^29.
 fn elements_within<T>(binding: u64) -> u32 {
     let most = (binding / size_of::<T>() as u64).clamp(64, 1 << 29);
     1 << most.ilog2()
@@ -128,8 +129,9 @@ mod tests {
             (1 << 60, 1 << 30),
         ] {
             assert_eq!(most_photons(binding), photons, "bindings of {binding} bytes");
-            // All else that is made of a photon fits then as well: its key and place in two buffers of the sort, its part of the
-            // counts of digits, of the cells and of what a search reads.
+            // All else that is made of a photon fits then as well: its key and place in two buffers
+            // of the sort, its part of the counts of digits, of the cells and of what a search
+            // reads.
             assert!(photons * 8 <= binding.max(1024), "sort entries in {binding} bytes");
             assert!(photons / u64::from(CELL_PHOTONS) * 37 <= binding.max(1024), "cells in {binding} bytes");
             // A path that found no place is sent beyond 2^31.

@@ -1,4 +1,5 @@
-//! Stable radix sort of (key, index) pairs, and prefix sums. Kernels: `count_digits`, `sum_spans`, `scan_spans`, `scatter_entries`.
+//! Stable radix sort of (key, index) pairs, and prefix sums. Kernels: `count_digits`, `sum_spans`,
+//! `scan_spans`, `scatter_entries`.
 
 use std::ops::Range;
 
@@ -35,8 +36,9 @@ impl RadixSort {
         }
     }
 
-    /// Sorts the first `count` pairs of `entries[0]` by those bits of their keys, 0 the lowest; equal ones keep their order.
-    /// Returns which of the two buffers holds the result; the other one is overwritten.
+    /// Sorts the first `count` pairs of `entries[0]` by those bits of their keys, 0 the lowest;
+    /// equal ones keep their order. Returns which of the two buffers holds the result; the other
+    /// one is overwritten.
     ///
     /// # Errors
     /// [`crate::Error::Limit`] if the digit counts exceed a binding.

@@ -1,4 +1,5 @@
-//! Orders photons along a Hilbert curve. Kernels: `bound_photons`, `merge_bounds`, `key_photons`, `sort_photons`.
+//! Orders photons along a Hilbert curve. Kernels: `bound_photons`, `merge_bounds`, `key_photons`,
+//! `sort_photons`.
 
 use super::{photon_store::PhotonStore, radix_sort::RadixSort};
 use crate::{
@@ -39,7 +40,8 @@ impl SortPhotons {
             gpu.storage::<[u32; 2]>("sort entries", count.into())?,
             gpu.storage::<[u32; 2]>("sort entries", count.into())?,
         ];
-        // By the fine half of the key first: the sort by the coarse half keeps that order among equals.
+        // By the fine half of the key first: the sort by the coarse half keeps that order among
+        // equals.
         for fine in [1, 0] {
             let mut encoder = gpu.encoder();
             // A buffer may not be dropped before the commands that use it are submitted.

@@ -78,8 +78,8 @@ impl PhotonKernels {
         Ok(BatchResult { counters, counts: gpu.read(&buffers.counts, 0, paths * u64::from(MAP_KINDS))? })
     }
 
-    /// Moves a batch's photons of one kind to their places in the map, up to the first path that does
-    /// not fit as a whole.
+    /// Moves a batch's photons of one kind to their places in the map, up to the first path that
+    /// does not fit as a whole.
     pub fn store(
         &self,
         gpu: &Gpu,

@@ -1,8 +1,9 @@
 //! The photon pass: emission by emission, batch by batch, until the maps are full.
 //!
-//! Aimed, there are two emissions: general paths fill the global map, and paths aimed at mirrors and glass the caustic
-//! map, which then holds L S+ D only. Unaimed, the same paths fill both. Which photons a map holds, and in which order, depends on
-//! the indices of the paths alone: never on the size of the batches or on the order in which the device runs them.
+//! Aimed, there are two emissions: general paths fill the global map, and paths aimed at mirrors
+//! and glass the caustic map, which then holds L S+ D only. Unaimed, the same paths fill both.
+//! Which photons a map holds, and in which order, depends on the indices of the paths alone: never
+//! on the size of the batches or on the order in which the device runs them.
 
 use super::{
     photon_batch::{BatchBuffers, PhotonKernels},
@@ -18,8 +19,8 @@ use crate::{
     upload::{SceneBuffers, light_buffers::ChoiceBuffer},
 };
 
-/// Minimum and maximum number of paths of one batch: the device must be busy, and the key of a staged
-/// photon holds its path.
+/// Minimum and maximum number of paths of one batch: the device must be busy, and the key of a
+/// staged photon holds its path.
 const MIN_BATCH: u64 = 1 << 16;
 const MAX_BATCH: u64 = layout::PATH_MASK as u64 + 1;
 /// Paths over which the growth of a map is watched, at least; a map's capacity if that is more.
@@ -56,7 +57,8 @@ struct EmissionPlan<'a> {
     stream: u32,
     first_target: u32,
     target_count: u32,
-    /// [`layout::AIM`], [`layout::CAUSTICS_APART`], and what of the modes' rules holds for these paths.
+    /// [`layout::AIM`], [`layout::CAUSTICS_APART`], and what of the modes' rules holds for these
+    /// paths.
     rules: u32,
     fills: &'static [MapKind],
 }
@@ -72,8 +74,8 @@ impl PhotonTracer {
         let _ = Self::new(gpu, scene, sampler);
     }
 
-    /// Traces photons until both maps are full, hardly grow, or all paths have been emitted. `caustics`: the scene has
-    /// a delta surface.
+    /// Traces photons until both maps are full, hardly grow, or all paths have been emitted.
+    /// `caustics`: the scene has a delta surface.
     ///
     /// # Errors
     /// Limits of the adapter, faults of the driver, and [`crate::Error::Stopped`].

@@ -1,4 +1,5 @@
-//! Photons as they come from the photon pass: a map that fills up, and the paths that it is normalised by.
+//! Photons as they come from the photon pass: a map that fills up, and the paths that it is
+//! normalised by.
 
 use crate::{
     error::Result,
@@ -7,7 +8,8 @@ use crate::{
     passes::maps::photon_store::{PhotonStore, check_capacity},
 };
 
-/// A map that gains less than this fraction of its capacity while a window of paths is traced is idle.
+/// A map that gains less than this fraction of its capacity while a window of paths is traced is
+/// idle.
 const LEAST_GROWTH: f64 = 1e-4;
 
 /// Photons in the order of their paths.
@@ -40,8 +42,8 @@ impl RawMap {
         })
     }
 
-    /// Place of the first photon of each path of a batch. The first path that does not fit closes the map, which is
-    /// then normalised by the paths before it.
+    /// Place of the first photon of each path of a batch. The first path that does not fit closes
+    /// the map, which is then normalised by the paths before it.
     pub(crate) fn place(&mut self, counts: impl Iterator<Item = u32>, first_path: u64) -> Vec<u32> {
         // Beyond the end of any map, also when a path's photons are counted from there.
         const DROPPED: u32 = 1 << 31;

@@ -1,7 +1,8 @@
-//! The folder of public assets that `CAUSTICA_ASSETS` names: `assets.json` in it says what is to come of each file.
+//! The folder of public assets that `CAUSTICA_ASSETS` names: `assets.json` in it says what is to
+//! come of each file.
 //!
-//! Without the variable there is nothing to try, which is said. `CAUSTICA_ASSETS_BYTES` leaves out scenes whose folder is
-//! larger, where time is short.
+//! Without the variable there is nothing to try, which is said. `CAUSTICA_ASSETS_BYTES` leaves out
+//! scenes whose folder is larger, where time is short.
 
 use std::{
     fs,
@@ -46,7 +47,8 @@ fn text<'a>(asset: &'a Value, key: &str) -> &'a str {
 }
 
 fn expected(asset: &Value) -> Expected {
-    // Draco's is a required extension that a renderer may lack; the two of Compatibility are said in words only.
+    // Draco's is a required extension that a renderer may lack; the two of Compatibility are said
+    // in words only.
     match text(asset, "id") {
         "DracoSparseMesh" | "handmade__png_bomb_30000x30000" => return Expected::Either,
         "AG/Compatibility_04" | "AG/Compatibility_05" => return Expected::Refuse,

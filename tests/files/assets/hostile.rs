@@ -1,4 +1,5 @@
-//! Small files with a fault each, and the exact words of their refusal: `tests/hostile/messages.txt`.
+//! Small files with a fault each, and the exact words of their refusal:
+//! `tests/hostile/messages.txt`.
 
 use std::{collections::BTreeMap, fs, path::Path};
 

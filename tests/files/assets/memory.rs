@@ -1,4 +1,5 @@
-//! Counts what a thread allocates, so that a reader's hunger is a number and not a matter of the machine.
+//! Counts what a thread allocates, so that a reader's hunger is a number and not a matter of the
+//! machine.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},

@@ -31,7 +31,8 @@ fn render_with_command(scene: &Path) -> Ended {
 }
 
 impl Ended {
-    /// The one line with which it was refused, without the place of the file; what else happened, as an error.
+    /// The one line with which it was refused, without the place of the file; what else happened,
+    /// as an error.
     fn refusal(&self, scene: &Path) -> Result<String, String> {
         let line = self.stderr.strip_suffix('\n').unwrap_or(&self.stderr);
         match line.strip_prefix("error: ") {

@@ -16,7 +16,8 @@ fn hits(scene: &Scene, asked: &[(Vec3, Vec3)]) -> Vec<bool> {
     rays::trace(scene, &[], asked).1.iter().map(|hit| hit.alpha > 0.0).collect()
 }
 
-/// A closed mesh about the origin: a cube's lattice, pushed out to a dented sphere; neighbours share their corners' bits.
+/// A closed mesh about the origin: a cube's lattice, pushed out to a dented sphere; neighbours
+/// share their corners' bits.
 fn dented_sphere() -> Scene {
     const SIDE: i32 = 8;
     let mut scene = scene(&[diffuse(0.5)]);
@@ -63,7 +64,8 @@ fn no_ray_slips_between_triangles() {
 
 #[test]
 fn a_quad_shows_no_diagonal() {
-    // Quads that stand askew, each seen straight on over a third of a millimetre around its diagonal.
+    // Quads that stand askew, each seen straight on over a third of a millimetre around its
+    // diagonal.
     let covered = |gap: f32| {
         let mut alpha = 0.0;
         for i in 1..3 {
@@ -127,7 +129,8 @@ fn degenerate_triangles_leave_no_trace() {
     let clear = with(&[], Mode::DirectRays);
     assert!(with(&degenerate, Mode::DirectRays) == clear, "they show");
     assert!(with(&[[-x, x, y]], Mode::DirectRays) != clear, "control: a real triangle does not show");
-    // Photons are aimed at all glass, also at that without area: others, but none that is not finite.
+    // Photons are aimed at all glass, also at that without area: others, but none that is not
+    // finite.
     with(&degenerate, Mode::IndirectPhotons);
 }
 
@@ -157,7 +160,8 @@ fn of_coincident_quads_always_one_is_seen() {
 
 #[test]
 fn glass_on_a_floor_does_not_leak() {
-    // A block that stands on the floor: its lower face lies in the floor's plane, in other triangles.
+    // A block that stands on the floor: its lower face lies in the floor's plane, in other
+    // triangles.
     let least = |floor: bool| {
         let mut scene = scene(&[diffuse(0.7), glass()]);
         let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.4, 0.2, 0.3);
@@ -242,7 +246,8 @@ fn size_does_not_matter() {
         let other = render_scene(&scaled(factor, factor * factor), &raw).frame.radiance().to_vec();
         assert!(other == one, "another picture at 2^{exponent}");
     }
-    // 7 mm and 10 km wide; what is drawn by chance around each estimate depends on the places' bits.
+    // 7 mm and 10 km wide; what is drawn by chance around each estimate depends on the places'
+    // bits.
     let right = mean(&render_scene(&room(), &quick(Mode::Hybrid)));
     for factor in [0.0035, 5000.0] {
         let of = |light| render_scene(&scaled(factor, light), &quick(Mode::Hybrid));
@@ -272,7 +277,8 @@ fn a_thousand_kilometres_away_all_looks_the_same() {
     let mut file = moved(serde_json::json!([0, 1, 2]), [FAR, -FAR, FAR]);
     file["scenes"][0]["nodes"] = serde_json::json!([3]);
     assert!(picture(&file).0 == right, "moved by its node");
-    // In the vertices themselves only what f32 keeps of them is there: the sixteenth part of a metre.
+    // In the vertices themselves only what f32 keeps of them is there: the sixteenth part of a
+    // metre.
     let mut file = moved(serde_json::json!([1, 2]), [FAR, 0.0, 0.0]);
     file["scenes"][0]["nodes"] = serde_json::json!([0, 3]);
     let vertices = [[FAR, 0.0, 0.0], [FAR + 1.04, 0.0, 0.0], [FAR, 1.0, 0.0]];

@@ -1,4 +1,5 @@
-//! Numbers and scenes at the edge of what can be computed, or beyond it: a finite picture all the same.
+//! Numbers and scenes at the edge of what can be computed, or beyond it: a finite picture all the
+//! same.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|

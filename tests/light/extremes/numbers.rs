@@ -78,7 +78,8 @@ fn closed_box(albedo: f32) -> Scene {
 fn black_and_white_rooms_end() {
     let black = render_scene(&closed_box(0.0), &settings(Mode::Hybrid, 1000, 8));
     assert!(is_finite(&black) && mean(&black) == 0.0 && black.stats.non_finite == NonFinite::default());
-    // Nothing is absorbed: each bounce stores all of the power, and the bounce limit takes it in the end.
+    // Nothing is absorbed: each bounce stores all of the power, and the bounce limit takes it in
+    // the end.
     let power = 4.0 * std::f64::consts::PI;
     let limited = |albedo: f32, max_bounces: u32, max_paths: u64| {
         let settings = settings(Mode::Photons, 100_000, 8).with(|s| {

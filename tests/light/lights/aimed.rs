@@ -75,7 +75,8 @@ fn lit_balls() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// Flux of the caustic map in all, and by which side of the floor it lies on, left and right; W, each with its variance.
+/// Flux of the caustic map in all, and by which side of the floor it lies on, left and right; W,
+/// each with its variance.
 fn caustic_flux(scene: &Scene, emission: Emission) -> [(f64, f64); 3] {
     let settings = settings(Mode::DirectPhotons, 1, 1).with(|s| {
         s.photons.emission = emission;
@@ -86,7 +87,8 @@ fn caustic_flux(scene: &Scene, emission: Emission) -> [(f64, f64); 3] {
     let photons: Vec<Photon> = map.read(gpu()).expect("photons read back");
     let part = |wanted: &dyn Fn(f32) -> bool| {
         let part: Vec<_> = photons.iter().filter(|p| wanted(p.position[0])).collect();
-        // Each path leaves one photon at most, and few do: the variance is about the sum of squares.
+        // Each path leaves one photon at most, and few do: the variance is about the sum of
+        // squares.
         let squares: f64 = part.iter().map(|p| f64::from(p.flux[0]).powi(2)).sum();
         (flux(part, map.emitted), squares / (map.emitted as f64).powi(2))
     };

@@ -22,7 +22,8 @@ use support::*;
 
 use super::{direct_flux, floor, spot};
 
-/// Irradiance of the surface of albedo 1/2 that a camera sees at `target`, by direct light. The target must lie on no edge.
+/// Irradiance of the surface of albedo 1/2 that a camera sees at `target`, by direct light. The
+/// target must lie on no edge.
 fn irradiance_at(scene: &Scene, eye: Vec3, target: Vec3, light_samples: u32) -> f64 {
     let mut scene = scene.clone();
     scene.cameras = vec![camera(eye, target, 0.02)];
@@ -54,8 +55,8 @@ fn a_spot_has_the_falloff_of_the_specification() {
 
 #[test]
 fn photons_of_a_spot_carry_its_exact_flux() {
-    // In a ball, the light inside and all directions open to it; and above a floor that it lights from outside the
-    // scene's sphere, wider than its cone and narrower than its cone.
+    // In a ball, the light inside and all directions open to it; and above a floor that it lights
+    // from outside the scene's sphere, wider than its cone and narrower than its cone.
     let solid_angle = |inner: f64, outer: f64| 2.0 * PI * ((1.0 - inner.cos()) + (inner.cos() - outer.cos()) / 3.0);
     let inside = |inner: f32, outer: f32| {
         let mut ball = scene(&[diffuse(0.5)]);
@@ -115,8 +116,9 @@ fn a_uniform_sky_gives_pi_times_its_radiance() {
     assert!(!within(flux(2.04), right, 0.01), "control: photons of a sky 2 % stronger pass");
 }
 
-/// Irradiance by a polygon of radiance 1, seen counterclockwise from the point (Lambert 1760): half the sum over its edges of the
-/// angle under which an edge is seen, times the cosine of its plane's normal.
+/// Irradiance by a polygon of radiance 1, seen counterclockwise from the point (Lambert 1760): half
+/// the sum over its edges of the angle under which an edge is seen, times the cosine of its plane's
+/// normal.
 fn lambert(point: Vec3, normal: Vec3, corners: &[Vec3]) -> f64 {
     let to = |i: usize| (corners[i % corners.len()] - point).as_dvec3().normalize();
     let edge = |i: usize| to(i).angle_between(to(i + 1)) * to(i).cross(to(i + 1)).normalize().dot(normal.as_dvec3());
@@ -169,7 +171,8 @@ fn a_spherical_emitter_gives_what_its_solid_angle_says() {
         assert!(within(measured(0.8), right, 0.005), "at {x}: {} instead of {right}", measured(0.8));
         assert!(!within(measured(0.816), right, 0.005), "control: a bulb 2 % larger passes at {x}");
     }
-    // Its photons: π L times its area, half of it over the horizon of a large floor below and none lost in a ball.
+    // Its photons: π L times its area, half of it over the horizon of a large floor below and none
+    // lost in a ball.
     let flux = |radius| {
         let mut scene = bulb(radius);
         scene.spheres.push(sphere(Vec3::ZERO, 50.0, 0));

@@ -1,4 +1,5 @@
-//! Every kind of light: what is known in closed form, photons against rays, and emission aimed at what it is for.
+//! Every kind of light: what is known in closed form, photons against rays, and emission aimed at
+//! what it is for.
 
 mod aimed;
 mod closed_forms;

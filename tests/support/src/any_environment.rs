@@ -1,5 +1,5 @@
-//! What holds for any bytes given as an environment map: shared by the fuzz target `environment` and the replay of its
-//! corpus.
+//! What holds for any bytes given as an environment map: shared by the fuzz target `environment`
+//! and the replay of its corpus.
 
 use std::path::Path;
 

@@ -1,4 +1,5 @@
-//! What holds for any bytes given as a scene: shared by the fuzz target `scene` and the replay of its corpus.
+//! What holds for any bytes given as a scene: shared by the fuzz target `scene` and the replay of
+//! its corpus.
 
 use std::path::Path;
 

@@ -15,7 +15,8 @@ pub fn floats(numbers: &[f32]) -> Vec<u8> {
     numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// A triangle in the plane z = 0 that looks to +Z, seen by a camera and lit by a point light of 1 W/sr.
+/// A triangle in the plane z = 0 that looks to +Z, seen by a camera and lit by a point light of 1
+/// W/sr.
 pub fn triangle() -> Value {
     let positions = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
     let indices: Vec<u8> = [0_u16, 1, 2, 0].iter().flat_map(|i| i.to_le_bytes()).collect();

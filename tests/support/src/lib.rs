@@ -1,5 +1,5 @@
-//! Code that several test programs, benchmarks or fuzz targets share: scenes built in code, and the one device of a test
-//! program.
+//! Code that several test programs, benchmarks or fuzz targets share: scenes built in code, and the
+//! one device of a test program.
 
 pub mod any_environment;
 pub mod any_scene;

@@ -1,4 +1,5 @@
-//! Photons and points to search, by a fixed generator. Shared by the test and the benchmark of the search.
+//! Photons and points to search, by a fixed generator. Shared by the test and the benchmark of the
+//! search.
 
 use caustica::layout::{Photon, VisiblePoint, octahedral};
 use glam::Vec3;

@@ -1,5 +1,6 @@
-//! Places where the surface around a point is no whole flat disc, lit by one point light alone, so that the irradiance is
-//! I cos θ / d². Shared by the test of the estimate there and the benchmark that prints its errors.
+//! Places where the surface around a point is no whole flat disc, lit by one point light alone, so
+//! that the irradiance is I cos θ / d². Shared by the test of the estimate there and the benchmark
+//! that prints its errors.
 
 use caustica::{
     bvh::Bvh,
@@ -53,7 +54,8 @@ pub fn places(count: usize) -> Vec<Place> {
     ]
 }
 
-/// Irradiance estimates at the points by each way, over the same photons: one map a seed, mean over the seeds.
+/// Irradiance estimates at the points by each way, over the same photons: one map a seed, mean over
+/// the seeds.
 pub fn estimates(gpu: &Gpu, place: &Place, seeds: u32) -> [Vec<f64>; 4] {
     let mut sums = ways().map(|_| vec![0.0; place.points.len()]);
     for seed in 0..seeds {

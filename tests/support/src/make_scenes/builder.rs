@@ -74,7 +74,8 @@ impl Builder {
         }))
     }
 
-    /// Lambert reflectance, and light of its own: radiance `strength` times `color`, W/(m² sr), from the front side.
+    /// Lambert reflectance, and light of its own: radiance `strength` times `color`, W/(m² sr),
+    /// from the front side.
     pub fn emissive(&mut self, name: &str, reflectance: f64, color: [f64; 3], strength: f64) -> usize {
         let material = self.diffuse(name, [reflectance; 3]);
         self.uses("KHR_materials_emissive_strength");
@@ -124,7 +125,8 @@ impl Builder {
         self.light_node(light, json!({ "name": name, "translation": decimals(position) }));
     }
 
-    /// A spot light at a place, aimed at another: W/sr times `color` along its axis, half angles of its cones in degrees.
+    /// A spot light at a place, aimed at another: W/sr times `color` along its axis, half angles of
+    /// its cones in degrees.
     pub fn spot(&mut self, name: &str, [from, to]: [Vec3; 2], intensity: f64, color: [f64; 3], cones: [f32; 2]) {
         let [inner, outer] = cones.map(|degrees| decimal(degrees.to_radians()));
         let spot = json!({ "innerConeAngle": inner, "outerConeAngle": outer });
@@ -133,7 +135,8 @@ impl Builder {
         self.light_node(light, node);
     }
 
-    /// Light from infinitely far away along a direction: W/m² times `color` where it falls straight.
+    /// Light from infinitely far away along a direction: W/m² times `color` where it falls
+    /// straight.
     pub fn sun(&mut self, name: &str, direction: Vec3, irradiance: f64, color: [f64; 3]) {
         let light = json!({ "type": "directional", "color": color, "intensity": irradiance });
         self.light_node(light, json!({ "name": name, "rotation": aim(direction) }));
@@ -207,7 +210,8 @@ impl Builder {
         self.nodes.push(node);
     }
 
-    /// The file's text and its bytes: in a file of their own if that has a name, else in a data URI.
+    /// The file's text and its bytes: in a file of their own if that has a name, else in a data
+    /// URI.
     pub fn finish(mut self, bin: Option<&str>) -> (Vec<u8>, Vec<u8>) {
         if self.camera.is_none() {
             self.camera(Vec3::new(0.0, 1.0, 4.5), 0.0, 31.5, 1.0);

@@ -1,4 +1,5 @@
-//! Balls and a block in the open, and the sky above them as a picture of its own: what `--env` is for.
+//! Balls and a block in the open, and the sky above them as a picture of its own: what `--env` is
+//! for.
 
 use glam::Vec3;
 use image::{Rgb, codecs::hdr::HdrEncoder};
