@@ -209,9 +209,10 @@ fn circles_are_found() {
 
 /// The files and folders of a folder from the lowest to the highest: each uses those before it
 /// only. Its `mod.rs` may use all.
-const ORDERS: [(&str, &[&str]); 4] = [
+const ORDERS: [(&str, &[&str]); 5] = [
     ("renderer", &["size", "tally", "maps", "tiles", "gatherer", "session", "render"]),
     ("passes", &["maps", "wavefront", "photons", "estimate", "camera"]),
+    ("passes/estimate", &["query_order", "gather_kernels", "gather", "share_estimates"]),
     (
         "study",
         &[

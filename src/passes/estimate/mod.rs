@@ -2,6 +2,8 @@
 //! points share.
 
 pub mod gather;
+mod gather_kernels;
+mod query_order;
 pub mod share_estimates;
 
 pub use gather::{Gather, GatherOptions, GatherSettings};
