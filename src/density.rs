@@ -35,6 +35,7 @@ pub const MAX_MOMENTS: usize = 5;
 /// A kernel with its parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Density {
+    /// Shape of the kernel.
     pub kernel: DensityKernel,
     /// C of the cone, ≥ 1; unused by the other kernels.
     pub cone_constant: f32,
@@ -47,6 +48,7 @@ pub struct Polynomial {
     pub power: u32,
     /// Number of coefficients in use, 1 to [`MAX_MOMENTS`].
     pub moments: u32,
+    /// Coefficients of the polynomial, from the constant term on.
     pub coefficients: [f64; MAX_MOMENTS],
 }
 

@@ -30,7 +30,9 @@ impl MapKind {
 /// A value for each kind of map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ByKind<T> {
+    /// Of the global map.
     pub global: T,
+    /// Of the caustic map.
     pub caustic: T,
 }
 

@@ -6,11 +6,15 @@ use crate::error::{Error, Result};
 /// One adapter of this machine and whether it can be used.
 #[derive(Debug)]
 pub struct AdapterReport {
+    /// Name of the adapter.
     pub name: String,
+    /// Driver and its version.
     pub driver: String,
+    /// Graphics interface, as `Vulkan`.
     pub backend: String,
     /// `discrete`, `integrated`, `virtual`, `software` or `other`.
     pub kind: &'static str,
+    #[doc(hidden)]
     pub limits: wgpu::Limits,
     /// Invocations of the smallest and of the largest subgroup; 0 and 0 without subgroup
     /// operations.

@@ -40,13 +40,17 @@ use timer::Timer;
 /// An open device.
 #[derive(Debug)]
 pub struct Gpu {
+    #[doc(hidden)]
     pub device: wgpu::Device,
+    #[doc(hidden)]
     pub queue: wgpu::Queue,
+    #[doc(hidden)]
     pub limits: wgpu::Limits,
     /// Name of the adapter.
     pub name: String,
     /// Driver and its version.
     pub driver: String,
+    /// Device memory that buffers and tables take, bytes.
     pub memory: Arc<MemoryCount>,
     faults: Faults,
     pace: Pace,

@@ -3,8 +3,11 @@
 /// What a kernel may do with a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BindingKind {
+    /// A uniform buffer.
     Uniform,
+    /// A storage buffer that the kernel reads.
     ReadOnly,
+    /// A storage buffer that the kernel writes.
     ReadWrite,
     /// A texture that is read texel by texel.
     Table,
@@ -13,10 +16,13 @@ pub enum BindingKind {
 /// One buffer or table that a kernel uses.
 #[derive(Clone, Copy, Debug)]
 pub struct Binding {
+    /// Bind group.
     pub group: u32,
+    /// Number within the group.
     pub index: u32,
     /// Name of the variable in the shader.
     pub name: &'static str,
+    /// What the kernel may do with it.
     pub kind: BindingKind,
 }
 
@@ -29,6 +35,7 @@ pub struct Shader {
     pub wgsl: &'static str,
     /// Names of its `override` constants.
     pub overrides: &'static [&'static str],
+    /// What it binds.
     pub bindings: &'static [Binding],
     /// Invocations of a workgroup.
     pub workgroup_size: u32,

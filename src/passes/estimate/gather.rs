@@ -25,8 +25,8 @@ const BLOCK: u64 = layout::PACKET_BLOCK as u64;
 const PACKET: u32 = layout::QUERY_BLOCK / layout::PACKET_BLOCK;
 // The shaders hold them in the components of vectors.
 const _: () = assert!(PACKET == 4);
-/// Stride over the blocks of packets in each dispatch of the search: pilots are searched first, and the
-/// other blocks start from their radii.
+/// Stride over the blocks of packets in each dispatch of the search: pilots are searched first, and
+/// the other blocks start from their radii.
 const STRIDES: [u32; 3] = [layout::FIRST_PILOT_STRIDE, layout::PILOT_STRIDE, 1];
 
 /// Rays that measure the existing area of a partly covered disc.
@@ -111,12 +111,13 @@ impl<'s> Gather<'s> {
         self.kernels.compile(gpu, settings.variant(1));
     }
 
-    /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to the first of `results`
-    /// (`array<vec4f>`), and writes the radius and number of photons of each to the second
-    /// (`array<Gathered>`).
+    /// Adds the radiance of the first `count` points (`array<VisiblePoint>`) to the first of
+    /// `results` (`array<vec4f>`), and writes the radius and number of photons of each to the
+    /// second (`array<Gathered>`).
     ///
     /// # Errors
-    /// [`crate::Error::Stopped`] when `progress` says so, [`crate::Error::Gpu`] if the driver fails.
+    /// [`crate::Error::Stopped`] when `progress` says so, [`crate::Error::Gpu`] if the driver
+    /// fails.
     #[allow(clippy::too_many_arguments)]
     pub fn run(
         &mut self,
@@ -131,8 +132,8 @@ impl<'s> Gather<'s> {
         self.run_waiting(gpu, map, points, (count, u32::MAX), settings, results, progress)
     }
 
-    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of the map of
-    /// that number; see [`crate::layout::VisiblePoint::next_map`].
+    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of the
+    /// map of that number; see [`crate::layout::VisiblePoint::next_map`].
     ///
     /// # Errors
     /// As [`Self::run`].

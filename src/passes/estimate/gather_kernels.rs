@@ -8,8 +8,8 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Maximum of the nodes and primitives that one survey ray visits. Together the rays stay within the
-/// loop iterations of software Vulkan.
+/// Maximum of the nodes and primitives that one survey ray visits. Together the rays stay within
+/// the loop iterations of software Vulkan.
 const SURVEY_TRACE_BUDGET: u32 = 230;
 // Software Vulkan ends all loops of a subgroup after 65,535 iterations in total.
 const _: () = assert!(layout::MOST_RAYS * (SURVEY_TRACE_BUDGET + 1) < 65_535);
@@ -22,8 +22,8 @@ pub struct GatherOptions {
     pub side_test: bool,
     /// Loop iterations after which a query continues in the next dispatch.
     pub step_budget: u32,
-    /// Computes [`Gathered::fingerprint`](layout::Gathered::fingerprint): the wrapping sum of a hash
-    /// of the positions of the summed photons in the sorted map.
+    /// Computes [`Gathered::fingerprint`](layout::Gathered::fingerprint): the wrapping sum of a
+    /// hash of the positions of the summed photons in the sorted map.
     pub fingerprint: bool,
     /// Leaves out photons that do not lie on the point's surface, as far as it is flat and no wall
     /// stands on it.
