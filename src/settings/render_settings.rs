@@ -60,3 +60,17 @@ pub(crate) fn check_samples(photons: &PhotonSettings, picture: &PictureSettings)
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Settings;
+
+    #[test]
+    fn settings_that_a_file_leaves_out_are_the_defaults() {
+        let read = |json: &str| serde_json::from_str::<Settings>(json).expect("it is well formed");
+        assert_eq!(read("{}"), Settings::default());
+        let changed = read(r#"{"estimate": {"share_reach": 0.0}}"#);
+        assert_eq!(changed, Settings::default().with(|s| s.estimate.share_reach = 0.0));
+        assert_ne!(changed, Settings::default(), "control");
+    }
+}

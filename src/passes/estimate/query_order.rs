@@ -16,7 +16,7 @@ const POINT_KEY_BITS: u32 = 3 * layout::KEY_BITS;
 /// Maximum number of points, and how many of the highest bits of their keys are sorted by. Few
 /// points make few blocks of packets to distribute, and their pixel order already keeps near points
 /// together. More points are sorted by all bits.
-const FEW_SORTED_BITS: [(u32, u32); 2] = [(4096, 8), (16_384, 16)];
+const SORT_BITS_BY_COUNT: [(u32, u32); 2] = [(4096, 8), (16_384, 16)];
 
 /// The compiled kernels.
 #[derive(Debug)]
@@ -58,7 +58,8 @@ impl QueryOrder {
         self.key.dispatch(&mut encoder, &self.key.bind(gpu, &buffers), info.count.into());
         gpu.submit(encoder);
         let waiting = gpu.read::<u32>(&marks[0], info.count.into(), 1)?[0];
-        let bits = FEW_SORTED_BITS.iter().find(|(most, _)| waiting <= *most).map_or(POINT_KEY_BITS, |(_, bits)| *bits);
+        let bits =
+            SORT_BITS_BY_COUNT.iter().find(|(most, _)| waiting <= *most).map_or(POINT_KEY_BITS, |(_, bits)| *bits);
         let sorted = self.radix.sort(gpu, entries.each_ref(), waiting, POINT_KEY_BITS - bits..POINT_KEY_BITS)?;
         Ok((&entries[sorted], waiting))
     }
