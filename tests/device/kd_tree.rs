@@ -76,7 +76,7 @@ fn the_tree_equals_brute_force_at_awkward_sizes() {
 #[test]
 fn it_does_in_dense_caustics_and_on_one_spot() {
     let mut random = Random(2);
-    // More photons than one task of the parallel build takes.
+    // More photons than the build balances without further tasks.
     let dense = caustic_box(&mut random, 25_000, 0.8, 1e-3);
     check(&mut random, &positions(&dense));
     let spot = positions(&coincident(&mut random, 6000, 1000));
