@@ -92,7 +92,7 @@ fn black_and_white_rooms_end() {
     assert!(within(white.lost, power, 1e-3), "{} W were lost", white.lost);
     let grey = limited(0.9, 30, 1000);
     assert!(!within(flux(&grey.maps.global), 30.0 * power, 0.3) && grey.lost < 0.2 * power, "control");
-    // Without a limit the maximum of the setting ends them.
+    // Without a limit `MAX_BOUNCES` ends them.
     let endless = limited(1.0, 0, 2);
     assert_eq!((endless.maps.global.stored, endless.non_finite), (2 * 4095, 0));
 }
