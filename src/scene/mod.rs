@@ -2,6 +2,7 @@
 //! Coordinates are metres, right-handed, +Y up, relative to [`Scene::center`].
 
 mod camera;
+mod contents;
 mod describe;
 mod environment;
 mod gltf;
@@ -14,6 +15,7 @@ mod shape;
 mod words;
 
 pub use camera::{Camera, Projection};
+pub use contents::Scene;
 pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};
 pub use environment::Environment;
 pub use light::{LUMENS_PER_WATT, Light, LightKind, MIN_FALLOFF};

@@ -37,8 +37,7 @@ pub struct Browser {
 }
 
 impl Browser {
-    /// Starts it with a window of that many pixels. `None`: `CAUSTICA_NO_BROWSER=1` says to do
-    /// without.
+    /// Starts it with a window of this size, pixels. `None` with `CAUSTICA_NO_BROWSER=1`.
     pub fn open(width: u32, height: u32) -> Option<Self> {
         if env::var("CAUSTICA_NO_BROWSER").is_ok_and(|v| v == "1") {
             return None;
@@ -77,7 +76,7 @@ impl Browser {
         self.process = session["capabilities"]["goog:processID"].to_string();
     }
 
-    /// Shows a file; what was logged before is forgotten.
+    /// Clears the logs and opens a file.
     pub fn show(&self, file: &Path) {
         let path = file.canonicalize().expect("the page is there");
         self.command("POST", "/url", &json!({"url": "about:blank"}));
@@ -86,7 +85,7 @@ impl Browser {
         self.command("POST", "/url", &json!({"url": format!("file://{}", path.display())}));
     }
 
-    /// Runs JavaScript; what it returns.
+    /// Runs JavaScript and returns its result.
     pub fn run(&self, script: &str) -> Value {
         self.command("POST", "/execute/sync", &json!({"script": script, "args": []}))
     }
@@ -116,8 +115,7 @@ impl Browser {
         serious.map(|e| e["message"].to_string()).collect()
     }
 
-    /// Addresses asked for since the last call that are neither files nor in the page or the
-    /// browser itself.
+    /// URLs requested since the last call, without files, data URIs and the browser's own.
     pub fn outside_requests(&self) -> Vec<String> {
         let entries = self.command("POST", "/se/log", &json!({"type": "performance"}));
         let address = |entry: &Value| {
@@ -140,7 +138,7 @@ impl Browser {
         self.call(method, &format!("/session/{}{path}", self.session), body)
     }
 
-    /// One request to chromedriver; the `value` of its answer.
+    /// Sends one request to chromedriver. Returns the `value` of the response.
     fn call(&self, method: &str, path: &str, body: &Value) -> Value {
         let mut reader = BufReader::new(self.send(method, path, body).expect("chromedriver listens"));
         let mut length = 0;
@@ -162,7 +160,7 @@ impl Browser {
         value
     }
 
-    /// Sends a request; where its answer will come.
+    /// Sends a request. Returns the connection of the response.
     fn send(&self, method: &str, path: &str, body: &Value) -> io::Result<TcpStream> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
         stream.set_read_timeout(Some(Duration::from_secs(120)))?;
@@ -175,7 +173,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // Also after a failed test; a browser that does not end by itself is ended.
+        // Runs after a failed test too. A browser that does not quit is killed.
         let ended = self.send("DELETE", &format!("/session/{}", self.session), &Value::Null).and_then(|mut answer| {
             answer.set_read_timeout(Some(Duration::from_secs(10)))?;
             answer.read(&mut [0; 1])

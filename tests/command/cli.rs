@@ -1,4 +1,4 @@
-//! The command line: messages, exit codes and what is left in the folder.
+//! The command line: messages, exit codes and files.
 
 use std::{fs, path::Path, process::Command};
 
@@ -23,7 +23,7 @@ const TRIANGLE: &str = "AACAvwAAAAAAAIC/AAAAAAAAAAAAAIA/AACAPwAAAAAAAIC/";
 /// The same with NaN for the first coordinate.
 const NAN_TRIANGLE: &str = "AADAfwAAAAAAAIC/AAAAAAAAAAAAAIA/AACAPwAAAAAAAIC/";
 
-/// A folder with `scene.gltf` and a few files that are no scenes.
+/// A folder with `scene.gltf` and a few files that are not scenes.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let write = |name: &str, text: String| fs::write(folder.path().join(name), text).expect("can be written");
@@ -37,7 +37,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// `caustica` with these words, in the folder.
+/// Command `caustica` with these arguments, in the folder.
 fn command(folder: &Path, line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_caustica"));
     command.current_dir(folder).args(line.split_whitespace()).env_remove("CAUSTICA_DEVICE");
@@ -70,7 +70,7 @@ fn caustica(folder: &Path, line: &str) -> Ended {
     run(&mut command(folder, line))
 }
 
-/// A small render of the scene, with further words.
+/// Runs a small render of the scene, with further arguments.
 fn render(folder: &Path, words: &str) -> Ended {
     caustica(folder, &format!("render scene.gltf --size 16x16 --spp 2 --photons 1k -k 10 {words}"))
 }
@@ -174,7 +174,7 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
     let folder = folder();
     fs::create_dir(folder.path().join("folder.exr")).expect("can be made");
     fs::create_dir(folder.path().join("sky")).expect("can be made");
-    // Files are known by their content.
+    // A file's format is known by its content.
     for name in ["grid.exr", "study.csv"] {
         let sky = b"#?RADIANCE\n\n-Y 1 +X 1\n\x80\x80\x80\x81";
         fs::write(folder.path().join("sky").join(name), sky).expect("can be written");

@@ -31,14 +31,14 @@ use support::gpu;
 
 const SCENE: &str = "scenes/mirror-and-glass.gltf";
 
-/// `caustica` with these words.
+/// Command `caustica` with these arguments.
 fn command(line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_caustica"));
     command.args(line.split_whitespace());
     command
 }
 
-/// A small comparison into the folder, with further words.
+/// Runs a small comparison into the folder, with further arguments.
 fn compare_into(folder: &Path, words: &str) -> Output {
     let line = format!("compare {SCENE} --size 32x24 --spp 2 --photons 3k {words} -o");
     command(&line).arg(folder).output().expect("it starts")

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 const ARROW_RIGHT: &str = "\u{e014}";
 
-/// Compares a small picture; exits as `code`.
+/// Compares a small picture. The exit code must be `code`.
 fn compare(folder: &Path, words: &str, code: i32) {
     let status = Command::new(env!("CARGO_BIN_EXE_caustica"))
         .args(["compare", "scenes/mirror-and-glass.gltf", "-q", "--size", "48x32", "--photons", "2k", "-k", "20", "-o"])
@@ -18,7 +18,7 @@ fn compare(folder: &Path, words: &str, code: i32) {
     assert_eq!(status.code(), Some(code));
 }
 
-/// How much of the second picture is cut off, and where the line between both stands.
+/// Clipping of the second picture, and position of the divider.
 fn cut(browser: &Browser) -> (Value, Value) {
     let style = |what: &str| browser.run(&format!("return {what}"));
     (
@@ -56,7 +56,7 @@ fn the_page_fits_a_phone_and_says_what_is_wrong() {
     compare(folder.path(), "--sabotage 3", 1);
     let Some(browser) = Browser::open(500, 900) else { return };
     browser.show(&folder.path().join("report.html"));
-    // A window is at least 500 wide: the page in a frame of a phone's width.
+    // A browser window is at least 500 pixels wide, so the page is in a frame of a phone's width.
     let overflow = "const f = document.createElement('iframe'); f.style.width = '360px'; f.srcdoc = \
                     document.documentElement.outerHTML; document.body.append(f); return new Promise(done => { f.onload = \
                     () => done(f.contentDocument.documentElement.scrollWidth - f.contentWindow.innerWidth) })";

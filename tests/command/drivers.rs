@@ -26,11 +26,11 @@ const BLOCK: usize = 8;
 const MOST_PHOTONS: f64 = 0.001;
 const MOST_MEAN: f64 = 0.002;
 
-/// Where distributions put what says that SwiftShader is there: Debian, Fedora.
+/// Paths of SwiftShader's ICD manifest in distributions: Debian, Fedora.
 const DRIVERS: [&str; 2] =
     ["/usr/lib/chromium/vk_swiftshader_icd.json", "/usr/lib64/chromium-browser/vk_swiftshader_icd.json"];
 
-/// SwiftShader's file; `None` where `CAUSTICA_NO_BROWSER=1` says that Chromium is not wanted.
+/// SwiftShader's ICD manifest; `None` with `CAUSTICA_NO_BROWSER=1`.
 fn swiftshader() -> Option<PathBuf> {
     if env::var("CAUSTICA_NO_BROWSER").is_ok_and(|value| value == "1") {
         return None;
@@ -39,7 +39,7 @@ fn swiftshader() -> Option<PathBuf> {
     Some(found.unwrap_or_else(|| panic!("no SwiftShader in {DRIVERS:?}: run scripts/install-chromium")))
 }
 
-/// Runs `caustica` on a driver, or the default one.
+/// Runs `caustica` on a driver; `None` is the default one.
 fn run(driver: Option<&Path>, line: &str, folder: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_caustica"));
     if let Some(driver) = driver {
@@ -49,7 +49,7 @@ fn run(driver: Option<&Path>, line: &str, folder: &Path) -> Output {
     command.output().expect("it starts")
 }
 
-/// What a render leaves.
+/// Results of a render.
 struct Rendered {
     stats: Stats,
     blocks: Vec<[f32; 3]>,
@@ -103,7 +103,7 @@ fn same_mean(a: &Rendered, b: &Rendered) -> bool {
     is_close(a.mean(), b.mean(), MOST_MEAN)
 }
 
-/// A scene on the default driver, with another seed too, and on SwiftShader.
+/// Renders of a scene: on the default driver with two seeds, and on SwiftShader.
 struct Renders {
     name: &'static str,
     here: Rendered,

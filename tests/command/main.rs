@@ -1,4 +1,4 @@
-//! The command: its words, messages and exit codes, and the pages that it writes, in a browser.
+//! The command: arguments, messages and exit codes, and its pages in a browser.
 
 mod browser;
 mod cli;

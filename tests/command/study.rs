@@ -1,4 +1,4 @@
-//! Studies: what is measured, what is kept, what is written.
+//! Studies: measurements, stored cells, output files.
 
 use std::{fs, path::Path};
 
@@ -45,7 +45,7 @@ fn run(plan: &Plan, folder: &Path) -> Results {
     study::run(gpu(), plan, folder, &Silent).expect("the study runs")
 }
 
-/// Rendered now and kept from before.
+/// Numbers of cells rendered now and reused.
 fn counts(results: &Results) -> (usize, usize) {
     (results.rendered, results.kept)
 }
@@ -71,7 +71,7 @@ fn a_study_measures_every_combination_and_writes_all_files() {
         let radii = row.global.radius.expect("photons lie near");
         assert!(0.0 < radii.min && radii.min <= radii.median && radii.median <= radii.max, "{radii:?}");
         assert!(row.caustic.radius.is_some() && row.caustic.stored > 0);
-        // A full map ends at a whole path.
+        // A full map ends at a path's end.
         let full = row.global.stored as f64 / f64::from(row.photons);
         assert!(full > 0.9 && full <= 1.0, "{full}");
         assert!(row.noise > Some(0.0) && row.rel_mse > Some(0.0) && row.flip > Some(0.0) && row.error.is_none());
@@ -193,7 +193,7 @@ fn one_cell_that_fails_does_not_lose_the_others() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path();
     assert!(run(&small(), path).failures.is_empty());
-    // A folder in the place of a picture cannot be replaced.
+    // A folder with a picture's name cannot be replaced.
     let picture = &cells(path, "exr")[0];
     fs::remove_file(picture).expect("can be removed");
     fs::create_dir(picture).expect("can be made");

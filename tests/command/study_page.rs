@@ -8,7 +8,7 @@ use std::{
 
 use super::browser::Browser;
 
-/// `caustica study` on the scenes of this project, with these words.
+/// Command `caustica study` on the scenes of this project, with these arguments.
 fn command(folder: &Path, words: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_caustica"));
     command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("study").args(words.split_whitespace()).arg("-o").arg(folder);
@@ -88,7 +88,7 @@ fn the_preset_answers_every_claim_and_its_page_sorts() {
     assert_eq!((figures.len(), questions.len()), (8, 10), "{questions:?}");
     let light = claims.iter().find(|c| c["question"] == "three-lights").expect("asked");
     assert!(light["measured"].as_str().is_some_and(|m| m.contains("times the light in")), "{light}");
-    // On so few pixels bias may be hidden by noise; everything else can be told.
+    // With so few pixels noise may hide the bias. Every other claim can be decided.
     let unknown = claims.iter().filter(|c| c["verdict"] == "unknown" && c["question"] != "noise-for-bias");
     assert_eq!(unknown.count(), 0, "{claims:?}");
 
@@ -139,7 +139,7 @@ fn ctrl_c_keeps_finished_cells_and_leaves_no_half_file() {
         time::{Duration, Instant},
     };
     let folder = tempfile::tempdir().expect("a folder");
-    // The first cells take an instant, the last an hour.
+    // The first cells take milliseconds, the last an hour.
     let words = "scenes/one-light.gltf --size 24x24 --spp 200000 --photons 1k -k 1 --modes direct-rays,photons";
     let line = words.replace("--spp 200000", "--spp 1");
     assert_eq!(study(folder.path(), &format!("{line} -q")).status.code(), Some(0));

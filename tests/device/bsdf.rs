@@ -1,4 +1,4 @@
-//! The lobes of the BSDF: sampling, density, value and albedo belong together.
+//! The lobes of the BSDF: sampling, density, value and albedo are consistent.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -37,7 +37,7 @@ fn values(ns: Vec3) -> Vec<[f32; 4]> {
 
 const STEPS: usize = 12;
 
-/// Integral over all directions of what is known at these midpoints.
+/// Integral over all directions of values at these midpoints.
 fn integral(values: impl Iterator<Item = f64>) -> f64 {
     values.sum::<f64>() * 4.0 * PI / (GRID.rows * GRID.columns * STEPS * STEPS) as f64
 }
@@ -78,11 +78,11 @@ fn light_and_flux_are_reciprocal() {
         let midpoints = GRID.midpoints(STEPS);
         let mismatches = |of_flux: &[[f32; 4]]| {
             let all = values(ns).into_iter().zip(of_flux).zip(&midpoints);
-            // Value over cosine does not depend on the direction: it is the same from either side.
+            // The BRDF does not depend on the directions, so that it is symmetric.
             let wrong = |((v, flux), d): &(([f32; 4], &[f32; 4]), &glam::DVec3)| {
                 let (cos_s, cos_g) = (d.dot(ns.as_dvec3()), d.y);
                 let sided = if cos_s > 0.0 && cos_g > 0.0 { cos_s } else { 0.0 };
-                // Where light grazes the geometric surface the weight is bounded.
+                // The weight is clamped at grazing incidence on the geometric surface.
                 let bounded = cos_g < 0.2;
                 let (value, weight) = (f64::from(v[0]), f64::from(flux[2]));
                 (value - sided).abs() > 1e-5 || !bounded && (weight * cos_g - value).abs() > 1e-5
@@ -130,12 +130,12 @@ fn albedo_is_the_integral_of_the_brdf() {
     }
     assert_eq!(of(2, 0.0)[..3], [0.6, 0.7, 0.8], "the mirror's tint");
     assert_eq!(of(3, 0.0)[..3], [0.9, 0.8, 0.7], "the tint of glass");
-    // With another normal nothing is added.
+    // A leaning shading normal adds no light.
     let leaning = integral(values(LEANING).iter().map(|v| f64::from(v[0])));
     assert!(leaning < PI && leaning > 0.9 * PI, "{leaning}");
 }
 
-/// Numbers of lobes, as `bsdf.wesl` has them.
+/// Lobe numbers of `bsdf.wesl`.
 const REFLECTION: f32 = 1.0;
 const TRANSMISSION: f32 = 2.0;
 
@@ -147,7 +147,7 @@ fn specular_lobes_are_drawn_by_fresnel_and_snell() {
         let drawn = |material: f32| run("probe_bsdf", &rows(SAMPLES, incoming.extend(material).to_array()));
         let reflections = |drawn: &[[f32; 4]]| drawn.iter().filter(|d| d[3] == REFLECTION).count() as f64;
         let fresnel = closed_form(cosine.into(), 1.5);
-        // Distance of a share from a probability, in standard deviations.
+        // Distance of the fraction of reflections from a probability, in standard deviations.
         let z = |drawn: &[[f32; 4]], probability: f64| {
             let count = drawn.len() as f64;
             (reflections(drawn) - count * probability).abs() / (count * probability * (1.0 - probability)).sqrt()

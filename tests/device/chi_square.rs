@@ -4,20 +4,20 @@ use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec3, dvec3};
 
-/// Samples of a test, unless it needs more.
+/// Default number of samples of a test.
 pub const SAMPLES: usize = 100_000;
 /// Cells along each side of the unit square.
 const SIDE: usize = 16;
-/// Least expected count of a cell; sparser ones are counted together.
+/// Minimum expected count of a cell; sparser cells are pooled.
 const LEAST: f64 = 10.0;
 
-/// What a test finds: chi-square as a standard normal deviate (Wilson and Hilferty 1931).
+/// Result of a test: chi-square as a standard normal deviate (Wilson and Hilferty 1931).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviate(f64);
 
 impl Deviate {
-    /// Significance 1e-4 on either side: neither too far from the density nor too close for
-    /// independent samples.
+    /// Accepts at a significance of 1e-4 on either side: neither too far from the density nor too
+    /// close for independent samples.
     pub fn fits(self) -> bool {
         self.0.abs() < 3.72
     }
@@ -39,7 +39,7 @@ pub fn deviate(counts: &[f64], probabilities: &[f64]) -> Deviate {
             false => add(*count, expected),
         }
     }
-    // What should be all but empty must be.
+    // Cells of nearly zero probability must be nearly empty.
     if sparse.1 > LEAST || sparse.0 > LEAST {
         add(sparse.0, f64::max(sparse.1, 1e-3));
     }
@@ -48,7 +48,7 @@ pub fn deviate(counts: &[f64], probabilities: &[f64]) -> Deviate {
     Deviate(((sum / freedom).cbrt() - (1.0 - spread)) / spread.sqrt())
 }
 
-/// Points that should be uniform in the unit square.
+/// Tests points for a uniform distribution in the unit square.
 pub fn of_unit_square(points: impl IntoIterator<Item = [f64; 2]>) -> Deviate {
     let mut counts = vec![0.0; SIDE * SIDE];
     for point in points {

@@ -1,4 +1,4 @@
-//! Same scene, settings, seed and adapter: the same bits.
+//! Determinism: the same scene, settings, seed and adapter give the same bits.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -62,12 +62,12 @@ fn read(path: &Path) -> Vec<u8> {
     fs::read(path).expect("the program wrote a file")
 }
 
-/// Directions of `count` paths from path `first` on, as the kernel draws them.
+/// Directions of `count` paths from path `first` on, as drawn by the kernel.
 fn emitted_directions(first: u64, count: u32, sampler: Sampler, turns: u32) -> Vec<Vec3> {
     emitted_directions_of(LightKind::Point, first, count, sampler, turns)
 }
 
-/// The same of another kind of light.
+/// As [`emitted_directions`], for another kind of light.
 fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampler, turns: u32) -> Vec<Vec3> {
     let gpu = gpu();
     let mut scene = scene(&[diffuse(0.5)]);
@@ -101,7 +101,7 @@ fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampl
     paths.iter().map(|p| Vec3::from(p.direction)).collect()
 }
 
-/// The report's way: points uniform in a cube, kept if inside the unit sphere, projected on it.
+/// Rejection sampling: uniform points in a cube that lie inside the unit sphere, projected onto it.
 fn rejection_directions(count: usize) -> Vec<Vec3> {
     let mut state = 12345_u64;
     let mut uniform = || {
@@ -121,8 +121,8 @@ fn rejection_directions(count: usize) -> Vec<Vec3> {
     found
 }
 
-/// Chi-square of two samples of the same size over 8 x 16 cells of equal area, and of azimuth 16
-/// cells.
+/// Chi-square of two samples of the same size over 128 cells of equal area: 8 of height times 16 of
+/// azimuth.
 fn chi_square(a: &[Vec3], b: &[Vec3]) -> f64 {
     let cells = |sample: &[Vec3]| {
         let mut counts = vec![0.0_f64; 128];
@@ -153,7 +153,7 @@ fn random_numbers_go_on_after_four_billion_paths() {
     const HALF: u32 = 200;
     for (sampler, turns) in [(Sampler::Sobol, 1), (Sampler::Random, 1), (Sampler::Sobol, 3)] {
         let from = |first, count| emitted_directions(first, count, sampler, turns);
-        // Where the low word of the round overflows.
+        // The path at which the low word of the round overflows.
         let border = u64::from(turns) << 32;
         let across = from(border - u64::from(HALF), 2 * HALF);
         let (before, after) = across.split_at(HALF as usize);

@@ -1,9 +1,10 @@
-//! Where one direction can be drawn in several ways, each way knows the density of the others.
+//! Multiple importance sampling: where several techniques can draw a direction, each evaluates the
+//! density of the others.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
-//! | emission | photon paths follow the balance of overlapping targets | a target smaller |
-//! | emitters | directions follow the density that `arriving_at` tells | lamps chosen alike |
+//! | emission | photon paths follow the balance heuristic over overlapping targets | a smaller target |
+//! | emitters | directions follow the density that `arriving_at` returns | lamps chosen uniformly |
 //! | weights | of a direction to a lamp and one by the cosine sum to one | another table of choices |
 
 use std::f64::consts::PI;
@@ -58,7 +59,7 @@ fn aimed_emission_follows_the_balance_of_its_targets() {
     assert!(wrong < SAMPLES / 1000, "{wrong} paths have another flux than their density says");
 }
 
-/// Lamps and a sky around the origin, none before another one.
+/// Lamps and a sky around the origin. No lamp hides another.
 fn lamps() -> Scene {
     let mut scene = scene(&[]);
     scene.materials.extend([emissive("panel", 0.0, 3.0, true), emissive("bulb", 0.0, 5.0, false)]);
@@ -68,7 +69,8 @@ fn lamps() -> Scene {
     scene
 }
 
-/// Directions to the lamps, with the densities as drawn, negative where hidden, and as met.
+/// Directions to the lamps with two densities: as sampled (negative where hidden), and as evaluated
+/// for a ray that hits the lamp.
 fn drawn_and_met(samples: &[Row], sampling: LightSampling) -> Vec<([f32; 4], f32)> {
     let buffers = upload(&lamps(), sampling);
     let choices = if sampling == LightSampling::Power { &buffers.lights.direct } else { &buffers.lights.photons };
@@ -78,7 +80,7 @@ fn drawn_and_met(samples: &[Row], sampling: LightSampling) -> Vec<([f32; 4], f32
     drawn.into_iter().zip(met).map(|(drawn, met)| (drawn, met[0])).collect()
 }
 
-/// Two triangles, a sphere and the sky.
+/// Number of emitters: two triangles, a sphere and the sky.
 const LAMPS: f32 = 4.0;
 
 fn lamp_samples() -> Vec<Row> {
@@ -97,7 +99,7 @@ fn emitters_are_sampled_with_the_density_that_is_told() {
     let points = grid.midpoints(32).into_iter().map(|d| [d.as_vec3().extend(0.0).to_array(), [0.0, LAMPS, 0.0, 0.0]]);
     let densities = probe("probe_emitter_pdf", &lamps(), &points.collect::<Vec<_>>());
     let mut probabilities = grid.probabilities(&densities.iter().map(|d| f64::from(d[0])).collect::<Vec<_>>());
-    // What is drawn from the sky behind a lamp is hidden.
+    // Samples of the sky behind a lamp are hidden.
     let seen: f64 = probabilities.iter().sum();
     probabilities.iter_mut().for_each(|p| *p /= seen);
     let drawn = visible(LightSampling::Power);
@@ -113,8 +115,8 @@ fn emitters_are_sampled_with_the_density_that_is_told() {
     assert!(!other.fits(), "control: lamps chosen alike: {other:?}");
 }
 
-/// Weights of the power heuristic for a direction drawn with density `p` by one way and `q` by the
-/// other (Veach 1997, 9.2.2).
+/// Weight of the power heuristic for a direction drawn with density `p` by one technique and `q` by
+/// the other (Veach 1997, 9.2.2).
 fn weight(p: f64, q: f64) -> f64 {
     1.0 / (1.0 + (q / p).powi(2))
 }
@@ -124,8 +126,8 @@ fn weights_of_both_ways_to_an_emitter_sum_to_one() {
     let samples = lamp_samples();
     let pairs = drawn_and_met(&samples, LightSampling::Power);
     let other = drawn_and_met(&samples, LightSampling::Uniform);
-    // Densities of the same direction: as drawn, as met after the cosine had drawn it, and the
-    // cosine's own.
+    // Densities of the same direction: of light sampling as drawn, of light sampling as evaluated
+    // for a cosine sample, and of cosine sampling.
     let sums = |met: &dyn Fn(usize) -> Option<f32>| {
         let one = |(i, (drawn, _)): (usize, &([f32; 4], f32))| {
             let cosine = f64::from(drawn[1]) / PI;
@@ -137,7 +139,7 @@ fn weights_of_both_ways_to_an_emitter_sum_to_one() {
     let wrong = |sums: &[f64]| sums.iter().filter(|sum| (*sum - 1.0).abs() > 2e-3).count();
     let right = sums(&|i| Some(pairs[i].1));
     assert!(right.len() > SAMPLES / 4, "{} directions are visible", right.len());
-    // Directions at an emitter's edge may meet what is beside it.
+    // Directions at an emitter's edge may hit a neighbouring surface.
     assert!(wrong(&right) < right.len() / 500, "{} of {} pairs of weights", wrong(&right), right.len());
     let same = |i: usize| (pairs[i].0[..3] == other[i].0[..3]).then_some(other[i].1);
     let mixed = sums(&same);

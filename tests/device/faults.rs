@@ -1,4 +1,4 @@
-//! Faults of the device, and dispatches that are cut so that there are none.
+//! Faults of the device, and the splitting of dispatches that avoids them.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -20,7 +20,7 @@ use caustica::{
 use glam::{Vec3, vec3};
 use support::*;
 
-/// A closed room with a glass ball, a lamp and a panel that shines.
+/// A closed room with a glass ball, a lamp and an emissive panel.
 fn room() -> Scene {
     let mut scene = scene(&[diffuse(0.6), glass()]);
     scene.materials.push(emissive("panel", 0.5, 2.0, false));
@@ -60,7 +60,7 @@ fn cut_dispatches_change_no_bit() {
     assert!(other != whole, "control: the seed changes nothing");
 }
 
-/// Loses the device when a stage is reported.
+/// Destroys the device when a stage is reported.
 struct Loses<'g> {
     gpu: &'g Gpu,
     at: Stage,
@@ -94,7 +94,7 @@ fn a_lost_device_is_an_error_at_any_stage() {
         let error = render(&gpu, &room(), &small(), &Silent).expect_err("it stays lost");
         assert!(matches!(error, Error::Lost { .. }), "{stage:?}, again: {error}");
     }
-    // Control: a stage that never comes.
+    // Control: a stage that never occurs.
     assert!(render_losing(&open(Pacing::Whole), Stage::Compare).is_ok());
 }
 

@@ -2,8 +2,8 @@
 
 use super::probe::{Probe, Row};
 
-/// Largest error of the device's reflectance over cosines and relative indices, if it is that of
-/// the indices times `factor`.
+/// Largest error of the device's reflectance over cosines and relative indices, against the closed
+/// form for the indices times `factor`.
 fn error(factor: f64) -> f64 {
     let cosines = (0..=1000).map(|i| f64::from(i) / 1000.0);
     let pairs: Vec<(f64, f64)> =
@@ -41,7 +41,7 @@ fn fresnel_is_the_closed_form() {
     assert!(error(1.0) < 2e-4, "the reflectance is off by {}", error(1.0));
     assert!(error(1.01) > 1e-2, "control: with indices 1 % larger it is off by {}", error(1.01));
     let at = |cos: f32, eta: f32| Probe::new("probe_fresnel").run(&[[[cos, eta, 0.0, 0.0], [0.0; 4]]])[0][0];
-    // From glass of 1.5 into air all is reflected beyond 41.81°.
+    // From glass of index 1.5 into air, total internal reflection begins at 41.81°.
     assert_eq!(at(42_f32.to_radians().cos(), 1.0 / 1.5), 1.0, "total reflection");
     assert!(at(41.5_f32.to_radians().cos(), 1.0 / 1.5) < 0.8, "control: within the critical angle");
     assert!((at(1.0, 1.5) - 0.04).abs() < 1e-6 && at(0.0, 1.5) == 1.0);

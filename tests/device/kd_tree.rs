@@ -1,5 +1,4 @@
-//! The kd-tree of the reference finds what a search that looks at all finds, and what another tree
-//! finds.
+//! The kd-tree of the reference finds the photons of brute force, and those of another tree.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -36,9 +35,9 @@ fn queries(random: &mut Random, positions: &[Vec3]) -> Vec<Vec3> {
         .collect()
 }
 
-/// Queries whose answer from the tree is not that of brute force over `positions`.
+/// Number of queries for which the tree differs from brute force over `positions`.
 fn differences(tree: &KdTree, positions: &[Vec3], queries: &[Vec3], k: u32, radius: Option<f32>) -> usize {
-    // A side test that accepts two of three.
+    // A side test that accepts two of three photons.
     let some = |i: usize| i % 3 != 1;
     let wrong = |&&query: &&Vec3| {
         let all = tree.nearest(query, k, radius, |_| true) != brute_force(positions, query, k, radius, |_| true);
@@ -47,8 +46,7 @@ fn differences(tree: &KdTree, positions: &[Vec3], queries: &[Vec3], k: u32, radi
     queries.iter().filter(wrong).count()
 }
 
-/// Compares over several k and bounds; then, as the control, with a photon moved that the first
-/// query uses.
+/// Compares over several k and bounds. The control moves a photon that the first query uses.
 fn check(random: &mut Random, positions: &[Vec3]) {
     let tree = KdTree::new(positions);
     let queries = queries(random, positions);
@@ -78,12 +76,12 @@ fn the_tree_equals_brute_force_at_awkward_sizes() {
 #[test]
 fn it_does_in_dense_caustics_and_on_one_spot() {
     let mut random = Random(2);
-    // More photons than one task balances.
+    // More photons than the build balances without further tasks.
     let dense = caustic_box(&mut random, 25_000, 0.8, 1e-3);
     check(&mut random, &positions(&dense));
     let spot = positions(&coincident(&mut random, 6000, 1000));
     check(&mut random, &spot);
-    // All on one spot: among equals the first count.
+    // All photons at one position: among equals the first are taken.
     let tree = KdTree::new(&spot[1000..]);
     let found = tree.nearest(Vec3::ZERO, 50, None, |_| true);
     assert_eq!(found.photons, (0..50).collect::<Vec<_>>());
@@ -115,7 +113,8 @@ fn it_finds_the_distances_that_kiddo_finds() {
     assert!(differences(&positions) > 0, "the control");
 }
 
-/// A map of photons on a line from the origin, all of them from above, seen from a point there.
+/// A map of photons on a line from the origin, all arriving from above, and a visible point at the
+/// origin.
 fn line(distances: &[f32]) -> (KdMap, caustica::layout::VisiblePoint) {
     let place = |&x: &f32| PhotonPlace { position: [x, 0.0, 0.0], wi: octahedral(Vec3::Y) };
     let map = KdMap::new(distances.iter().map(place).collect(), vec![PhotonFlux::default(); distances.len()], 1);
@@ -133,9 +132,9 @@ fn photons_nearly_as_far_as_each_other_are_tied() {
     let near = 2.0 * (1.0 + 2.4e-7);
     assert!(tied(&[1.0, 2.0, near], None) && tied(&[1.0, 2.0, 2.0, 2.0, 3.0], None));
     assert!(!tied(&[1.0, 2.0, 2.00001], None) && !tied(&[1.0, 1.0, 3.0], None));
-    // Fewer than k: the last gives the radius.
+    // With fewer than k photons the last one gives the radius.
     assert!(tied(&[2.0, near], None) && !tied(&[1.0, 2.0], None) && !tied(&[1.0], None) && !tied(&[], None));
-    // The bound of the radius between photons, and on one from either side.
+    // The maximum radius lies between photons, on one, and just beyond one.
     assert!(!tied(&[1.0, 2.0], Some(1.5)) && tied(&[1.0, 2.0], Some(2.0)) && tied(&[1.0, 2.0], Some(near)));
 }
 
@@ -146,7 +145,7 @@ fn fingerprints_tell_sets_apart_and_do_not_know_order() {
     assert_eq!(fingerprint(&all), fingerprint(&reversed));
     let others: Vec<u32> = (1..101).collect();
     assert_ne!(fingerprint(&all), fingerprint(&others));
-    // 1 + 4 = 2 + 3, but not mixed.
+    // 1 + 4 = 2 + 3, but the hashes differ.
     assert_ne!(fingerprint(&[1, 4]), fingerprint(&[2, 3]));
     assert_eq!(fingerprint(&[]), 0);
 }

@@ -1,9 +1,9 @@
-//! Lights are chosen and drawn with their densities: chi-square at a significance of 1e-4, over
-//! fixed numbers.
+//! Sampling of lights follows the densities: chi-square at a significance of 1e-4, with fixed
+//! seeds.
 //!
 //! | test | density | negative control |
 //! |---|---|---|
-//! | choice | by power, for photons and for direct light | every light alike |
+//! | choice | by power, for photons and for direct light | uniform over the lights |
 //! | surface | 1/area, of a triangle and a sphere | a corner moved; a sphere moved |
 //! | profile | the cosine on one side and on both; a spot's falloff, soft and hard | another inner cone; the other number of sides |
 //! | environment | by cells, and by the density told | another map |
@@ -34,7 +34,7 @@ pub fn probe(stem: &str, scene: &Scene, rows: &[Row]) -> Vec<[f32; 4]> {
     Probe::of_scene(stem, &buffers, &buffers.lights.direct).run(rows)
 }
 
-/// A triangle and a sphere that shine, apart from each other.
+/// An emissive triangle and an emissive sphere, apart from each other.
 fn shapes(corner: Vec3, center: Vec3, double_sided: bool) -> Scene {
     let mut scene = scene(&[]);
     scene.materials.push(emissive("lamp", 0.0, 2.0, double_sided));
@@ -131,15 +131,14 @@ fn surfaces_send_by_the_cosine() {
     }
 }
 
-/// The falloff between the cones of a spot, squared, at a height of 1 − cos; and its integral from
-/// 0 on.
+/// Squared falloff between the cones of a spot at the height 1 − cos θ, and its integral from 0 to
+/// there.
 fn falloff(inner: f64, outer: f64, height: f64) -> (f64, f64) {
     let edge = 1.0 - outer.cos();
     let width = (inner.cos() - outer.cos()).max(MIN_FALLOFF.into());
     let rest = |height: f64| {
         let t = ((edge - height) / width).clamp(0.0, 1.0);
-        // What lies farther out than the height: linear within the inner cone, a cube outside of
-        // it.
+        // Integral beyond the height: linear within the inner cone, a cubic between the cones.
         width * t.powi(3) / 3.0 + (edge - width - height).max(0.0)
     };
     (((edge - height) / width).clamp(0.0, 1.0).powi(2), rest(0.0) - rest(height))
@@ -174,7 +173,7 @@ fn spots_send_by_their_falloff() {
     }
 }
 
-/// A map of uneven pixels, some of them black and one bright.
+/// A map of varied pixels, some black and one bright.
 pub fn sky(bright: f32) -> Environment {
     let (width, height) = (16, 8);
     let mut random = photons::Random(9);
@@ -188,8 +187,8 @@ fn under(environment: Environment) -> Scene {
     Scene { environment: Some(environment), ..shapes(CORNER, CENTER, false) }
 }
 
-/// Probability of each cell of a map, `rows + 1` rows of `columns`: its corners' mean times its
-/// solid angle.
+/// Probability of each cell of a map, `rows + 1` rows of `columns`: mean of its corners times its
+/// solid angle, normalized.
 fn cell_probabilities(map: &Environment) -> Vec<f64> {
     let (columns, rows) = (map.width as usize, map.height as usize);
     let at = |x: usize, y: usize| map.pixels[y * columns + x % columns].iter().map(|c| f64::from(*c)).sum::<f64>();
@@ -229,7 +228,8 @@ fn environments_are_sampled_by_their_light() {
     let (found, wrong) = (of_cells(&directions), of_cells(&other));
     assert!(found.fits(), "cells: {found:?}");
     assert!(!wrong.fits(), "control: cells of a map with a brighter pixel: {wrong:?}");
-    // Directions finer than the cells, against the density that other passes ask for.
+    // Directions at a finer resolution than the cells, against the density that other passes
+    // evaluate.
     let grid = Directions { rows: 24, columns: 48 };
     let points: Vec<Row> = grid.midpoints(8).iter().map(|d| [d.as_vec3().extend(0.0).to_array(), [0.0; 4]]).collect();
     let densities = probe("probe_environment_pdf", &under(sky(30.0)), &points);

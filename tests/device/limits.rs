@@ -1,4 +1,4 @@
-//! Bounds of memory and loops.
+//! Limits of memory and loops.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -41,7 +41,7 @@ fn room(side: i32) -> Scene {
     scene
 }
 
-/// A device that pretends to have bindings of that many bytes.
+/// A device with its maximum binding size set to `bytes`.
 fn device_with_bindings(bytes: u64) -> Gpu {
     let mut gpu = Gpu::open(None).expect("tests need an adapter");
     gpu.limits.max_storage_buffer_binding_size = bytes;
@@ -55,7 +55,7 @@ fn what_exceeds_a_binding_is_split() {
     let settings = settings(Mode::Hybrid, 300_000, 24);
     let picture = |gpu: &Gpu| render(gpu, &scene, &settings, &Silent).map(|r| r.frame);
     let whole = picture(gpu()).expect("the scene renders");
-    // The primitives and the photons of a map need two windows each; nothing else scales with the
+    // The primitives need two bindings. So do the photons of a map. Nothing else scales with the
     // scene.
     let split = picture(&device_with_bindings(primitives * 55 / 100)).expect("what exceeds a binding is split");
     assert!(split == whole, "the split scene gives another picture");
@@ -67,7 +67,7 @@ fn what_exceeds_a_binding_is_split() {
 #[test]
 fn maps_that_no_buffers_hold_are_refused_at_once() {
     let scene = room(4);
-    // 1024 places of photons in a window, two windows.
+    // A binding holds the positions of 1024 photons; there are two bindings.
     let gpu = device_with_bindings(16 << 10);
     let refused = |global_photons, caustic_photons| {
         let settings = settings(Mode::Hybrid, 1, 8).with(|s| {
@@ -87,7 +87,7 @@ fn maps_that_no_buffers_hold_are_refused_at_once() {
     assert_ne!(what, "a photon map", "control: these maps fit, only what comes after does not");
 }
 
-/// Of rays in the room, those that were given up with that loop budget.
+/// Number of rays in the room that exceed this loop budget.
 fn unfinished(budget: f64) -> u32 {
     let ray = |i: u16| {
         let angle = f32::from(i) * 2.4;
@@ -106,7 +106,7 @@ fn a_ray_out_of_its_loop_budget_is_counted() {
 fn memory_is_bounded_by_photons_alone() {
     const MIB: u64 = 1 << 20;
     let scene = room(8);
-    // A device of its own: the peak counts all that lives on it.
+    // A separate device: the peak counts all its buffers.
     let gpu = Gpu::open(None).expect("tests need an adapter");
     let peak = |photons: u32, size: u32, spp: u32| {
         let settings = settings(Mode::IndirectPhotons, photons, size).with(|s| {

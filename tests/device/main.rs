@@ -1,4 +1,4 @@
-//! The device and the kernels on it: search, traversal, sampling, limits, faults, equal bits.
+//! The device and its kernels: search, traversal, sampling, limits, faults, determinism.
 
 mod bsdf;
 mod chi_square;

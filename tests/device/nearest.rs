@@ -1,5 +1,4 @@
-//! The k nearest photons of the grid are those of a search that looks at all, at every size,
-//! density and k.
+//! The k nearest photons of the grid are those of brute force, at every size, density and k.
 
 use caustica::{
     density::{Density, DensityKernel},
@@ -24,7 +23,7 @@ struct Bench {
     two_sided: Gather<'static>,
 }
 
-/// What a gather returned.
+/// Results of a gather.
 #[derive(Clone, Debug, PartialEq)]
 struct Answer {
     gathered: Vec<Gathered>,
@@ -102,8 +101,8 @@ fn agrees(gathered: &Gathered, radiance: &[f32; 4], found: &Found, expected: [f6
         && (0..3).all(|c| close(radiance[c].into(), expected[c], 2e-4))
 }
 
-/// Asks for `k` neighbours and compares with brute force; then, as the control, with brute force
-/// over a map that lacks the photon nearest to the last valid point.
+/// Gathers `k` neighbours and compares with brute force. The control compares with brute force over
+/// a map that lacks the photon nearest to the last valid point.
 fn check(bench: &mut Bench, photons: &[Photon], points: &[VisiblePoint], settings: &GatherSettings, side_test: bool) {
     let map = bench.map(photons);
     let answer = bench.ask(side_test, &map, points, settings);
@@ -160,7 +159,7 @@ fn an_empty_map_gives_nothing() {
     let answer = bench.ask(true, &map, &points, &settings(10));
     assert!(answer.radiance.iter().all(|r| *r == [0.0; 4]));
     assert!(answer.gathered.iter().all(|g| g.count == 0));
-    // Control: the same question to one that is not empty.
+    // Control: the same query of a map that is not empty.
     let map = bench.map(&uniform_box(&mut Random(1), 100));
     assert!(bench.ask(true, &map, &points, &settings(10)).radiance.iter().any(|r| *r != [0.0; 4]));
 }
@@ -241,7 +240,7 @@ fn every_kernel_sums_what_its_formula_says() {
         let density = Density { kernel, cone_constant: 1.2 };
         let bounded = GatherSettings { max_radius: Some(0.2), density, ..settings(100) };
         check(&mut bench, &photons, &points, &bounded, true);
-        // Control: another kernel is told apart.
+        // Control: another kernel gives another result.
         let other = Density { kernel: DensityKernel::ALL[(kernel as usize + 1) % 5], ..density };
         let map = bench.map(&photons);
         let answer = bench.ask(true, &map, &points, &bounded);
@@ -263,12 +262,12 @@ fn all_photons_within_a_radius_are_summed() {
     points[1].position = [30.0, 0.0, 0.0];
     let map = bench.map(&photons);
     for radius in [1e-3, 0.1, 0.5, 100.0] {
-        // A kernel that falls to 0 at the rim weighs two or three photons by differences of nearly
-        // equal numbers.
+        // A kernel that falls to 0 at the edge of the disc weights two or three photons by
+        // differences of nearly equal numbers.
         let last = if radius < 0.5 { DensityKernel::Gaussian } else { DensityKernel::Silverman };
         for kernel in [DensityKernel::Cone, last] {
             let density = Density { kernel, ..CONE };
-            // Neither the number of neighbours nor the largest radius has a say.
+            // The number of neighbours and the maximum radius have no effect.
             let within = GatherSettings { radius: Some(radius), max_radius: Some(0.01), density, ..settings(3) };
             check(&mut bench, &photons, &points, &within, true);
             let answer = bench.ask(true, &map, &points, &within);
@@ -282,7 +281,7 @@ fn all_photons_within_a_radius_are_summed() {
 
 #[test]
 fn each_kernel_integrates_to_1_over_its_disc() {
-    // Photons of flux 1 evenly on a unit square at y = 0, one in each cell of a grid: irradiance is
+    // Photons of flux 1 on a unit square at y = 0, one in each cell of a grid: the irradiance is
     // their number.
     let mut bench = Bench::open();
     let mut random = Random(13);
@@ -321,7 +320,7 @@ fn each_kernel_integrates_to_1_over_its_disc() {
 fn the_side_test_takes_only_photons_before_the_surface() {
     let mut bench = Bench::open();
     let mut random = Random(5);
-    // All photons come from above; points that look down see none.
+    // All photons come from above. Points with a downward normal gather none.
     let mut photons = uniform_box(&mut random, 3000);
     photons.iter_mut().for_each(|p| p.wi = caustica::layout::octahedral(Vec3::new(0.1, 0.9, 0.2).normalize()));
     let mut points: Vec<_> = (0..40).map(|_| point(&mut random, false)).collect();
@@ -336,7 +335,7 @@ fn a_tiny_budget_goes_on_in_further_dispatches_with_the_same_bits() {
     let mut bench = Bench::open();
     let mut random = Random(6);
     let photons = caustic_box(&mut random, 30_000, 0.3, 1e-2);
-    // Enough for pilots of both strides; these lie far apart.
+    // Enough points for pilots of both strides; they lie far apart.
     let points: Vec<_> = (0..2500).map(|_| point(&mut random, false)).collect();
     let map = bench.map(&photons);
     for (budget, k, count) in
@@ -348,7 +347,7 @@ fn a_tiny_budget_goes_on_in_further_dispatches_with_the_same_bits() {
         assert!(pieces.stats.dispatches > 2 * whole.stats.dispatches, "{:?} {:?}", pieces.stats, whole.stats);
         assert!(pieces.gathered == whole.gathered, "other sets: budget {budget}, k = {k}");
         assert!(pieces.radiance == whole.radiance, "other bits: budget {budget}, k = {k}");
-        // Control: the answer depends on what is asked.
+        // Control: the result depends on k.
         let other = bench.ask(true, &map, &points[..count], &settings(k - 1));
         assert!(other.gathered != whole.gathered, "the control");
     }
@@ -449,8 +448,8 @@ fn the_sort_is_stable_at_every_size() {
 
 #[test]
 fn the_estimate_is_unbiased_with_the_next_photon() {
-    // Photons of flux 1 evenly on a unit square at y = 0: irradiance is their number over the
-    // paths.
+    // Photons of flux 1, uniform on a unit square at y = 0: the irradiance is their number over the
+    // number of paths.
     let mut bench = Bench::open();
     let mut random = Random(9);
     let count = 40_000u32;
@@ -468,11 +467,11 @@ fn the_estimate_is_unbiased_with_the_next_photon() {
     let answer = bench.ask(true, &map, &points, &settings(10));
     let even = f64::from(count) / EMITTED as f64;
     let mean = answer.radiance.iter().map(|r| f64::from(r[0])).sum::<f64>() / points.len() as f64 / even;
-    // 4000 discs of 10 photons lie beside each other: noise of the mean is about 1 / sqrt(40,000) /
-    // 2.
+    // The square holds 4000 disjoint discs of 10 photons: the noise of the mean is about 1 /
+    // sqrt(40,000) / 2.
     assert!((mean - 1.0).abs() < 0.01, "{mean}");
-    // Control: with the radius of the k-th photon itself the mean is too bright, by weight(r) / (k
-    // - 1) / mean weight.
+    // Control: with the radius of the k-th photon the mean is too bright, by weight(r) / (k - 1) /
+    // mean weight.
     let (places, fluxes) = map.read(bench.gpu).unwrap();
     let positions: Vec<Vec3> = places.iter().map(|p| p.position.into()).collect();
     let with_kth = |p: &VisiblePoint| {

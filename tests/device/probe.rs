@@ -10,12 +10,12 @@ use caustica::{
 };
 use support::{gpu, photons::Random};
 
-/// What a probe reads, `a` and `b` in the shader.
+/// Input row of a probe, `a` and `b` in the shader.
 pub type Row = [[f32; 4]; 2];
 
 const PROBES: &[Shader] = &include!(concat!(env!("OUT_DIR"), "/probe_table.rs"));
 
-/// A probe, over a scene if its function reads one.
+/// A probe, with a scene's buffers if its function reads them.
 pub struct Probe<'s> {
     kernel: Kernel,
     scene: Option<(&'s SceneBuffers, &'s ChoiceBuffer)>,

@@ -1,5 +1,5 @@
-//! Each sampling function draws with its density: chi-square at a significance of 1e-4, over fixed
-//! numbers.
+//! Each sampling function follows its density: chi-square at a significance of 1e-4, with fixed
+//! seeds.
 //!
 //! | test | density | negative control |
 //! |---|---|---|
@@ -55,7 +55,7 @@ fn cones_are_uniform() {
 
 #[test]
 fn the_hemisphere_follows_the_cosine() {
-    // The share below the height h is sin²θ.
+    // The fraction below the height h is sin²θ.
     let share = |h: f64| h * (2.0 - h);
     for axis in AXES {
         let drawn = Probe::new("probe_cosine").run(&rows(SAMPLES, axis.extend(0.0).to_array()));
@@ -86,7 +86,7 @@ fn linear_densities_are_drawn() {
     for (a, b) in [(1.0, 3.0), (0.0, 2.0), (5.0, 0.0), (1.0, 1.1)] {
         let share = |x: f64| (f64::from(a) * x + 0.5 * f64::from(b - a) * x * x) / (0.5 * f64::from(a + b));
         let test = |drawn: Vec<[f32; 4]>| {
-            // The second coordinate is that of the number itself.
+            // The second coordinate is the random number itself.
             of_unit_square(drawn.iter().zip(rows(SAMPLES, [0.0; 4])).map(|(d, r)| [share(d[0].into()), r[0][1].into()]))
         };
         let (found, other) = (test(drawn(a, b)), test(drawn(b, a)));
@@ -117,7 +117,7 @@ fn scrambled_sobol_numbers_are_uniform_over_the_seeds() {
     }
     let [first, second] = [0, 1].map(|index| sampler(seeds.clone().map(|seed| [seed, index, 0, 0])));
     assert!(first.iter().zip(&second).all(|(a, b)| (a[0] < 0.5) != (b[0] < 0.5)), "a set has one number in each half");
-    // Control: the numbers of one set are far too even for independent ones.
+    // Control: the numbers of one set are far too uniform for independent ones.
     let set = of_unit_square(sampler((0..1 << 16).map(|index| [0, index, 0, 0])).iter().map(|n| [n[0], n[1]]));
     assert!(!set.fits(), "control: a whole set: {set:?}");
 }

@@ -1,5 +1,5 @@
-//! The traversal on the device finds what brute force finds, in trees that need a short stack and
-//! in those that need a long one.
+//! The traversal on the device finds the hits of brute force, in trees that need a short stack and
+//! in trees that need a long one.
 
 use caustica::{
     bvh::Bvh,
@@ -13,11 +13,11 @@ use support::*;
 use super::probe::{Probe, Row};
 
 const RAYS: usize = 4096;
-/// Of [`RAYS`], those that may be decided by rounding: where outlines are grazed or two surfaces
-/// lie equally far.
+/// Maximum number of [`RAYS`] that rounding may decide: rays that graze an outline, or hit two
+/// surfaces at equal distances.
 const UNSURE: usize = 2;
 
-/// Well-spread numbers in 0..1 (PCG hash, Jarzynski and Olano 2020).
+/// Uniform numbers in 0..1 (PCG hash, Jarzynski and Olano 2020).
 struct Random(u32);
 
 impl Random {
@@ -32,7 +32,7 @@ impl Random {
     }
 }
 
-/// Shapes of a size at random places in a cube about `middle`.
+/// Shapes of one size at random positions in a cube about `middle`.
 fn shapes(triangles: usize, spheres: usize, size: f32, middle: Vec3) -> Scene {
     let mut random = Random(11);
     let mut scene = scene(&[diffuse(0.5)]);
@@ -48,7 +48,7 @@ fn shapes(triangles: usize, spheres: usize, size: f32, middle: Vec3) -> Scene {
     scene
 }
 
-/// From everywhere about the cube in all directions, some along the axes.
+/// Rays from random origins around the cube in all directions, some along the axes.
 fn rays(middle: Vec3) -> Vec<Row> {
     let mut random = Random(5);
     let mut ray = |i: usize| {
@@ -131,19 +131,19 @@ fn finds_what_brute_force_finds() {
         let wrong = mismatches(&scene, &bvh, middle);
         assert!(wrong <= UNSURE, "{wrong} rays of {triangles} triangles, {spheres} spheres about {middle}");
     }
-    // Boxes without depth.
+    // Boxes of zero extent along y.
     let mut flat = shapes(400, 0, 0.4, Vec3::ZERO);
     flat.triangles.iter_mut().flat_map(|t| &mut t.positions).for_each(|p| p.y = 0.25);
     assert!(mismatches(&flat, &Bvh::build(&flat), Vec3::ZERO) <= UNSURE, "in a plane");
     assert!(short > 0 && long > 0, "stacks of several sizes are tested: {short}, {long}");
 }
 
-/// Controls: boxes that are too small, and a shape that the tree does not hold.
+/// Controls: a box that is too small, and shapes that the tree does not hold.
 #[test]
 fn what_the_tree_lacks_is_missed() {
     let scene = shapes(3000, 200, 0.1, Vec3::ZERO);
     let mut bvh = Bvh::build(&scene);
-    // The first child's box, along an axis, ends where it begins.
+    // The first child's box gets zero extent along one axis.
     bvh.nodes[0].high[0] = (bvh.nodes[0].high[0] & !0xff) | (bvh.nodes[0].low[0] & 0xff);
     assert!(mismatches(&scene, &bvh, Vec3::ZERO) > 10 * UNSURE);
     let scene = shapes(40, 0, 0.5, Vec3::ZERO);

@@ -1,4 +1,4 @@
-//! What compressed files hold.
+//! Decoding of compressed files.
 
 use super::loading_geometry::{inward, surface};
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ fn hex(text: &str) -> Vec<u8> {
 
 /// Streams of meshoptimizer 1.0: the corners of an octahedron of radius 1000 as 16-bit integers,
 /// the same of radius 0.75 by the exponential filter and its normals by the octahedral one; its
-/// triangles, as such and as plain indices.
+/// triangles, as a triangle stream and as an index sequence.
 const POSITIONS: &str = "a0013c000000602f013c0000000d08010fc000002f602f010fc00000060d080100f000002f600100f00000060d\
                          0000000000000000000000000000000000000000000000000000e803000000000000";
 const EXPONENTIAL: &str = "a000013c000000bf6001180000000000010fc0000060bf60010180000000000100f0000060bf010010000000\
@@ -66,7 +66,7 @@ fn compressed_views_hold_what_was_put_in() {
     let small = octahedron(EXPONENTIAL, 12, 5126, "EXPONENTIAL", TRIANGLES, "TRIANGLES");
     assert!((loaded(&small).bounding_sphere().1 - 0.75).abs() < 1e-4);
 
-    // Damage and lies: an error, whatever is changed.
+    // Damaged data and false sizes: every change is an error.
     for stream in [POSITIONS, TRIANGLES, SEQUENCE] {
         for cut in (2..stream.len()).step_by(4) {
             let mode = if stream == SEQUENCE { "INDICES" } else { "TRIANGLES" };
@@ -126,7 +126,7 @@ fn compressed_primitives_hold_what_was_put_in() {
         let near = |(p, n): (&glam::Vec3, glam::Vec3)| (p.length() - 1.0).abs() < 1e-3 && (*p - n).length() < 0.02;
         assert!(triangle.positions.iter().zip(triangle.normals).all(near), "{triangle:?}");
     }
-    // Two nodes, one stream; two primitives, one stream.
+    // One stream shared by two nodes, and by two primitives.
     let mut twice = gltf.clone();
     let primitive = twice["meshes"][0]["primitives"][0].clone();
     push(&mut twice["meshes"][0], "primitives", primitive);

@@ -1,4 +1,4 @@
-//! Files that a scene names, and what may not be opened.
+//! Files that a scene names, and files that it must not open.
 
 use caustica::scene::{LoadOptions, Scene};
 
@@ -21,7 +21,7 @@ fn the_hash_covers_the_files_beside_the_scene() {
     assert_ne!(hash(0), hash(1));
 }
 
-/// A scene in a folder of its own, beside which lies a file of bytes that it may not read.
+/// A scene in a folder of its own. A file next to that folder must not be read.
 #[cfg(unix)]
 #[test]
 fn buffers_lie_in_the_folder_of_the_scene_unless_all_is_allowed() {
@@ -61,7 +61,7 @@ fn buffers_lie_in_the_folder_of_the_scene_unless_all_is_allowed() {
     }
     let web = message(read("https://a.example/b.bin", true));
     assert_eq!(web, r#"buffers[0].uri: "https://a.example/b.bin": only data URIs and files are read"#);
-    // What never ends, or never begins, is not opened.
+    // Files that never end, or that block on opening, are not opened.
     let pipe = scene_folder.join("pipe.bin");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
     assert_eq!(message(read("pipe.bin", false)), r#"buffers[0].uri: "pipe.bin": is not a regular file"#);

@@ -1,4 +1,4 @@
-//! What is refused, and with which words.
+//! Refused files and their error messages.
 
 use caustica::scene::{Environment, Scene};
 use glam::Vec3;
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 use support::gltf::{add_accessor, add_zeros, data_uri, floats, load, load_bytes, loaded, message, triangle};
 
-/// The whole line that a change of the triangle is refused with.
+/// Error line for a modified triangle file.
 fn refusal(change: impl FnOnce(&mut Value)) -> String {
     let mut gltf = triangle();
     assert!(load(&gltf).is_ok(), "the unchanged file loads");
@@ -245,7 +245,7 @@ fn scenes_without_light_or_shape_say_what_they_hold() {
     assert!(scene.check_renderable().is_ok());
     scene.environment = Some(Environment::uniform(Vec3::ZERO));
     assert!(scene.check_renderable().is_err());
-    // An emissive material that nothing shows gives no light.
+    // An emissive material that no surface uses gives no light.
     let lamp = json!({ "emissiveFactor": [0, 0, 0.5] });
     gltf["materials"].as_array_mut().expect("a list").push(lamp);
     assert_eq!(refused(&gltf), dark);
@@ -301,7 +301,8 @@ fn absurd_counts_cost_nothing() {
         g["scenes"][0]["nodes"] = json!([0, 1, 2, 3, 4, 5, 6]);
     });
     assert_eq!(instances, "scene: 117440512 triangles, at most 100000000 are read");
-    // As many corners as there can be without bytes, all at one place: nothing is held for them.
+    // The maximum number of vertices without bytes, all at one position: no memory is allocated for
+    // them.
     let mut gltf = triangle();
     let positions = add_zeros(&mut gltf, 5126, 3 << 22, "VEC3");
     gltf["meshes"][0]["primitives"] = json!([{ "attributes": { "POSITION": positions } }]);
@@ -321,14 +322,14 @@ fn absurd_counts_cost_nothing() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever happens to the bytes, the file loads or is refused; nothing panics and nothing is
-    /// not a number.
+    /// With any bytes changed, the file loads or is refused. There is no panic and no NaN.
     #[test]
     fn damaged_files_never_panic(changes in prop::collection::vec((0_usize..10_000, any::<u8>()), 1..4), cut in 0_usize..20_000) {
         let mut bytes = triangle().to_string().into_bytes();
         let length = bytes.len();
         for (at, value) in changes {
-            // Mostly digits and structure, which leave the JSON whole more often than any byte.
+            // Mostly digits and punctuation, which keep the JSON valid more often than arbitrary
+            // bytes.
             bytes[at % length] = if value < 200 { b"0123456789-.e,:[]{}\"x"[value as usize % 21] } else { value };
         }
         bytes.truncate(cut.max(1));
@@ -339,7 +340,7 @@ proptest! {
         }
     }
 
-    /// The same for what the data hold.
+    /// The same for the bytes of the buffers.
     #[test]
     fn damaged_data_never_panic(bytes in prop::collection::vec(any::<u8>(), 44)) {
         let mut gltf = triangle();

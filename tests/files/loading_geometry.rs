@@ -1,4 +1,4 @@
-//! How triangles and spheres come out of meshes, nodes and transforms.
+//! Triangles and spheres from meshes, nodes and transforms.
 
 use caustica::scene::{Scene, Triangle};
 use glam::{Mat4, Quat, Vec3};
@@ -8,7 +8,7 @@ use support::gltf::{add_accessor, add_zeros, data_uri, floats, load, loaded, mes
 /// Corners of a unit square in the plane z = 0, in an order that suits a strip.
 const SQUARE: [f32; 12] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0];
 
-/// The triangle's file with another primitive: positions, mode, indices of the given type.
+/// The triangle's file with another primitive: positions, mode, and indices of the given type.
 fn with_primitive(positions: &[f32], mode: u32, indices: Option<(u32, Vec<u8>, usize)>) -> Value {
     let mut gltf = triangle();
     let positions = add_accessor(&mut gltf, &floats(positions), 5126, positions.len() / 3, "VEC3");
@@ -20,8 +20,8 @@ fn with_primitive(positions: &[f32], mode: u32, indices: Option<(u32, Vec<u8>, u
     gltf
 }
 
-/// Triangles as sets of corners, each starting at its smallest: equal for equal surfaces with equal
-/// outsides.
+/// Triangles as sorted lists of corners, each rotated to start at its smallest corner: equal for
+/// equal surfaces with equal orientation.
 pub fn surface(scene: &Scene) -> Vec<[[i32; 3]; 3]> {
     let corner = |p: Vec3| (p * 1000.0).round().as_ivec3().to_array();
     let mut surface: Vec<_> = scene
@@ -48,12 +48,12 @@ fn lists_strips_and_fans_give_the_same_surface() {
         assert_eq!(surface(&loaded(&with_primitive(&SQUARE, 4, Some((component, bytes(&list, size), 6))))), expected);
     }
     assert_eq!(surface(&loaded(&with_primitive(&SQUARE, 5, None))), expected);
-    // The fan goes round: its diagonal must be the strip's.
+    // The fan's corners go around the square, so that its diagonal is that of the strip.
     let fan = bytes(&[1, 3, 2, 0], 1);
     assert_eq!(surface(&loaded(&with_primitive(&SQUARE, 6, Some((5121, fan, 4))))), expected);
     let corners: Vec<f32> = list.iter().flat_map(|i| SQUARE[3 * *i as usize..][..3].to_vec()).collect();
     assert_eq!(surface(&loaded(&with_primitive(&corners, 4, None))), expected);
-    // Negative control: the other winding is another surface.
+    // Negative control: the opposite winding gives another surface.
     let turned = bytes(&[0, 2, 1, 2, 3, 1], 1);
     assert_ne!(surface(&loaded(&with_primitive(&SQUARE, 4, Some((5121, turned, 6))))), expected);
 }
@@ -112,7 +112,7 @@ fn sparse_elements_replace_zeros_and_others() {
     });
     gltf["meshes"][0]["primitives"][0]["indices"] = indices.into();
     assert_eq!(surface(&loaded(&gltf)), surface(&loaded(&triangle())));
-    // Negative control: without its list the index 9 is what counts.
+    // Negative control: without the sparse list the index 9 is read, and refused.
     gltf["accessors"][indices].as_object_mut().expect("an object").remove("sparse");
     assert_eq!(message(load(&gltf)), "meshes[0].primitives[0].indices: index 9 at 1, but there are 3 vertices");
 }
@@ -141,7 +141,7 @@ fn morph_targets_move_vertices_and_normals_by_default_weights() {
     let (moved, normal) = places(&gltf);
     assert_eq!(moved, expected);
     assert!((normal - Vec3::new(1.0, 0.0, 1.0).normalize()).length() < 1e-6, "{normal}");
-    // A node's own weights go before the mesh's, for this node alone.
+    // A node's weights override those of the mesh, for this node only.
     push(&mut gltf, "nodes", json!({ "mesh": 0, "weights": [0, 0] }));
     gltf["scenes"][0]["nodes"] = json!([3, 0]);
     let scene = loaded(&gltf);
@@ -157,8 +157,8 @@ fn morph_targets_move_vertices_and_normals_by_default_weights() {
 #[test]
 fn skins_stand_as_their_joints_do() {
     let mut gltf = triangle();
-    // The first vertex holds to joint 0, the second to joint 1, the third to both alike, with
-    // weights that sum to 100.
+    // The first vertex is bound to joint 0, the second to joint 1, and the third to both equally,
+    // with weights that sum to 100.
     let joints = add_accessor(&mut gltf, &[0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0], 5121, 3, "VEC4");
     let weights = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 50.0, 50.0, 0.0, 0.0];
     let weights = add_accessor(&mut gltf, &floats(&weights), 5126, 3, "VEC4");
@@ -167,7 +167,7 @@ fn skins_stand_as_their_joints_do() {
     gltf["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = joints.into();
     gltf["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = weights.into();
     gltf["skins"] = json!([{ "joints": [3, 4], "inverseBindMatrices": inverse }]);
-    // The node's own place does not count; the joints need not be in the scene.
+    // The transform of the skinned node is ignored. The joints need not be in the scene.
     gltf["nodes"][0] = json!({ "mesh": 0, "skin": 0, "translation": [100, 100, 100] });
     push(&mut gltf, "nodes", json!({ "children": [4] }));
     push(&mut gltf, "nodes", json!({ "translation": [1, 0, 4] }));
@@ -176,7 +176,7 @@ fn skins_stand_as_their_joints_do() {
         scene.triangles[0].positions.map(|p| p + scene.center.as_vec3())
     };
     assert_eq!(places(&gltf), [Vec3::ZERO, Vec3::new(1.0, 0.0, 4.0), Vec3::new(0.0, 1.0, 2.0)]);
-    // Joints that mirror keep the outside out.
+    // Joints with a reflection keep the orientation of the surface.
     gltf["nodes"][3]["scale"] = json!([1, 1, -1]);
     let mirrored = loaded(&gltf).triangles[0].geometric_normal();
     gltf["nodes"][3]["scale"] = json!([1, 1, 1]);
@@ -230,7 +230,8 @@ fn instances_stand_where_their_attributes_say() {
     assert_eq!(message(load(&gltf)), format!("{place}.ROTATION: element 0 is not a rotation"));
 }
 
-/// A tetrahedron around the origin with its outside out, and normals that point from the centre.
+/// A tetrahedron around the origin with outward winding, and normals that point away from the
+/// centre.
 fn tetrahedron(node: Value) -> Value {
     let corners = [[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0]];
     let indices = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3];
@@ -243,7 +244,7 @@ fn tetrahedron(node: Value) -> Value {
     gltf
 }
 
-/// Triangles that look towards the middle of the scene, with their plane or with a corner's normal.
+/// Triangles that face the centre of the scene, by their geometric or by a vertex normal.
 pub fn inward(triangles: &[Triangle]) -> usize {
     let looks_in = |t: &Triangle| {
         let out = t.positions.iter().sum::<Vec3>();
@@ -268,7 +269,7 @@ fn mirrored_and_stretched_solids_keep_their_outside() {
         assert_eq!(inward(&scene.triangles), 0, "{node}");
         assert!(scene.triangles.iter().flat_map(|t| t.normals).all(|n| (n.length() - 1.0).abs() < 1e-5));
     }
-    // Negative control: one triangle turned round is found.
+    // Negative control: one reversed triangle is found.
     let mut scene = loaded(&tetrahedron(json!({})));
     scene.triangles[2].positions.swap(0, 1);
     assert_eq!(inward(&scene.triangles), 1);
@@ -299,7 +300,7 @@ fn triangles_without_area_are_dropped_and_counted() {
     let scene = loaded(&gltf);
     assert_eq!(scene.triangles.len(), 1);
     assert_eq!(scene.warnings, ["1 of 2 triangles have no area and are not drawn"]);
-    // Smallness alone is no reason.
+    // A small triangle is not degenerate by its size alone.
     let small = with_primitive(&[0.0, 0.0, 0.0, 1e-15, 0.0, 0.0, 0.0, 1e-15, 0.0], 4, None);
     assert_eq!(loaded(&small).triangles.len(), 1);
 }
@@ -313,14 +314,14 @@ fn far_from_the_origin_is_as_near_it() {
         gltf["scenes"][0]["nodes"] = json!([3]);
         loaded(&gltf)
     };
-    // A power of two, which f32 holds exactly: nothing but the loader could lose digits.
+    // A power of two, which is exact in f32: only the loader could lose digits.
     let (near, far) = (at(0.0), at(67_108_864.0));
     assert_eq!(far.center.x, 67_108_864.0);
     assert_eq!(near.triangles, far.triangles);
     assert_eq!(near.lights, far.lights);
     assert_eq!(near.cameras, far.cameras);
     assert_eq!(far.describe().lights[0].position, Some([67_108_864.0, -67_108_864.0, 67_108_866.0]));
-    // Negative control: in f32 the same place has no room for the triangles.
+    // Negative control: in f32 the triangles collapse at this position.
     assert_eq!(67_108_864.0_f32 + 1.0, 67_108_864.0);
 }
 
@@ -334,7 +335,7 @@ fn deep_chains_of_nodes_do_not_overflow_the_stack() {
     list.push(json!({ "mesh": 0 }));
     gltf["nodes"][3]["children"] = json!([4]);
     gltf["scenes"][0]["nodes"] = json!([1, 3]);
-    // Node 3 leads to 4, and node i to i + 1.
+    // A chain: node 3 has the child 4, and node i the child i + 1.
     for i in 4..50_004 {
         gltf["nodes"][i]["children"] = json!([i + 1]);
     }

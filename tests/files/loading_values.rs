@@ -1,4 +1,4 @@
-//! How materials, lights and cameras are read, and what is said about them.
+//! Reading of materials, lights and cameras, and the warnings about them.
 
 use caustica::scene::{Camera, Environment, LightKind, LoadOptions, Projection, Surface};
 use caustica::settings::LightUnit;
@@ -6,7 +6,7 @@ use glam::Vec3;
 use serde_json::{Value, json};
 use support::gltf::{lambert, loaded, message, read_with, triangle};
 
-/// The surface that a material is read as, and what is said about it.
+/// Surface that a material is read as, and the warnings about it.
 fn read_as(material: Value) -> (Surface, Vec<String>) {
     let mut gltf = triangle();
     gltf["materials"][0] = material;
@@ -88,7 +88,7 @@ fn spots_and_directional_lights_shine_along_minus_z_of_their_node() {
     };
     let near = |a: Vec3, b: Vec3| (a - b).length() < 1e-6;
     let untouched: fn(&mut Value) = |_| {};
-    // Angles that are not given: 0 and 45 degrees.
+    // Default angles: 0 and 45 degrees.
     for plain in [json!({ "type": "spot" }), json!({ "type": "spot", "spot": {} })] {
         let (spot, notes) = light(plain, untouched);
         assert_eq!(spot.kind, LightKind::Spot { inner: 0.0, outer: std::f32::consts::FRAC_PI_4 });
@@ -107,7 +107,7 @@ fn spots_and_directional_lights_shine_along_minus_z_of_their_node() {
     assert_eq!(notes, [said]);
     assert!(matches!(sharp.kind, LightKind::Spot { inner, outer: 0.25 } if inner < 0.25 && inner > 0.2499));
 
-    // A quarter turn about +X takes -Z to +Y, whatever the scale; a mirror takes it along.
+    // A rotation by 90° about +X takes -Z to +Y at any scale. A reflection reverses it.
     let sun = json!({ "type": "directional", "intensity": 3 });
     let turn: fn(&mut Value) = |node| node["rotation"] = json!([0.5_f64.sqrt(), 0, 0, 0.5_f64.sqrt()]);
     let scaled: fn(&mut Value) = |node| {
@@ -120,10 +120,10 @@ fn spots_and_directional_lights_shine_along_minus_z_of_their_node() {
         assert!(near(sun.direction, Vec3::Y) && (sun.direction.length() - 1.0).abs() < 1e-6, "{}", sun.direction);
     }
     assert!(near(light(sun.clone(), |node| node["scale"] = json!([1, 1, -2])).0.direction, Vec3::Z));
-    // A directional light is nowhere: it may lie as far away as it likes.
+    // A directional light has no position: its node may lie at any distance.
     let far: fn(&mut Value) = |node| node["translation"] = json!([0, 1e30, 0]);
     assert_eq!(light(sun, far).0.position, Vec3::ZERO);
-    // Nothing is said of a light that gives none, and it is none.
+    // A light of zero intensity is left out, with a warning.
     let mut gltf = triangle();
     gltf["extensions"]["KHR_lights_punctual"]["lights"][0] = json!({ "type": "spot", "intensity": 0 });
     let scene = loaded(&gltf);
@@ -184,7 +184,7 @@ fn cameras_are_found_by_name_and_number_and_made_if_missing() {
     let camera = scene.camera(None).expect("a framing camera");
     let sees = |p: Vec3, size: (u32, u32)| {
         let v = p - camera.position;
-        // Half the height, and of it the part that the width has.
+        // Half the height, and the height times the aspect ratio.
         let half = camera.half_height_at(v.dot(camera.forward), size);
         v.dot(camera.up).abs() <= half && v.dot(camera.right).abs() <= half * size.0 as f32 / size.1 as f32
     };
@@ -213,7 +213,7 @@ fn a_scene_without_light_gets_a_sky_and_one_with_light_keeps_it() {
     );
     assert!(sky.radiance(-Vec3::Y).max_element() < 0.5, "what is white stands out from the sky");
     assert!(dark.check_renderable().is_ok());
-    // What was asked for stays, dark or not.
+    // An environment given by the user stays, dark or not.
     let mut asked = loaded(&gltf);
     asked.environment = Some(Environment::uniform(Vec3::ZERO));
     asked.add_default_light();
@@ -238,7 +238,7 @@ fn scenes_of_a_file_are_chosen_by_name_or_number() {
     assert_eq!(counts("3"), (0, 0));
     let default = read_with(&gltf, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((default.triangles.len(), default.lights.len()), (1, 1));
-    // What is kept under a scene's hash is not found under another's.
+    // Results stored under one scene's hash must not be found under another's.
     assert_ne!(scene("1").expect("it loads").hash, default.hash);
     let expected = r#"load.scene 4: test.gltf has the scenes 0, 1 "lamp only", 2 "0", 3"#;
     assert_eq!(message(scene("4")), expected);

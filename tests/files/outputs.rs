@@ -1,12 +1,11 @@
-//! What is written, and what is left behind by a run that fails or is stopped: by the program, on
-//! real files.
+//! Output files of the program, also of runs that fail or are stopped, on the real file system.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | destroys | an output over any file that is read, or over another output, is refused before the work | a path beside it is written |
 //! | full | a file that cannot be written whole is an error, and the older one stays | without the limit it is replaced |
 //! | places | folders, files as folders, names too long, and pipes to read are refused before the work | names that are only long or odd are written |
-//! | closed | a reader that has gone, or a full disk behind stderr, is no failure | what is read is all there |
+//! | closed | a closed pipe, or a full disk behind stderr, is no failure | an open pipe gets the whole output |
 //! | stops | SIGINT and SIGTERM end every stage of every command, and leave no file | a run that is not stopped goes on |
 #![cfg(unix)]
 
@@ -40,7 +39,7 @@ const SCENE: &str = r#"{
 }"#;
 const FILES: [&str; 4] = ["corners.json", "old.exr", "scene.gltf", "wood grain.png"];
 
-/// A folder with the scene, its files, and an older picture.
+/// A folder with the scene, its files, and an earlier picture.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).expect("can be written");
@@ -52,7 +51,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// `caustica` with these words, in the folder.
+/// Command `caustica` with these arguments, in the folder.
 fn command(folder: &Path, line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_caustica"));
     command.current_dir(folder).args(line.split_whitespace()).env_remove("CAUSTICA_DEVICE");
@@ -67,7 +66,7 @@ fn ended(command: &mut Command) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8(output.stderr).expect("messages are text"))
 }
 
-/// The one line of a run that fails before it does anything.
+/// The error line of a run that fails before any work.
 fn refusal(folder: &Path, line: &str) -> String {
     let (code, said) = ended(&mut command(folder, line));
     assert_eq!(code, Some(1), "{line}: {said}");
@@ -77,7 +76,7 @@ fn refusal(folder: &Path, line: &str) -> String {
     said
 }
 
-/// All files in the folder and in those in it.
+/// All files of the folder, recursively.
 fn names(folder: &Path) -> Vec<String> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).expect("can be listed").map(|e| e.expect("can be listed")) {
@@ -117,7 +116,7 @@ fn nothing_that_is_read_or_written_is_written_over() {
         assert_eq!(code, Some(2), "{words}: {text}");
         assert!(text.contains("is another output"), "{words}: {text}");
     }
-    // A folder of results with the scene in it, under a name of theirs.
+    // A folder of results that holds the scene under the name of a result.
     fs::copy(path("scene.gltf"), path("study.json")).expect("can be copied");
     assert!(refusal(folder.path(), "study study.json -q -o . --photons 1k -k 1").contains("study.json: is the scene"));
     fs::remove_file(path("study.json")).expect("can be removed");
@@ -147,7 +146,7 @@ fn what_cannot_be_written_whole_leaves_the_older_file() {
         let line = format!("{limit} exec \"$0\" {QUICK} -q -o old.exr");
         ended(shell.current_dir(folder.path()).args(["-c", &line, env!("CARGO_BIN_EXE_caustica")]))
     };
-    // One block, of 512 or 1024 bytes.
+    // A limit of one block: 512 or 1024 bytes.
     let (code, said) = limited("ulimit -f 1;");
     assert_eq!(code, Some(1), "{said}");
     assert!(said.starts_with("error: old.exr: ") && said.lines().count() == 1, "{said}");
@@ -178,7 +177,7 @@ fn places_that_cannot_be_written_are_refused_before_the_work() {
         let text = refusal(folder.path(), &format!("{QUICK} -q -o {output}"));
         assert!(text.contains(said), "{output}: {text}");
     }
-    // Nobody writes into the pipe: what reads it would wait for ever.
+    // No process writes to the pipe: reading it would block for ever.
     let made = Command::new("mkfifo").arg(folder.path().join("pipe.exr")).status().expect("mkfifo runs");
     assert!(made.success());
     for line in [
@@ -188,7 +187,7 @@ fn places_that_cannot_be_written_are_refused_before_the_work() {
         let text = refusal(folder.path(), &line);
         assert!(text.contains("pipe.exr: is not a regular file"), "{line}: {text}");
     }
-    // Controls: a name as long as names can be, and one that is no text.
+    // Controls: a name of maximum length, and one that is not UTF-8.
     let odd = OsStr::from_bytes(b"\xff\xfe.png");
     let mut line = command(folder.path(), &format!("{QUICK} -q -o {long}.exr -o"));
     assert_eq!(ended(line.arg(odd)), (Some(0), String::new()));
@@ -210,8 +209,8 @@ fn a_reader_that_has_gone_is_no_failure() {
     assert!(code == Some(0) && said.contains("wrote a.exr"), "control: {said}");
 }
 
-/// How it ends by itself. The promise is two seconds; a machine under load is given time, work that
-/// goes on is not.
+/// Waits for the process to end by itself. The documented time is two seconds. The limit allows for
+/// a loaded machine, but not for work that continues.
 fn wait_for(child: &mut Child) -> Option<ExitStatus> {
     let deadline = Instant::now() + Duration::from_secs(30);
     while Instant::now() < deadline {
@@ -225,7 +224,7 @@ fn wait_for(child: &mut Child) -> Option<ExitStatus> {
     None
 }
 
-/// The same command, which hears the end of its terminal even where this test does not, as under
+/// The same command with the default action of SIGHUP, even where this test ignores it, as under
 /// nohup.
 fn hearing_hangups(command: &Command) -> Command {
     let mut hearing = Command::new("env");
@@ -242,7 +241,7 @@ fn hearing_hangups(command: &Command) -> Command {
     hearing
 }
 
-/// Sends a signal when a line that begins so is on stderr. Returns the exit code.
+/// Sends a signal once a line with this prefix is on stderr. Returns the exit code.
 fn stopped_at(folder: &Path, line: &str, stage: &str, signal: &str) -> Option<i32> {
     let mut child = hearing_hangups(&command(folder, line)).stderr(Stdio::piped()).spawn().expect("it starts");
     let mut stderr = BufReader::new(child.stderr.take().expect("it is piped"));
@@ -270,7 +269,7 @@ fn signals_end_every_stage_and_leave_no_file() {
     let made = Command::new("mkfifo").arg(folder.path().join("pipe.exr")).status().expect("mkfifo runs");
     assert!(made.success());
     let hours = "render scene.gltf --size 64x64 --spp 1000000 -k 10 -o old.exr -o a.png --stats s.json";
-    // Nobody reads the pipe: the write waits for ever.
+    // No process reads the pipe: writing to it blocks for ever.
     let write = format!("{QUICK} --stats s.json -o pipe.exr");
     let study = "study scene.gltf -o out --photons 1k,2k -k 10 --size 64x64 --spp 1000000";
     let compare = "compare scene.gltf -o out --photons 1k -k 10 --size 64x64 --spp 1000000";
@@ -292,7 +291,7 @@ fn signals_end_every_stage_and_leave_no_file() {
         assert_eq!(left, FILES, "{line} at {stage}");
         assert_eq!(fs::read(folder.path().join("old.exr")).expect("it is there"), b"old");
     }
-    // Control: without a signal it does not end at its first stage.
+    // Control: without a signal the run does not end at its first stage.
     let mut child = command(folder.path(), hours).stderr(Stdio::null()).spawn().expect("it starts");
     sleep(Duration::from_millis(300));
     let early = child.try_wait().expect("it can be waited for");

@@ -178,7 +178,7 @@ fn no_circle_of_files() {
     assert!(closed.is_empty(), "no circle is left in these, take them out of OPEN: {closed:?}");
 }
 
-/// Circles among made-up files, one line each.
+/// Circles among example files, one line each.
 fn knots(sources: &[(&str, &str)]) -> Vec<String> {
     let sources: Vec<(&str, String)> = sources.iter().map(|(path, text)| (*path, (*text).to_string())).collect();
     let uses = Sources::new(&sources).uses();

@@ -5,10 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Folders in which a word in backquotes with a slash is a path from the root.
+/// Folders: a word in backquotes that begins with one of them is a path from the root.
 const FOLDERS: [&str; 8] = ["src", "shaders", "tests", "docs", "scripts", "scenes", "examples", "benches"];
 
-/// Targets of links, without their anchors, that are no addresses.
+/// Targets of links that are not URLs, without their anchors.
 fn links(text: &str) -> impl Iterator<Item = &str> {
     let targets = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
     targets.map(|target| target.split('#').next().unwrap_or_default()).filter(|t| !t.is_empty() && !t.contains("://"))
@@ -23,7 +23,7 @@ fn paths(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Links and paths of a document that lead nowhere; links are relative to its folder.
+/// Broken links and paths of a document. Links are relative to its folder.
 fn dead(root: &Path, document: &Path, text: &str) -> Vec<String> {
     let folder = document.parent().unwrap_or(root);
     // Fenced blocks have three backquotes and are left out.

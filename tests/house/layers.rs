@@ -7,7 +7,7 @@ fn layer_of(module: &str) -> Option<u32> {
     Some(match module {
         "density" | "pixel_filter" | "error" | "html" | "settings" | "image" | "layout" | "map_kind" | "memory"
         | "rng" | "stats" | "progress" => 0,
-        // What lib.rs hands out of `error` under its own name.
+        // Names of `error` that lib.rs re-exports.
         "Error" | "Result" => 0,
         "scene" | "bvh" => 1,
         "emitters" | "reference" => 2,
@@ -22,7 +22,7 @@ fn layer_of(module: &str) -> Option<u32> {
 
 const FIRST_LAYER_WITH_WGPU: u32 = 3;
 
-/// What a file does against the rule, one line each. `path` is relative to `src/`, with `/`.
+/// Violations of the rule by a file, one line each. `path` is relative to `src/`, with `/`.
 fn violations(path: &str, source: &str) -> Vec<String> {
     let module: Vec<&str> = path.trim_end_matches(".rs").trim_end_matches("/mod").split('/').collect();
     let Some(own) = layer_of(module[0]) else {
@@ -50,7 +50,7 @@ fn violations(path: &str, source: &str) -> Vec<String> {
     found
 }
 
-/// Whether a path begins with the name, which may be a crate's.
+/// Whether a path begins with the name of a crate.
 fn starts_a_path(tokens: &[String], name: &str) -> bool {
     (0..tokens.len().saturating_sub(1)).any(|i| {
         let inside = i >= 2 && tokens[i - 1] == "::" && is_name(&tokens[i - 2]);
@@ -165,7 +165,7 @@ pub(super) fn tokens(source: &str) -> Vec<String> {
     tokens
 }
 
-/// Where the raw string that begins at `start` ends, if one does.
+/// End of the raw string that begins at `start`, if there is one.
 fn raw_string_end(chars: &[char], start: usize) -> Option<usize> {
     let hashes = chars[start + 1..].iter().take_while(|c| **c == '#').count();
     let open = start + 1 + hashes;
@@ -242,8 +242,8 @@ fn good_sources_are_not() {
     }
 }
 
-/// Where the word `unsafe` stands in the code, and where a lint against it is lifted or a shader
-/// compiled without its checks: file and word.
+/// File and word of each `unsafe` in the code, of each lifted lint against it, and of each shader
+/// compiled without its checks.
 fn untrusted(path: &str, source: &str) -> Vec<String> {
     let tokens = tokens(source);
     let lifts = |i: usize| {
@@ -266,7 +266,7 @@ fn one_place_is_unsafe_and_no_shader_goes_unchecked() {
     let lints = lints.split("\n[").find(|table| table.starts_with("lints.rust]")).expect("there are lints");
     assert!(lints.contains("unsafe_code = \"deny\""), "{lints}");
     let found: Vec<String> = paths.iter().flat_map(|path| untrusted(path, &source(path))).collect();
-    // The one exception: a variable of the environment, set before there is a second thread.
+    // The one exception: an environment variable that is set before a second thread starts.
     assert_eq!(found, ["main.rs: unsafe_code", "main.rs: unsafe"]);
     assert!(source("main.rs").contains("// SAFETY: "), "it says why");
 }
@@ -284,8 +284,8 @@ fn unsafe_code_is_found() {
     }
 }
 
-/// What of a lock file comes from elsewhere than the registry, or without a checksum: the names of
-/// packages. Our own have neither.
+/// Names of the packages of a lock file that do not come from the registry, or have no checksum.
+/// The workspace's own packages have neither.
 fn strangers(lock: &str) -> Vec<&str> {
     let is_known = |package: &&str| {
         package.contains("\nsource = \"registry+https://github.com/rust-lang/crates.io-index\"\nchecksum = \"")

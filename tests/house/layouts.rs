@@ -1,13 +1,12 @@
-//! Every struct that crosses to the GPU has the same fields in the same places on both sides, and
-//! every shared constant the same value: the shaders are reflected with naga and compared with
-//! `layout.rs`.
+//! Structs shared with the GPU have the same fields at the same offsets on both sides, and shared
+//! constants the same values. The shaders are reflected with naga and compared with `layout.rs`.
 
 use std::{any::type_name, mem::offset_of};
 
 use caustica::{gpu::shaders::SHADERS, layout};
 use naga::{AddressSpace, ArraySize, Expression, Handle, Literal, Module, ScalarKind, Type, TypeInner};
 
-/// Name, byte offset and type of a field, in Rust's words.
+/// Name, byte offset and Rust type of a field.
 type Field = (String, u32, String);
 
 /// A struct of `layout.rs`.
@@ -17,7 +16,7 @@ struct Twin {
     fields: Vec<Field>,
 }
 
-/// Describes structs of `layout.rs`; a field that is left out does not compile.
+/// Describes structs of `layout.rs`. A missing field is a compile error.
 macro_rules! twins {
     ($($name:ident { $($field:ident),+ $(,)? })+) => {
         vec![$({
@@ -143,7 +142,7 @@ fn constants() -> Vec<(&'static str, f64)> {
     .to_vec()
 }
 
-/// Structs that only the device fills and reads, and the bytes that the host allots them.
+/// Structs that only the device writes and reads, and the sizes that the host allocates, bytes.
 const OPAQUE: [(&str, usize); 2] =
     [("SearchState", layout::SEARCH_STATE_BYTES), ("GatherState", layout::GATHER_STATE_BYTES)];
 
@@ -151,7 +150,7 @@ fn opaque_bytes(name: Option<&str>) -> Option<u32> {
     OPAQUE.iter().find(|(n, _)| Some(*n) == name).map(|(_, bytes)| *bytes as u32)
 }
 
-/// What of a kernel's text disagrees with `layout.rs`, one line each.
+/// Differences of a kernel from `layout.rs`, one line each.
 fn disagreements(wgsl: &str) -> Vec<String> {
     let module = naga::front::wgsl::parse_str(wgsl).expect("composed shaders are valid");
     let mut found = Vec::new();
@@ -174,10 +173,10 @@ fn disagreements(wgsl: &str) -> Vec<String> {
     found
 }
 
-/// Structs that kernels take from the texels of tables.
+/// Structs that kernels decode from the texels of tables.
 const IN_TABLES: [&str; 3] = ["Material", "Medium", "Normals"];
 
-/// Structs that lie in storage or uniform buffers, also inside of others, and those in tables.
+/// Structs in storage or uniform buffers, nested ones included, and structs in tables.
 fn bound_structs(module: &Module) -> Vec<Handle<Type>> {
     let in_buffer = |space| matches!(space, AddressSpace::Storage { .. } | AddressSpace::Uniform);
     let mut open: Vec<_> =
@@ -284,7 +283,7 @@ fn this_test_knows_every_struct_and_constant_of_the_host() {
 }
 
 /// Constants that no kernel names: sizes of structs; values that a kernel reads from a field or
-/// tells by the others of their kind; a bound of the host's own. Their values are not compared.
+/// infers from the others of their kind; a limit of the host. Their values are not compared.
 const NOT_NAMED: [&str; 7] = [
     "SEARCH_STATE_BYTES",
     "GATHER_STATE_BYTES",

@@ -1,11 +1,11 @@
-//! The library without the command: what it depends on.
+//! Dependencies of the library without the command.
 
 use std::process::Command;
 
 /// Crates that only the command and its reports need.
 const OF_THE_COMMAND: [&str; 6] = ["clap", "colorous", "embedded-graphics", "indicatif", "plotters", "signal-hook"];
 
-/// Names of all packages that the library is built of, but for those of build scripts and tests.
+/// Names of all packages that the library links, without those of build scripts and tests.
 fn packages(features: &[&str]) -> Vec<String> {
     let tree = Command::new(env!("CARGO"))
         .args(["tree", "--offline", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}"])

@@ -1,5 +1,4 @@
-//! The source and the documents: layers, layouts, scenes of the repository, what the documents
-//! name.
+//! The source and the documents: layers, layouts, scenes of the repository, names in the documents.
 
 mod circles;
 mod documents;

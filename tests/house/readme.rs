@@ -1,5 +1,5 @@
-//! The README's two commands are what `.ci/run` and a newcomer run, and the tests that
-//! `docs/reliability.md` names are there.
+//! The README's two commands are those of `.ci/run` and work as written. The tests that
+//! `docs/reliability.md` names exist.
 
 const README: &str = include_str!("../../README.md");
 const CI: &str = include_str!("../../.ci/run");
@@ -36,7 +36,7 @@ fn ci_runs_the_readme_test_command() {
     assert!(!has(&CI.replace("cargo test", "cargo build")));
 }
 
-/// Tests that a text names as `file.rs::test`; `…` stands for the file before.
+/// Tests that a text names as `file.rs::test`; `…` stands for the previous file.
 fn named_tests(text: &str) -> Vec<(&str, &str)> {
     let mut file = "";
     let names = text.split('`').filter_map(|word| {
@@ -49,7 +49,7 @@ fn named_tests(text: &str) -> Vec<(&str, &str)> {
     names.collect()
 }
 
-/// Whether the file has that test; any, if the name is that of its module of tests.
+/// Whether the file has that test, or any test if the name is `tests`, its module.
 fn exists((file, name): (&str, &str)) -> bool {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let text = std::fs::read_to_string(path).unwrap_or_default();

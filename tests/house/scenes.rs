@@ -1,4 +1,4 @@
-//! The repository's scenes are what their generator writes, and can be rendered.
+//! The repository's scenes match their generator, and can be rendered.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -53,17 +53,18 @@ fn each_kind_of_light_has_its_scene() {
     assert!(sky.radiance(sun).x > 20.0 * sky.radiance(-sun.with_y(-sun.y)).x, "the sun is where it should be");
 }
 
-/// Edges of the water's triangles that do not have exactly one neighbour, running the other way.
+/// Number of edges of the water's triangles without exactly one neighbour in the opposite
+/// direction.
 fn open_edges(scene: &Scene) -> usize {
     let mut edges: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
     let is_glass = |i: u32| matches!(scene.materials[i as usize].surface, Surface::Glass { .. });
     for triangle in scene.triangles.iter().filter(|triangle| is_glass(triangle.material)) {
-        // Adding zero makes one zero of the two.
+        // Adding zero turns -0 into +0.
         let corners = triangle.positions.map(|p| (p + 0.0).to_array().map(f32::to_bits));
         for i in 0..3 {
             let edge = [corners[i], corners[(i + 1) % 3]];
             let (key, way) = if edge[0] < edge[1] { (edge, 1) } else { ([edge[1], edge[0]], -1) };
-            // Two triangles the same way would give 2, and a third one an odd number.
+            // Two triangles of one direction would give 2, and a third one an odd number.
             *edges.entry(key).or_default() += way;
         }
     }
@@ -77,11 +78,11 @@ fn the_water_is_a_closed_solid_with_its_outside_out() {
         scene.triangles.iter().filter(|t| scene.materials[t.material as usize].surface.is_delta()).collect();
     assert!(glass.len() >= 50_000, "{}", glass.len());
     assert!(glass.iter().all(|t| t.normals.iter().all(|n| n.dot(t.geometric_normal()) > 0.9)));
-    // The volume within is positive when the outside is out (divergence theorem).
+    // The enclosed volume is positive if the triangles face outwards (divergence theorem).
     let volume: f32 = glass.iter().map(|t| t.positions[0].dot(t.positions[1].cross(t.positions[2])) / 6.0).sum();
     assert!((volume / (2.0 * 2.0 * 0.24) - 1.0).abs() < 0.1, "{volume}");
     assert_eq!(open_edges(&scene), 0);
-    // Negative control: without one of its triangles it is open along three edges.
+    // Negative control: without one triangle three edges are open.
     let at = scene.triangles.len() - 1;
     scene.triangles.remove(at);
     assert_eq!(open_edges(&scene), 3);

@@ -1,13 +1,13 @@
-//! Names in shaders are not mangled: a function, struct or constant of one file must not have the
-//! name of another's.
+//! Names in shaders are not mangled: functions, structs and constants of different files need
+//! different names.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-/// Words that begin a declaration; variables with a binding belong to their kernel and are left
+/// Keywords that begin a declaration. Variables with a binding belong to their kernel and are left
 /// out.
 const DECLARATIONS: [&str; 5] = ["fn ", "struct ", "const ", "override ", "alias "];
 
-/// Names declared at top level, which rustfmt-like style puts at the start of a line.
+/// Names declared at top level. Their declarations start a line.
 fn declared(text: &str) -> impl Iterator<Item = &str> {
     let name = |line: &'_ str| DECLARATIONS.iter().find_map(|word| line.strip_prefix(word).map(str::len));
     text.lines().filter_map(move |line| {
@@ -16,7 +16,7 @@ fn declared(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Names that several files declare, with these files.
+/// Names that several files declare, with the files.
 fn duplicates<'a>(files: &[(String, &'a str)]) -> Vec<(&'a str, Vec<String>)> {
     let mut found = BTreeMap::<&str, Vec<String>>::new();
     for (file, text) in files {

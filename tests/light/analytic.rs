@@ -1,4 +1,4 @@
-//! Scenes whose light is known in closed form.
+//! Scenes with a closed-form solution.
 //!
 //! | test | closed form | negative control |
 //! |---|---|---|
@@ -26,7 +26,7 @@ use support::*;
 const ALBEDO: f64 = 0.6;
 const BOUNCES: u32 = 3;
 
-/// Sum of the powers of ρ that B surfaces make.
+/// Sum of the powers of ρ over B bounces.
 fn series(albedo: f64, bounces: u32) -> f64 {
     (1.0 - albedo.powi(bounces as i32)) / (1.0 - albedo)
 }
@@ -60,11 +60,11 @@ fn closed_sphere_has_the_radiance_of_the_series() {
         let short = estimate(10, Sampler::Random, BOUNCES - 1);
         assert!(short.z(right) > 4.0, "control: {mode:?}: {short:?} with a bounce less");
         for neighbors in [10, 100] {
-            // Independent photons: those of a Sobol sequence keep a distance, which makes the
-            // (k+1)-th lie farther by up to 1/(2k).
+            // Independent photons. Photons of a Sobol sequence keep a distance from each other,
+            // which makes the squared distance of the (k+1)-th larger by up to 1/(2k).
             let found = estimate(neighbors, Sampler::Random, BOUNCES);
             assert!(found.z(right) < 4.0, "{mode:?}, k = {neighbors}: {found:?} instead of {right}");
-            // The default sampler stays within what its photons' distances may cost.
+            // The default sampler stays within this bias.
             let least = right * (1.0 - 0.5 / f64::from(neighbors));
             let fits = |mean: f64| mean > 0.995 * least && mean < 1.005 * right;
             let spread = estimate(neighbors, Sampler::Sobol, BOUNCES).mean;
@@ -119,7 +119,7 @@ fn closed_box_stores_the_flux_of_the_series() {
         assert!(within(flux[channel], right, 0.01), "channel {channel}: {} instead of {right}", flux[channel]);
         assert!(!within(short[channel], right, 0.01), "control: channel {channel}: {} passes", short[channel]);
     }
-    // What is neither absorbed nor cut off would be missing: Σ over channels of stored · (1 − ρ) +
+    // Energy balance: Σ over channels of stored · (1 − ρ) +
     // lost = Φ.
     let absorbed: f64 = (0..3).map(|c| flux[c] * (1.0 - f64::from(albedo[c]))).sum::<f64>() / 3.0;
     assert!(within(absorbed + traced.lost, power, 0.01), "{absorbed} + {} instead of {power}", traced.lost);

@@ -1,9 +1,9 @@
-//! The estimate where the surface around a point is no whole flat disc, against closed forms.
+//! The estimate where the surface around a point is not a full flat disc, against closed forms.
 //!
-//! | place | negative control |
+//! | surface | negative control |
 //! |---|---|
 //! | box corner, table edge, both sides of a thin wall, small spheres | the raw estimate, rejection alone, correction alone |
-//! | a ball that touches a floor, under few photons: against many | k = 2; light a tenth stronger |
+//! | a ball that touches a floor: few photons against many | k = 2; light 10 % stronger |
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ fn rejection_and_correction_are_right_together_and_wrong_alone() {
     }
 }
 
-/// What is amiss with the light of a picture, if another one is right.
+/// Difference of a picture's mean and maximum from a reference picture, if it is too large.
 fn amiss(found: &Render, right: &Render) -> Option<String> {
     let largest = |r: &Render| r.frame.radiance().iter().flatten().copied().fold(0.0, f32::max);
     let ratios = [mean(found) / mean(right), f64::from(largest(found) / largest(right))];

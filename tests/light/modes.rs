@@ -5,8 +5,8 @@
 //! | sum | mode 0 = mode 2 + mode 4, to rounding | mode 3 in place of 4 |
 //! | limit | means of modes 0 and 1 agree at 4 sigma over seeds | mode 1 without the weakest lamp, 1 % of the light |
 //! | smooth ball | modes 0 and 1 agree on a coarse smooth-shaded ball | flat-shaded ball |
-//! | final gathering | the same mean as without, whether emission is aimed or not | a lamp less; another mode |
-//! | full map | a map full at 1 % of the paths gives the same mean | a lamp less |
+//! | final gathering | the same mean as without, whether emission is aimed or not | one lamp fewer; another mode |
+//! | full map | a map full at 1 % of the paths gives the same mean | one lamp fewer |
 
 use caustica::{
     progress::Silent,
@@ -30,7 +30,7 @@ fn room() -> Scene {
     scene
 }
 
-/// The room with one of its lamps out.
+/// The room without one of its lamps.
 fn without_lamp(lamp: usize) -> Scene {
     let mut scene = room();
     scene.lights.remove(lamp);
@@ -95,7 +95,7 @@ fn final_gathering_has_the_mean_of_the_estimate() {
 #[test]
 fn hybrid_and_photons_agree_in_the_limit() {
     const SEEDS: u32 = 6;
-    // Independent photons: those of a Sobol sequence are estimated up to 1/(2k) darker.
+    // Independent photons. Estimates over photons of a Sobol sequence are up to 1/(2k) darker.
     let picture = |scene: &Scene, mode, seed| {
         let settings = settings(mode, 50_000, 32).with(|s| {
             s.photons.seed = seed;
@@ -104,7 +104,7 @@ fn hybrid_and_photons_agree_in_the_limit() {
         mean(&render_scene(scene, &settings))
     };
     let hybrid: Vec<f64> = (0..SEEDS).map(|seed| picture(&room(), Mode::Hybrid, seed)).collect();
-    // Both modes follow the same paths, so that most of the noise is in both.
+    // Both modes trace the same paths, so that most of their noise is the same.
     let ratio =
         |scene: &Scene| Estimate::over_seeds(SEEDS, |seed| picture(scene, Mode::Photons, seed) / hybrid[seed as usize]);
     let same = ratio(&room());
@@ -144,8 +144,8 @@ fn modes_agree_on_a_smooth_shaded_ball() {
         let settings = settings(mode, 100_000, 40).with(|s| s.estimate.neighbors = 150);
         render_scene(&coarse_ball(smooth), &settings)
     };
-    // Means over blocks of 4 x 4 pixels, against noise; away from the shadow's edge, where the disc
-    // of the estimate leaves the lit surface.
+    // Means over blocks of 4 x 4 pixels reduce noise. Pixels at the shadow's edge are left out:
+    // there the disc of the estimate extends beyond the lit surface.
     let blocks = |render: &Render| -> Vec<f64> {
         let block = |b: usize| {
             let pixels = (0..16).map(|i| ((b / 10) * 4 + i / 4) * 40 + (b % 10) * 4 + i % 4);
@@ -176,7 +176,7 @@ fn a_full_map_is_normalised_by_its_own_paths() {
             s.photons.max_paths = Some(500_000);
             s.estimate.neighbors = 50;
             s.lights.sampling = light_sampling;
-            // Over few photons sharing costs two per cent of the light of so small a picture.
+            // With few photons, sharing of estimates loses 2 % of the light of so small a picture.
             s.estimate.share_reach = 0.0;
         });
         let full = render_scene(&scene, &small);

@@ -1,18 +1,17 @@
-//! Camera samples: how they are distributed, through which lens they look, and what of the light
-//! they share.
+//! Camera samples: distribution, lens, and shared estimates.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
-//! | sampler | every prefix of a Sobol set is fair and spread: each 2^n-th of an axis has its share | independent numbers are fair and not spread |
-//! | pairs | two dimensions of a Sobol set are spread together, in rectangles of every shape | independent numbers are not |
+//! | sampler | every prefix of a Sobol set is uniform and stratified: each 2^n-th of an axis has its fraction | independent numbers are uniform and not stratified |
+//! | pairs | two dimensions of a Sobol set are stratified together, in rectangles of every shape | independent numbers are not |
 //! | matrices | columns of the third and fourth dimension are those of the recurrences | the next column is not |
 //! | gain | integrals by Sobol sets err far less than by independent numbers | two sets of independent numbers err alike |
 //! | filters | offsets have the filter's moments and distribution, the mean of a picture stays | another filter's distribution |
-//! | lens | circles of confusion have the closed form's size | the sharp plane has none |
+//! | lens | circles of confusion have the closed form's size | the plane in focus has none |
 //! | parallel | an orthographic camera shows true sizes at every distance | a perspective one does not |
-//! | crop | a part of a picture has the whole's bits | a part one pixel farther has not |
-//! | sharing | shared estimates err like estimates for every sample | other photons change more; half the photons err more |
-//! | borders | shared estimates go on across the borders of tiles | a right half of other photons does not |
+//! | crop | a crop has the bits of the whole picture | a crop shifted by one pixel has not |
+//! | sharing | shared estimates have the error of estimates for every sample | other photons change more; half the photons err more |
+//! | borders | shared estimates are continuous across the borders of tiles | a right half with other photons is not |
 
 use std::path::Path;
 
@@ -41,12 +40,12 @@ fn plane(z: f32) -> Scene {
     scene
 }
 
-/// Looks from the origin along -z and sees `ymag` metres up and down, at every distance.
+/// Orthographic camera at the origin along -z that sees `ymag` metres up and down.
 fn parallel_camera(ymag: f32) -> Camera {
     Camera { projection: Projection::Orthographic { ymag }, ..camera(Vec3::ZERO, Vec3::NEG_Z, 40.0) }
 }
 
-/// Pixel and position of what the samples of a picture of `size` see.
+/// Pixel and visible point of each sample of a picture of `size`.
 fn visible(scene: &Scene, camera: &Camera, size: u32, settings: &Settings) -> Vec<((u32, u32), Vec3)> {
     let buffers = SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &settings.lights).expect("the scene fits");
     let tracer = CameraTracer::new(
@@ -119,12 +118,12 @@ fn every_prefix_is_fair_and_spread() {
             }
         }
     }
-    // A further seed is another set: the scrambling is no fixed table.
+    // Another seed gives another set: the scrambling is not a fixed table.
     assert_ne!(sobol, set(Sampler::Sobol, 1000, 6));
 }
 
-/// Over 256 places the first two dimensions have one point in each of 256 equal rectangles,
-/// whatever their shape.
+/// The first 256 points of the first two dimensions have one point in each of 256 equal rectangles
+/// of any shape.
 #[test]
 fn two_dimensions_are_spread_together() {
     let spread = |points: &[DVec2]| {
@@ -145,7 +144,7 @@ fn two_dimensions_are_spread_together() {
 }
 
 /// Columns of the matrices of x² + x + 1 and x³ + x + 1, 32 bits each, by the recurrences of Joe
-/// and Kuo 2008 from their first numbers.
+/// and Kuo 2008 from their initial numbers.
 fn sobol_columns() -> Vec<[u32; 2]> {
     let mut columns = vec![[0x8000_0000, 0x8000_0000], [0xc000_0000, 0xc000_0000], [0x6000_0000, 0x2000_0000]];
     for i in 3..32 {
@@ -170,8 +169,8 @@ fn matrices_follow_from_their_polynomials() {
 
 #[test]
 fn sobol_sets_integrate_better() {
-    // Mean square error of the area of a disc and of a smooth function over 16 seeds and a prefix
-    // that is no power of two.
+    // Mean squared error of the area of a disc and of the integral of a smooth function, over 16
+    // seeds and with a number of points that is not a power of two.
     let error = |sampler: Sampler, first_seed: u32| {
         let one = |seed| {
             let points = set(sampler, 200, seed);
@@ -197,7 +196,7 @@ fn samples_follow_the_pixel_filter() {
             s.picture.spp = 4096;
         }))
     });
-    // Chi-square over 12 parts of one axis, of what lies inside the filter.
+    // Chi-square over 12 intervals of one axis, for the offsets inside the filter.
     let chi_square = |points: &[DVec2], filter: PixelFilter, axis: usize| {
         let (radius, steps) = (filter.radius(), 1200);
         let at = |i: usize| -radius + (i as f64 + 0.5) * 2.0 * radius / f64::from(steps);
@@ -219,7 +218,7 @@ fn samples_follow_the_pixel_filter() {
             assert!(other > 37.4, "control: {filter:?} passes for another filter, chi-square {other}");
         }
     }
-    // One sample by the box is the pixel's centre, by others it is not.
+    // A single sample lies at the pixel's centre with the box filter, and not with others.
     assert_eq!(offsets(&Settings::default().with(|s| s.picture.spp = 1)), [DVec2::ZERO]);
     let one = Settings::default().with(|s| {
         s.picture.spp = 1;
@@ -258,8 +257,8 @@ fn circles_of_confusion_have_the_closed_form_s_size() {
         s.picture.focus = Some(focus);
         s.picture.spp = 1024;
     });
-    // Points of the plane seen by the one pixel of a narrow picture, about its centre: a disc,
-    // blurred by the pixel.
+    // Points of the plane that the one pixel of a narrow picture sees, relative to their centre: a
+    // disc, blurred by the pixel.
     let spread = |distance: f32| {
         let points = visible(&plane(-distance), &eye, 1, &lens);
         let squares = points.iter().map(|(_, p)| p.truncate().length_squared());
@@ -300,7 +299,7 @@ fn parallel_rays_show_true_sizes() {
     assert!(pixels(&perspective, 2.0) > 3 * pixels(&perspective, 7.0), "control: distance does not matter");
 }
 
-/// A room with glass and two kinds of photons.
+/// A room with glass, so that both maps hold photons.
 fn room() -> Scene {
     let mut scene = scene(&[diffuse(0.6), glass()]);
     add_box(&mut scene, Vec3::splat(-1.0), Vec3::splat(1.0), 0);
@@ -366,7 +365,7 @@ fn shared_estimates_err_like_those_of_every_sample() {
     assert!(error(&shared) < 1.03 * error(&own), "{} against {}", error(&shared), error(&own));
     let sum = |picture: &[[f32; 3]]| picture.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
     assert!((sum(&shared) / sum(&own) - 1.0).abs() < 0.004, "mean {}", sum(&shared) / sum(&own));
-    // What sharing changes is less than what other photons change, and it changes something.
+    // The change by sharing is not zero, and less than the change by other photons.
     let change = rel_mse(&shared, &own, None);
     let other = rel_mse(&picture(&base.clone().with(|s| s.photons.seed = 1), 0.0), &own, None);
     assert!(change > 0.0 && change < 0.5 * other, "{change} against {other}");
@@ -375,8 +374,8 @@ fn shared_estimates_err_like_those_of_every_sample() {
     assert!(error(&few) > 1.03 * error(&own), "control: half the photons err as little");
 }
 
-/// Largest change from one column of a picture to the next, root mean square over the rows of the
-/// back wall, over the median of all columns there: at the borders of tiles, every `side` pixels.
+/// Largest change between adjacent columns at the borders of tiles, every `side` pixels, divided by
+/// the median over all columns. A change is a root mean square over the rows of the back wall.
 fn step_at_borders(radiance: &[[f32; 3]], width: usize, side: usize) -> f64 {
     let (rows, columns) = (width / 5..2 * width / 5, width / 5..4 * width / 5);
     let light = |x: usize, y: usize| f64::from(Vec3::from(radiance[y * width + x]).element_sum()).ln();
@@ -395,7 +394,7 @@ fn shared_estimates_go_on_across_the_borders_of_tiles() {
     let mut radiance = render_scene(&scene, &asked).frame.radiance().to_vec();
     let step = step_at_borders(&radiance, 256, 128);
     assert!(step < 2.0, "light changes {step} times as much where tiles meet as elsewhere");
-    // Control: tiles that do not share with each other, for their photons are not the same.
+    // Control: tiles that cannot share, because their photons differ.
     let other = render_scene(&scene, &asked.clone().with(|s| s.photons.seed = 1)).frame.radiance().to_vec();
     for (row, other) in radiance.chunks_mut(256).zip(other.chunks(256)) {
         row[128..].copy_from_slice(&other[128..]);

@@ -17,7 +17,7 @@ use caustica::{
 };
 use support::*;
 
-/// relMSE and relative error of the mean of a default render against the reference of the same
+/// relMSE, and relative error of the mean, of a default render against the reference of the same
 /// name.
 fn errors(name: &str, other: &str, size: u32, most: f64) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");

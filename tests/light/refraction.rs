@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | ball in glass | the radiance of a diffuse ball inside a glass ball, by photons alone | in denser glass |
 //! | slab, camera | a ray through a slab is shifted by d sin(i) (1 − cos i / (n cos t)) | no glass |
-//! | slab, photons | flux through a slab is 1 − 2F/(1 + F) of what falls on it | as of the pane |
+//! | slab, photons | a slab transmits the fraction 1 − 2F/(1 + F) of the incident flux | as of the pane |
 //! | pane | the same reflectance for a thin pane | a denser one |
 //! | air bubble | an ior-1 sphere in glass deflects like a hole | solid glass |
 
@@ -25,8 +25,7 @@ fn fresnel(cos_i: f64, n: f64) -> f64 {
     (s * s + p * p) / 2.0
 }
 
-/// A floor whose colour changes from black to white at x = 0, seen straight down from an oblique
-/// camera.
+/// A floor that is black for x < 0 and white for x > 0, below a slab if there is one.
 fn edge_scene(slab: Option<Surface>) -> Scene {
     let mut scene = scene(&[diffuse(0.0), diffuse(1.0), slab.unwrap_or(glass())]);
     add_quad(&mut scene, vec3(-9.0, 0.0, 9.0), vec3(9.0, 0.0, 0.0), vec3(0.0, 0.0, -18.0), 0);
@@ -43,7 +42,8 @@ fn edge_height(scene: &Scene) -> f64 {
     let settings = settings(Mode::DirectRays, 1000, 128).with(|s| s.picture.spp = 16);
     let frame = render_scene(scene, &settings).frame;
     let column: Vec<f32> = frame.radiance().iter().skip(64).step_by(128).map(|p| p[0]).collect();
-    // The white part has about 1; stray reflections in the glass brighten the black one a little.
+    // The white part has a radiance of about 1. Stray reflections in the glass brighten the black
+    // part a little.
     let dark = 0.2;
     column.iter().filter(|p| **p < dark).count() as f64 / 128.0
 }
@@ -151,9 +151,9 @@ fn an_air_bubble_is_a_closed_surface_of_ior_one() {
         let settings = settings(Mode::DirectRays, 1000, 8).with(|s| s.picture.spp = 16);
         mean(&render_scene(&scene, &settings))
     };
-    // A bubble spreads the view away from the axis, a ball of the slab's own index leaves it: both
-    // see white, farther from the light and nearer to it. A denser ball turns the view over: black,
-    // but for stray reflections.
+    // A bubble refracts the view away from the axis, and a ball of the slab's own index does not
+    // change it: both see white, farther from the light and nearer to it. A denser ball inverts the
+    // view: black, but for stray reflections.
     let (bubble, same, denser) = (through(1.0), through(1.5), through(3.0));
     assert!(bubble > 0.001 && bubble < 0.5 * same, "bubble {bubble}, same index {same}");
     assert!(denser < 0.1 * same, "control: a denser ball gives {denser}, the same index {same}");

@@ -1,4 +1,4 @@
-//! Inputs that fuzzing found or started from, read again.
+//! Replay of the fuzzing corpus: seeds and inputs that fuzzing found.
 
 use std::{fs, path::Path};
 
@@ -6,10 +6,10 @@ use support::{any_environment, any_scene};
 
 use super::memory::peak;
 
-/// What the files of a corpus may take to read, whatever they claim.
+/// Maximum memory for reading a file of a corpus, whatever sizes it claims.
 const MOST_BYTES: i64 = 200 << 20;
 
-/// Gives each file of a corpus to `check`; returns how many were read and how many were refused.
+/// Passes each file of a corpus to `check`. Returns the numbers of accepted and of refused files.
 fn replay<T>(corpus: &str, check: impl Fn(&[u8]) -> Result<T, String>) -> (usize, usize) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(corpus);
     let mut paths: Vec<_> = fs::read_dir(folder).expect("can be listed").map(|e| e.expect("an entry").path()).collect();

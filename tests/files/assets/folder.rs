@@ -1,8 +1,8 @@
-//! The folder of public assets that `CAUSTICA_ASSETS` names: `assets.json` in it says what is to
-//! come of each file.
+//! The folder of public assets that `CAUSTICA_ASSETS` names. Its `assets.json` lists the expected
+//! outcome of each file.
 //!
-//! Without the variable there is nothing to try, which is said. `CAUSTICA_ASSETS_BYTES` leaves out
-//! scenes whose folder is larger, where time is short.
+//! Without the variable the test prints that it has nothing to do. `CAUSTICA_ASSETS_BYTES` is a
+//! maximum size of a scene's folder, bytes; larger ones are skipped to save time.
 
 use std::{
     fs,
@@ -18,16 +18,16 @@ use serde_json::Value;
 
 use super::{Ended, render_with_command};
 
-/// What the README of the assets asks for.
+/// Expected outcome by the README of the assets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Expected {
     /// A picture.
     Render,
-    /// It is read, and nothing in it can be drawn.
+    /// The file loads, but holds nothing to draw.
     Empty,
     /// Exit code 1 and one line.
     Refuse,
-    /// One of the two.
+    /// A picture or a refusal.
     Either,
 }
 
@@ -47,8 +47,8 @@ fn text<'a>(asset: &'a Value, key: &str) -> &'a str {
 }
 
 fn expected(asset: &Value) -> Expected {
-    // Draco's is a required extension that a renderer may lack; the two of Compatibility are said
-    // in words only.
+    // Draco is a required extension that a renderer may lack. The two files of Compatibility have
+    // their outcome in prose only.
     match text(asset, "id") {
         "DracoSparseMesh" | "handmade__png_bomb_30000x30000" => return Expected::Either,
         "AG/Compatibility_04" | "AG/Compatibility_05" => return Expected::Refuse,
@@ -62,7 +62,7 @@ fn expected(asset: &Value) -> Expected {
     }
 }
 
-/// Bytes of all files beside the scene.
+/// Size of all files in the scene's folder, bytes.
 fn size_with_neighbours(path: &Path) -> u64 {
     let entries = fs::read_dir(path.parent().expect("a folder")).expect("can be listed");
     entries.map(|entry| entry.expect("an entry").metadata().expect("its size").len()).sum()
@@ -75,7 +75,7 @@ fn load(path: &Path) -> Result<Scene, String> {
     Ok(scene)
 }
 
-/// Renders in this process; says what is wrong with the picture.
+/// Renders in this process. Returns what is wrong with the picture.
 fn render(path: &Path) -> Result<(), String> {
     let scene = load(path)?;
     let settings = support::settings(Mode::Hybrid, 500, 16).with(|s| s.estimate.neighbors = 10);
@@ -91,7 +91,7 @@ fn render(path: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// What the command makes of a file that may be refused; `true` if it is.
+/// Runs the command on a file that may be refused. Returns whether it was.
 fn refused_or_rendered(path: &Path) -> Result<bool, String> {
     let ended: Ended = render_with_command(path);
     if ended.code == Some(0) && ended.wrote {
@@ -149,7 +149,7 @@ fn every_environment_is_read_or_refused() {
     assert!(images.len() >= 10, "{}", images.len());
     for image in images {
         let path = folder.join(text(image, "file"));
-        // The damaged ones have names that no reader would open by.
+        // Damaged files are named without an extension.
         let damaged = path.extension().is_none();
         match Environment::load(&path, 1.0, 0.0) {
             Ok(map) => {

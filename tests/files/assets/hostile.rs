@@ -1,5 +1,4 @@
-//! Small files with a fault each, and the exact words of their refusal:
-//! `tests/hostile/messages.txt`.
+//! Small files with one fault each. `tests/hostile/messages.txt` holds the exact error messages.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
@@ -7,14 +6,14 @@ use caustica::scene::Scene;
 
 use super::{memory::peak, render_with_command};
 
-/// Words of the table for a file that is read.
+/// Entry of the table for a file that loads.
 const LOADS: &str = "loads";
 
 fn folder() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hostile")
 }
 
-/// The file's line of the table as it should be now, after the file's name.
+/// Current entry of the file in the table, without the file's name.
 fn now(path: &Path) -> String {
     let (most, scene) = peak(|| {
         let mut scene = Scene::load(path)?;

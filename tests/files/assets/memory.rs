@@ -1,4 +1,4 @@
-//! Counts what a thread allocates, so that a reader's hunger is a number and not a matter of the
+//! Counts the bytes that a thread allocates, so that a reader's memory use does not depend on the
 //! machine.
 
 use std::{
@@ -17,7 +17,7 @@ struct Counting;
 static COUNTING: Counting = Counting;
 
 fn count(change: i64) {
-    // A thread that is ending has no counter any more, and no one who asks for it.
+    // A thread that is ending has lost its counter, which nobody reads any more.
     let _ = NOW.try_with(|now| {
         now.set(now.get() + change);
         let _ = MOST.try_with(|most| most.set(most.get().max(now.get())));
@@ -25,7 +25,7 @@ fn count(change: i64) {
 }
 
 #[allow(unsafe_code)]
-// SAFETY: all is left to the system's allocator; counting allocates nothing.
+// SAFETY: all calls go to the system's allocator; counting allocates nothing.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size() as i64);
@@ -43,7 +43,8 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Most bytes that `work` held at once on this thread beyond those before it, and its result.
+/// Peak of the bytes that `work` holds at once on this thread, beyond those held before, and its
+/// result.
 pub fn peak<T>(work: impl FnOnce() -> T) -> (i64, T) {
     let before = NOW.get();
     MOST.set(before);

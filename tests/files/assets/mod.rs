@@ -1,4 +1,4 @@
-//! Files made by others, and files made to do harm: each is rendered, or refused in one line.
+//! Third-party and hostile files: each is rendered, or refused in one line.
 
 mod corpus;
 mod folder;
@@ -7,7 +7,7 @@ mod memory;
 
 use std::{fs, path::Path, process::Command};
 
-/// What the command left behind.
+/// Outcome of a run of the command.
 struct Ended {
     code: Option<i32>,
     stderr: String,
@@ -31,8 +31,7 @@ fn render_with_command(scene: &Path) -> Ended {
 }
 
 impl Ended {
-    /// The one line with which it was refused, without the place of the file; what else happened,
-    /// as an error.
+    /// The one line of the refusal, without the file's folder. Any other outcome is an error.
     fn refusal(&self, scene: &Path) -> Result<String, String> {
         let line = self.stderr.strip_suffix('\n').unwrap_or(&self.stderr);
         match line.strip_prefix("error: ") {

@@ -1,4 +1,4 @@
-//! Shapes and places that leave rounding no room.
+//! Geometry on which rounding errors would show.
 
 use caustica::{
     scene::{Light, LightKind, Scene, Triangle},
@@ -11,13 +11,13 @@ use support::*;
 
 use super::is_finite;
 
-/// For each ray, whether it hits something.
+/// Whether each ray hits something.
 fn hits(scene: &Scene, asked: &[(Vec3, Vec3)]) -> Vec<bool> {
     rays::trace(scene, &[], asked).1.iter().map(|hit| hit.alpha > 0.0).collect()
 }
 
-/// A closed mesh about the origin: a cube's lattice, pushed out to a dented sphere; neighbours
-/// share their corners' bits.
+/// A closed mesh about the origin: the grid of a cube, projected to a dented sphere. Neighbours
+/// share the bits of their corners.
 fn dented_sphere() -> Scene {
     const SIDE: i32 = 8;
     let mut scene = scene(&[diffuse(0.5)]);
@@ -64,7 +64,7 @@ fn no_ray_slips_between_triangles() {
 
 #[test]
 fn a_quad_shows_no_diagonal() {
-    // Quads that stand askew, each seen straight on over a third of a millimetre around its
+    // Rotated quads, each seen at normal incidence over a third of a millimetre around its
     // diagonal.
     let covered = |gap: f32| {
         let mut alpha = 0.0;
@@ -104,7 +104,7 @@ fn quick(mode: Mode) -> Settings {
 fn degenerate_triangles_leave_no_trace() {
     let with = |shapes: &[[Vec3; 3]], mode: Mode| {
         let mut scene = room();
-        // Turned, so that rounding leaves collinear points not quite collinear.
+        // Rotated, so that rounding leaves collinear points not quite collinear.
         let turn = Quat::from_euler(glam::EulerRot::XYZ, 0.7, 0.3, 1.1);
         for shape in shapes {
             let positions = shape.map(|p| turn * p);
@@ -129,7 +129,7 @@ fn degenerate_triangles_leave_no_trace() {
     let clear = with(&[], Mode::DirectRays);
     assert!(with(&degenerate, Mode::DirectRays) == clear, "they show");
     assert!(with(&[[-x, x, y]], Mode::DirectRays) != clear, "control: a real triangle does not show");
-    // Photons are aimed at all glass, also at that without area: others, but none that is not
+    // Photons are aimed at all glass, also at glass without area. The photons differ, but all are
     // finite.
     with(&degenerate, Mode::IndirectPhotons);
 }
@@ -147,7 +147,8 @@ fn of_coincident_quads_always_one_is_seen() {
         let frame = render_scene(&scene, &settings(Mode::DirectRays, 1000, 24)).frame;
         frame.albedo().iter().map(|albedo| albedo[0]).collect::<Vec<_>>()
     };
-    // From anywhere each half of the quad is of one colour: at most the diagonal parts two.
+    // From any point each half of the quad has one colour: a row changes colour at the diagonal
+    // only.
     for eye in [vec3(0.3, 2.0, 0.4), vec3(-1.0, 1.5, 1.0), vec3(0.2, 3.0, -0.4)] {
         let both = seen(&[0, 1], eye);
         let changes = |row: &[f32]| row.windows(2).filter(|pair| pair[0] != pair[1]).count();
@@ -206,7 +207,7 @@ fn lights_on_surfaces_and_along_walls_are_harmless() {
     for light in lights {
         let mut scene = room();
         if light.kind == LightKind::Directional {
-            // The walls across it would keep it out.
+            // The walls across the light's direction would block it.
             scene.triangles.retain(|t| t.normals[0].x.abs() < 0.5);
         }
         scene.triangles.iter_mut().for_each(|t| t.positions = t.positions.map(|p| turn * p));
@@ -218,7 +219,7 @@ fn lights_on_surfaces_and_along_walls_are_harmless() {
             let render = render_scene(&scene, &quick(mode).with(|s| s.estimate.raw = true));
             assert!(is_finite(&render) && render.stats.non_finite == NonFinite::default(), "{kind:?} in {mode:?}");
             let most = render.frame.radiance().iter().map(|p| f64::from(p[0])).fold(0.0, f64::max);
-            // Photons that a light leaves where it stands would be a spot without end.
+            // Photons stored at the light's own position would give an unbounded bright spot.
             assert!(
                 (mean(&render) > 1e-4 || mode == Mode::DirectRays) && most < 100.0 * mean(&render).max(1e-4),
                 "{kind:?} in {mode:?}: up to {most}"
@@ -227,7 +228,7 @@ fn lights_on_surfaces_and_along_walls_are_harmless() {
     }
 }
 
-/// The room made larger; with the light's power along, its radiance stays.
+/// The scaled room. Its radiance stays the same if the light's power scales with the area.
 fn scaled(factor: f32, light: f32) -> Scene {
     let mut scene = room();
     scene.triangles.iter_mut().for_each(|t| t.positions = t.positions.map(|p| factor * p));
@@ -246,8 +247,7 @@ fn size_does_not_matter() {
         let other = render_scene(&scaled(factor, factor * factor), &raw).frame.radiance().to_vec();
         assert!(other == one, "another picture at 2^{exponent}");
     }
-    // 7 mm and 10 km wide; what is drawn by chance around each estimate depends on the places'
-    // bits.
+    // 7 mm and 10 km wide. The random numbers of each estimate depend on the bits of its position.
     let right = mean(&render_scene(&room(), &quick(Mode::Hybrid)));
     for factor in [0.0035, 5000.0] {
         let of = |light| render_scene(&scaled(factor, light), &quick(Mode::Hybrid));
@@ -277,8 +277,7 @@ fn a_thousand_kilometres_away_all_looks_the_same() {
     let mut file = moved(serde_json::json!([0, 1, 2]), [FAR, -FAR, FAR]);
     file["scenes"][0]["nodes"] = serde_json::json!([3]);
     assert!(picture(&file).0 == right, "moved by its node");
-    // In the vertices themselves only what f32 keeps of them is there: the sixteenth part of a
-    // metre.
+    // The vertices themselves have the resolution of f32 there: 1/16 m.
     let mut file = moved(serde_json::json!([1, 2]), [FAR, 0.0, 0.0]);
     file["scenes"][0]["nodes"] = serde_json::json!([0, 3]);
     let vertices = [[FAR, 0.0, 0.0], [FAR + 1.04, 0.0, 0.0], [FAR, 1.0, 0.0]];

@@ -1,4 +1,4 @@
-//! What paths start in.
+//! Media in which paths start.
 
 use std::f64::consts::PI;
 
@@ -14,8 +14,8 @@ use support::*;
 
 use super::{flux, traced};
 
-/// Water in a shell of flint glass: indices and radii, metres; and how far from the middle paths
-/// start.
+/// Water in a shell of flint glass: indices and radii, metres; and the distance of the paths'
+/// origin from the centre.
 const WATER: f64 = 1.33;
 const FLINT: f64 = 1.7;
 const BOUNDS: [f32; 2] = [1.0, 1.05];
@@ -30,8 +30,8 @@ fn ball_in_shell(water: f64) -> Scene {
 }
 
 /// Sine of the largest angle to the radius at which a ray that starts in the water, `ASIDE` from
-/// the middle, gets out. By Bouguer's invariant n r sin θ is the same in all layers; a ray gets out
-/// where it is below n r outside of each.
+/// the centre, leaves. By Bouguer's invariant n r sin θ is the same in all layers; a ray leaves if
+/// it is below n r outside of each.
 fn critical_sine() -> f64 {
     f64::from(BOUNDS[1]) / (WATER * f64::from(ASIDE))
 }
@@ -45,7 +45,8 @@ fn a_camera_in_nested_glass_sees_as_from_inside() {
     assert!(wrong > 100, "control: of glass of 1.5 only {wrong} pixels are wrong");
 }
 
-/// What is seen from inside of a ball of such glass, against what is seen from inside of water.
+/// Numbers of bright, of dark and of wrong pixels: the view from inside of a ball of this glass,
+/// against the closed form for water.
 fn bright_dark_and_wrong_pixels(ior: f64) -> [usize; 3] {
     const SIZE: usize = 24;
     let mut scene = ball_in_shell(ior);
@@ -54,15 +55,15 @@ fn bright_dark_and_wrong_pixels(ior: f64) -> [usize; 3] {
     let half = 50.0_f32.to_radians().tan();
     scene.cameras.push(view.clone());
     let render = render_scene(&scene, &settings(Mode::DirectRays, 1000, SIZE as u32));
-    // In a uniform field radiance over n² is the same everywhere: all that is not trapped brings n²
-    // L.
+    // In a uniform field radiance over n² is the same everywhere: each direction that is not
+    // trapped has the radiance n² L.
     let (inside, outside) = (WATER * WATER * 2.0, 0.0);
     let (mut bright, mut dark, mut wrong) = (0, 0, 0);
     for (i, pixel) in render.frame.radiance().iter().enumerate() {
         let at = |i: usize| (2.0 * (i as f32 + 0.5) / SIZE as f32 - 1.0) * half;
         let direction = (view.forward + at(i % SIZE) * view.right - at(i / SIZE) * view.up).normalize();
         let sine = f64::from(direction.cross(Vec3::X).length());
-        // At the border itself most is reflected, and the bounce limit takes it.
+        // Near the critical angle most light is reflected until the bounce limit ends it.
         if (sine - critical_sine()).abs() > 0.02 {
             let gets_out = sine < critical_sine();
             let right = if gets_out { inside } else { outside };
@@ -104,8 +105,8 @@ fn emitters_start_in_what_is_around_them() {
     scene.spheres.push(sphere(vec3(0.4, 0.0, 0.0), 0.1, bulb));
     scene.spheres.push(sphere(vec3(5.0, 0.0, 0.0), 0.1, bulb));
     scene.spheres.push(sphere(vec3(-0.6, 0.0, 0.0), 0.2, glowing));
-    // On the outside of the box's left face, a triangle's own rounding away from it: glass behind
-    // it, air before it.
+    // On the outside of the box's left face, one rounding error away from it: glass behind it, air
+    // before it.
     add_quad(&mut scene, vec3(-1.0, -0.2, -0.2), Vec3::Z * 0.4, Vec3::Y * 0.4, panel);
     scene.lights.push(point_light(vec3(0.4, 0.3, 0.0), 1.0));
     let buffers =
@@ -115,8 +116,8 @@ fn emitters_start_in_what_is_around_them() {
     // Media are numbered in the order of the materials that bound them: box, ball, glowing glass.
     let (none, water, glow) = ([0; 4], [1, 2, 0, 0], [1, 3, 0, 0]);
     let glass = [1, 0, 0, 0];
-    // The point light, the bulbs, the panel's two triangles, and glass that shines both ways; a
-    // bulb's inside is never left.
+    // The point light, the bulbs, the panel's two triangles, and glass that emits on both sides. No
+    // path leaves from a bulb's inside.
     let fronts: Vec<_> = found.iter().map(|(front, _)| *front).collect();
     assert_eq!(fronts, [water, water, none, none, none, glass]);
     let backs: Vec<_> = found[3..].iter().map(|(_, back)| *back).collect();
@@ -141,8 +142,8 @@ fn what_lies_in_the_same_glass_is_lit_by_rays_and_photons_alike() {
 
 #[test]
 fn rays_of_final_gathering_start_in_what_is_around_them() {
-    // A floor in a block of water in one of flint, in a room that is lit beside them: light comes
-    // in over the walls.
+    // A floor in a block of water inside a block of flint, in a room with a light beside them:
+    // light reaches it by way of the walls.
     let of = |ior: f64| Surface::Glass { ior: ior as f32, tint: Vec3::ONE };
     let mut scene = scene(&[of(FLINT), of(WATER), diffuse(0.8)]);
     add_box(&mut scene, Vec3::splat(-0.6), Vec3::splat(0.6), 0);

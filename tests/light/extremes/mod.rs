@@ -1,11 +1,10 @@
-//! Numbers and scenes at the edge of what can be computed, or beyond it: a finite picture all the
-//! same.
+//! Numbers and scenes at the limits of single precision, or beyond: the picture stays finite.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | media: camera | from inside of nested glass, radiance n² L and total reflection as Bouguer's invariant says | other glass |
-//! | media: light | from inside of nested glass the power leaves that is not trapped | nearer to the middle |
-//! | media: emitters | bulbs, panels and glass that shines start in what is around them | a bulb beside the glass |
+//! | media: light | from inside of nested glass all power leaves that is not trapped | nearer to the centre |
+//! | media: emitters | paths from bulbs, panels and emissive glass start in the medium around them | a bulb beside the glass |
 //! | media: final gathering | in nested glass it gives what the map holds there | half the light |
 //! | media: shared | object, light and camera in the same glass: rays and photons agree | half the light |
 //! | numbers: overflow | lights of 3e38: numbers out of range are counted by stage, the film is finite | an ordinary light counts none |
@@ -47,7 +46,7 @@ fn flux(map: &RawMap) -> f64 {
     photons.iter().map(|photon| f64::from(photon.flux[0])).sum::<f64>() / map.emitted as f64
 }
 
-/// All numbers of the picture are finite.
+/// Whether all numbers of the picture are finite.
 fn is_finite(render: &Render) -> bool {
     let frame = &render.frame;
     let mut triples = frame.radiance().iter().chain(frame.normal()).chain(frame.albedo()).flatten();

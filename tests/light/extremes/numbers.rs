@@ -12,7 +12,7 @@ use support::*;
 
 use super::{flux, is_finite, traced};
 
-/// A room with a glass ball, a point light, and a panel that shines.
+/// A room with a glass ball, a point light, and an emissive panel.
 fn room(intensity: f32, radiance: f32) -> Scene {
     let mut scene = scene(&[diffuse(0.6), glass()]);
     scene.materials.push(emissive("panel", 0.0, radiance, false));
@@ -41,7 +41,7 @@ fn what_leaves_the_range_of_numbers_is_counted_and_left_out() {
     assert!(photons > 0 && direct > 0, "{:?}", beyond.stats.non_finite);
     let said = beyond.stats.warnings.iter().filter(|w| w.contains("infinite or undefined")).count();
     assert_eq!(said, 1, "{:?}", beyond.stats.warnings);
-    // The estimate overflows where flux over area does, with photons that are finite themselves.
+    // The estimate overflows where flux over area does, although the photons are finite.
     let bright = picture(&room(1e36, 1.0), 0);
     assert!(is_finite(&bright) && bright.stats.non_finite.photons == 0, "{:?}", bright.stats.non_finite);
     let ordinary = picture(&room(1.0, 1.0), 0);
@@ -52,7 +52,7 @@ fn what_leaves_the_range_of_numbers_is_counted_and_left_out() {
 #[test]
 fn the_strength_of_light_is_a_factor() {
     let one = picture(&room(1.0, 2.0), 0);
-    // About 1e-6, 1e9 and 1e30, as powers of two, which rounding leaves alone.
+    // Powers of two near 1e-6, 1e9 and 1e30, which are exact.
     for exponent in [-20, 30, 100] {
         let factor = 2.0_f32.powi(exponent);
         let other = picture(&room(factor, 2.0 * factor), 0);
@@ -65,7 +65,7 @@ fn the_strength_of_light_is_a_factor() {
     }
 }
 
-/// A closed box of that albedo with a light of 1 W/sr.
+/// A closed box of this albedo with a light of 1 W/sr.
 fn closed_box(albedo: f32) -> Scene {
     let mut scene = scene(&[diffuse(albedo)]);
     add_box(&mut scene, Vec3::splat(-1.0), Vec3::splat(1.0), 0);
@@ -78,8 +78,7 @@ fn closed_box(albedo: f32) -> Scene {
 fn black_and_white_rooms_end() {
     let black = render_scene(&closed_box(0.0), &settings(Mode::Hybrid, 1000, 8));
     assert!(is_finite(&black) && mean(&black) == 0.0 && black.stats.non_finite == NonFinite::default());
-    // Nothing is absorbed: each bounce stores all of the power, and the bounce limit takes it in
-    // the end.
+    // Nothing is absorbed: each bounce stores the full power, and the bounce limit ends all paths.
     let power = 4.0 * std::f64::consts::PI;
     let limited = |albedo: f32, max_bounces: u32, max_paths: u64| {
         let settings = settings(Mode::Photons, 100_000, 8).with(|s| {
@@ -93,7 +92,7 @@ fn black_and_white_rooms_end() {
     assert!(within(white.lost, power, 1e-3), "{} W were lost", white.lost);
     let grey = limited(0.9, 30, 1000);
     assert!(!within(flux(&grey.maps.global), 30.0 * power, 0.3) && grey.lost < 0.2 * power, "control");
-    // Without a limit the ceiling ends them.
+    // Without a limit `MAX_BOUNCES` ends them.
     let endless = limited(1.0, 0, 2);
     assert_eq!((endless.maps.global.stored, endless.non_finite), (2 * 4095, 0));
 }

@@ -2,7 +2,7 @@
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
-//! | flux | aimed and unaimed caustic maps hold the same flux, all over the scene, for every kind of light | a ball less |
+//! | flux | aimed and unaimed caustic maps hold the same flux, everywhere in the scene, for every kind of light | one ball fewer |
 //! | picture | aimed and unaimed give the same picture | general paths keep L S+ D as well |
 //! | paths | aimed, a caustic photon takes far fewer paths | the unaimed count |
 
@@ -75,8 +75,8 @@ fn lit_balls() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// Flux of the caustic map in all, and by which side of the floor it lies on, left and right; W,
-/// each with its variance.
+/// Flux of the caustic map: in total, on the left and on the right side of the floor; W, each with
+/// its variance.
 fn caustic_flux(scene: &Scene, emission: Emission) -> [(f64, f64); 3] {
     let settings = settings(Mode::DirectPhotons, 1, 1).with(|s| {
         s.photons.emission = emission;
@@ -87,7 +87,7 @@ fn caustic_flux(scene: &Scene, emission: Emission) -> [(f64, f64); 3] {
     let photons: Vec<Photon> = map.read(gpu()).expect("photons read back");
     let part = |wanted: &dyn Fn(f32) -> bool| {
         let part: Vec<_> = photons.iter().filter(|p| wanted(p.position[0])).collect();
-        // Each path leaves one photon at most, and few do: the variance is about the sum of
+        // Each path stores at most one photon, and few paths do: the variance is about the sum of
         // squares.
         let squares: f64 = part.iter().map(|p| f64::from(p.flux[0]).powi(2)).sum();
         (flux(part, map.emitted), squares / (map.emitted as f64).powi(2))
@@ -128,7 +128,7 @@ fn blocks(picture: &[f64]) -> Vec<f64> {
 
 #[test]
 fn aimed_paths_make_the_picture_of_unaimed_ones() {
-    // A closed room, so that light passes the balls after diffuse bounces too.
+    // A closed room, so that light also passes the balls after diffuse bounces.
     let mut scene = scene(&[diffuse(0.35), glass(), Surface::Mirror { tint: Vec3::splat(0.9) }]);
     add_box(&mut scene, vec3(-1.0, 0.0, -1.0), vec3(1.0, 2.0, 3.0), 0);
     scene.spheres.push(sphere(vec3(0.45, 0.4, 0.2), 0.4, 1));
@@ -152,7 +152,7 @@ fn aimed_paths_make_the_picture_of_unaimed_ones() {
         |a: &[f64], b: &[f64]| blocks(a).iter().zip(blocks(b)).map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
     assert!(within(mean(&aimed), mean(&unaimed), 0.01), "means {} and {}", mean(&aimed), mean(&unaimed));
     assert!(worst(&aimed, &unaimed) < 0.03, "blocks differ by up to {}", worst(&aimed, &unaimed));
-    // Mode 3 less mode 2 is L S+ D: what general paths must not store besides.
+    // Mode 3 minus mode 2 is L S+ D, which general paths must not store as well.
     let [(photons, _), (rays, _)] =
         [Mode::DirectPhotons, Mode::DirectRays].map(|mode| picture(Emission::Unaimed, mode));
     let both: Vec<f64> = (0..aimed.len()).map(|i| aimed[i] + photons[i] - rays[i]).collect();

@@ -1,4 +1,4 @@
-//! Against what is known in closed form.
+//! Lights against closed forms.
 //!
 //! | test | closed form | negative control |
 //! |---|---|---|
@@ -8,7 +8,7 @@
 //! | square emitter | Lambert's formula for polygons, facing and askew | the back side; an emitter 5 cm higher |
 //! | spherical emitter | E = π L (r/d)² cos θ | 2 % larger |
 //! | furnace | closed objects of albedo 1 in radiance L look L | albedo 0.9 |
-//! | bright pixel | E = the sum over the map; the camera sees it where it is | the map turned by 20° |
+//! | bright pixel | E = the sum over the map; the camera sees it in its direction | the map rotated by 20° |
 
 use std::f64::consts::PI;
 
@@ -55,8 +55,8 @@ fn a_spot_has_the_falloff_of_the_specification() {
 
 #[test]
 fn photons_of_a_spot_carry_its_exact_flux() {
-    // In a ball, the light inside and all directions open to it; and above a floor that it lights
-    // from outside the scene's sphere, wider than its cone and narrower than its cone.
+    // Three cases: a light inside a ball, unobstructed in all directions; and a light outside the
+    // scene's bounding sphere above a floor that is wider, or narrower, than its cone.
     let solid_angle = |inner: f64, outer: f64| 2.0 * PI * ((1.0 - inner.cos()) + (inner.cos() - outer.cos()) / 3.0);
     let inside = |inner: f32, outer: f32| {
         let mut ball = scene(&[diffuse(0.5)]);
@@ -74,7 +74,7 @@ fn photons_of_a_spot_carry_its_exact_flux() {
     };
     let (measured, right) = (outside(1.0, 0.05, 0.15), 5.0 * solid_angle(0.05, 0.15));
     assert!(within(measured, right, 1e-3), "a narrow cone: {measured} instead of {right}");
-    // A square of half side a at distance h fills 4 atan(a²/(h √(h² + 2a²))) of a point's view.
+    // A square of half side a at distance h subtends the solid angle 4 atan(a²/(h √(h² + 2a²))).
     let (measured, right) = (outside(1.0, 1.4, 1.5), 20.0 * (1.0 / (5.0 * 27.0_f64.sqrt())).atan());
     assert!(within(measured, right, 0.01), "a wide cone: {measured} instead of {right}");
     assert!(!within(outside(1.02, 1.4, 1.5), right, 0.01), "control: a floor 2 % larger passes");
@@ -95,7 +95,7 @@ fn a_directional_light_has_the_same_irradiance_everywhere() {
         assert!(within(measured(&scene), right, 0.001), "{} instead of {right}", measured(&scene));
         assert!(!within(measured(&above), right, 0.001), "control: straight from above");
     }
-    // All that the floor catches: irradiance times area.
+    // Flux that the floor receives: irradiance times area.
     let (measured, right) = (direct_flux(&scene, 40_000), right * 64.0);
     assert!(within(measured, right, 0.01), "photons: {measured} W instead of {right} W");
     assert!(!within(direct_flux(&above, 40_000), right, 0.01), "control: photons straight from above");
@@ -125,7 +125,8 @@ fn lambert(point: Vec3, normal: Vec3, corners: &[Vec3]) -> f64 {
     0.5 * (0..corners.len()).map(edge).sum::<f64>().abs()
 }
 
-/// A square of 1 m² that shines down, over a floor and beside a wall at x = 1.5; not double-sided.
+/// A square of 1 m² that emits downwards, over a floor and beside a wall at x = 1.5. It is not
+/// double-sided.
 fn square_over_floor(height: f32) -> (Scene, [Vec3; 4]) {
     let mut scene = floor(3.0);
     scene.materials.push(emissive("lamp", 0.0, 2.0, false));
@@ -147,7 +148,7 @@ fn a_square_emitter_gives_what_its_form_factor_says() {
         assert!(within(measured(&scene), right, 0.01), "at {point}: {} instead of {right}", measured(&scene));
         assert!(!within(measured(&higher), right, 0.01), "control: an emitter 5 cm higher passes at {point}");
     }
-    // Nothing comes from its back.
+    // The back emits nothing.
     assert_eq!(irradiance_at(&scene, vec3(1.4, 2.6, 0.001), vec3(1.5, 2.5, 0.0), 64), 0.0);
     let mut both = scene.clone();
     both.materials[1].double_sided = true;
@@ -171,8 +172,8 @@ fn a_spherical_emitter_gives_what_its_solid_angle_says() {
         assert!(within(measured(0.8), right, 0.005), "at {x}: {} instead of {right}", measured(0.8));
         assert!(!within(measured(0.816), right, 0.005), "control: a bulb 2 % larger passes at {x}");
     }
-    // Its photons: π L times its area, half of it over the horizon of a large floor below and none
-    // lost in a ball.
+    // Flux of its photons: π L times its area. A large floor below receives half of it, an
+    // enclosing ball all of it.
     let flux = |radius| {
         let mut scene = bulb(radius);
         scene.spheres.push(sphere(Vec3::ZERO, 50.0, 0));
@@ -249,7 +250,7 @@ fn a_bright_pixel_lights_and_is_seen_where_it_is() {
         };
         (0..rows * columns).map(one).sum::<f64>() * PI / rows as f64 * 2.0 * PI / columns as f64
     };
-    // A leaning square of albedo 1/2.
+    // A tilted square of albedo 1/2.
     let mut scene = scene(&[diffuse(0.5)]);
     let across = normal.cross(Vec3::Y).normalize();
     add_quad(&mut scene, -across - normal.cross(across), 2.0 * across, 2.0 * normal.cross(across), 0);
@@ -260,13 +261,13 @@ fn a_bright_pixel_lights_and_is_seen_where_it_is() {
     let measured = |scene| irradiance_at(scene, point + normal, point, 16);
     assert!(within(measured(&scene), right, 0.01), "{} instead of {right}", measured(&scene));
     assert!(!within(measured(&other), right, 0.05), "control: {} with the map turned", measured(&other));
-    // Photons: all that the two sides of the square catch.
+    // Flux of the photons that the two sides of the square receive.
     let back = irradiance_at(&scene, point - normal, point, 16);
     let flux = direct_flux(&scene, 40_000);
     assert!(within(flux, 4.0 * (right + back), 0.02), "photons: {flux} W instead of {} W", 4.0 * (right + back));
     let flux = direct_flux(&other, 40_000);
     assert!(!within(flux, 4.0 * (right + back), 0.02), "control: {flux} W with the map turned");
-    // Seen from far above the square: pixel for pixel what the map says.
+    // Seen from far above the square, each pixel has the radiance of the map.
     let center = vec3(-0.1, 0.63, -0.7);
     scene.cameras = vec![camera(vec3(0.0, 50.0, 0.0), vec3(0.0, 50.0, 0.0) + center, 90.0)];
     scene.cameras[0].aspect = None;

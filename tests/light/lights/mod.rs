@@ -1,5 +1,4 @@
-//! Every kind of light: what is known in closed form, photons against rays, and emission aimed at
-//! what it is for.
+//! Every kind of light: closed forms, photons against rays, and emission aimed at specular objects.
 
 mod aimed;
 mod closed_forms;
@@ -37,7 +36,7 @@ fn traced(scene: &Scene, settings: &Settings) -> TracedPhotons {
     tracer.trace(gpu, &buffers, &settings.photons, scene.has_delta(), &Silent).expect("photons trace")
 }
 
-/// Sum of the flux of photons, W in the first channel, of so many paths.
+/// Total flux of the photons of `emitted` paths, W in the first channel.
 fn flux<'a>(photons: impl IntoIterator<Item = &'a Photon>, emitted: u64) -> f64 {
     photons.into_iter().map(|p| f64::from(p.flux[0])).sum::<f64>() / emitted as f64
 }

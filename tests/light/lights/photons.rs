@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | agreement | modes 0 and 1 have the same mean under every kind of light | without the second bounce |
 //! | sum | mode 0 = mode 2 + mode 4 where surfaces and the sky are seen | mode 3 in place of 4 |
-//! | many | 10,000 emissive triangles light as the ball that they make | a ball 3 % larger |
+//! | many | 10,000 emissive triangles light like the ball that they form | a ball 3 % larger |
 //! | shares | photons go to lights by power, in turn, or as weights ask | the shares of another rule |
 //! | seen | the front of an emitter is seen, straight and in a mirror | its back, and mode 4 |
 
@@ -44,7 +44,7 @@ fn lit_yards() -> Vec<(&'static str, Scene)> {
     let sun = Light { kind: LightKind::Directional, direction, ..point_light(Vec3::ZERO, 3.0) };
     let lamp = |scene: &mut Scene, double_sided| {
         scene.materials.push(emissive("lamp", 0.4, 2.0, double_sided));
-        // The double-sided one shines down with its back.
+        // The double-sided emitter shines down from its back.
         let (a, b) = (vec3(0.9, 0.3, 0.0), vec3(0.0, 0.4, 0.9));
         let (a, b) = if double_sided { (b, a) } else { (a, b) };
         add_quad(scene, vec3(-1.3, 0.9, -1.0), a, b, 2);
@@ -111,7 +111,7 @@ fn hybrid_is_direct_rays_plus_indirect_photons_where_lights_are_seen() {
     assert!(wrong > 0.1 * mean(hybrid), "control: mode 3 in place of mode 4 differs by only {wrong}");
 }
 
-/// A ball of 100 x 51 quads whose material 1 shines, its corners on the sphere.
+/// A ball of 100 x 51 quads with the emissive material 1, its corners on the sphere.
 fn add_shining_ball(scene: &mut Scene, center: Vec3, radius: f32) {
     let corner = |row: usize, column: usize| {
         let (theta, phi) = (row as f32 / 51.0 * std::f32::consts::PI, column as f32 / 100.0 * std::f32::consts::TAU);
@@ -120,7 +120,7 @@ fn add_shining_ball(scene: &mut Scene, center: Vec3, radius: f32) {
     for (row, column) in (0..51).flat_map(|row| (0..100).map(move |column| (row, column))) {
         let [a, b, c, d] =
             [(row, column), (row + 1, column), (row + 1, column + 1), (row, column + 1)].map(|(r, c)| corner(r, c));
-        // Next to the poles quads are triangles.
+        // Next to the poles the quads are triangles.
         let halves = match row {
             0 => vec![[a, b, c]],
             50 => vec![[a, b, d]],
@@ -202,7 +202,8 @@ fn photons_go_to_lights_as_asked() {
         assert!(!within(before, right, 0.03), "control: {light_sampling:?} {weights:?}: the rule before passes");
         before = measured;
     }
-    // Dealt in turn, each of two unequal lights at the centre still shines up as much as down.
+    // With paths assigned to the lights in turn, each of two unequal lights at the centre still
+    // emits as much up as down.
     let uppers = |apart: Vec3| {
         let mut pair = scene.clone();
         pair.lights = [(apart, 1.0), (-apart, 0.1)].map(|(at, intensity)| point_light(at, intensity)).into();
@@ -216,7 +217,7 @@ fn photons_go_to_lights_as_asked() {
     let (centred, apart) = (uppers(Vec3::ZERO), uppers(Vec3::splat(0.2)));
     assert!(centred.iter().all(half), "{centred:?} W above the middle of each axis");
     assert!(!apart.iter().any(half), "control: one light above, one below: {apart:?} W");
-    // Shares change the noise, not the light.
+    // Weights change the noise, not the mean.
     let mean_of = |weights: &[(&str, f64)]| mean(&run(LightSampling::Power, weights).expect("the scene renders"));
     let (plain, weighted) = (mean_of(&[]), mean_of(&[("panel", 6.0)]));
     assert!(within(weighted, plain, 0.05), "mean {weighted} with other shares, {plain} without");
@@ -227,7 +228,7 @@ fn photons_go_to_lights_as_asked() {
 
 #[test]
 fn the_front_of_an_emitter_is_seen() {
-    // The lamp looks to +Z, towards a mirror.
+    // The lamp faces +Z, towards a mirror.
     let (front, back, mirror) = (vec3(0.0, 0.0, 3.0), vec3(0.0, 0.0, -3.0), vec3(0.0, 0.0, 9.0));
     let radiance = |mode: Mode, eye: Vec3, target: Vec3, double_sided: bool| {
         let mut scene = scene(&[Surface::Mirror { tint: Vec3::splat(0.5) }]);

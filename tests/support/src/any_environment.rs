@@ -1,11 +1,11 @@
-//! What holds for any bytes given as an environment map: shared by the fuzz target `environment`
-//! and the replay of its corpus.
+//! Invariants for arbitrary bytes given as an environment map, shared by the fuzz target
+//! `environment` and the replay of its corpus.
 
 use std::path::Path;
 
 use caustica::scene::Environment;
 
-/// Reads the bytes. What comes out is sound, or a refusal in one line, which is returned.
+/// Reads the bytes and checks the map. Returns the map, or the error, which must be one line.
 pub fn check(bytes: &[u8]) -> Result<Environment, String> {
     match Environment::from_bytes(bytes, Path::new("any"), 1.0, 0.0) {
         Ok(map) => {

@@ -1,5 +1,5 @@
-//! What holds for any bytes given as a scene: shared by the fuzz target `scene` and the replay of
-//! its corpus.
+//! Invariants for arbitrary bytes given as a scene, shared by the fuzz target `scene` and the
+//! replay of its corpus.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use caustica::{
     scene::{Camera, LoadOptions, Projection, Scene, Surface},
 };
 
-/// Triangles up to which the tree is built too.
+/// Maximum number of triangles for which the BVH is built too.
 const MAX_BUILT: usize = 1000;
 
-/// Reads the bytes. What comes out is sound, or a refusal in one line, which is returned.
+/// Reads the bytes and checks the scene. Returns the scene, or the error, which must be one line.
 pub fn check(bytes: &[u8]) -> Result<Scene, String> {
     match Scene::read(bytes, Path::new("no-such-folder/any.gltf"), &LoadOptions::default()) {
         Ok(scene) => {
@@ -26,7 +26,7 @@ pub fn check(bytes: &[u8]) -> Result<Scene, String> {
     }
 }
 
-/// No index leads out of the scene and every number can be computed with.
+/// Checks that all indices and numbers are in their ranges.
 fn sound(scene: &Scene) {
     let materials = scene.materials.len() as u32;
     assert!(scene.center.is_finite(), "centre {}", scene.center);

@@ -1,4 +1,4 @@
-//! Small glTF files made on the spot.
+//! Small glTF files built in code.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ pub fn floats(numbers: &[f32]) -> Vec<u8> {
     numbers.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// A triangle in the plane z = 0 that looks to +Z, seen by a camera and lit by a point light of 1
+/// A triangle in the plane z = 0 that faces +Z, seen by a camera and lit by a point light of 1
 /// W/sr.
 pub fn triangle() -> Value {
     let positions = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
@@ -47,7 +47,7 @@ pub fn triangle() -> Value {
     })
 }
 
-/// A material that is pure diffuse.
+/// A purely diffuse material.
 pub fn lambert([r, g, b]: [f32; 3]) -> Value {
     json!({
         "name": "paint",

@@ -52,7 +52,7 @@ pub fn point_light(position: Vec3, intensity: f32) -> Light {
     }
 }
 
-/// A diffuse material that shines.
+/// An emissive diffuse material.
 pub fn emissive(name: &str, albedo: f32, emission: f32, double_sided: bool) -> Material {
     Material { name: name.to_owned(), surface: diffuse(albedo), emission: Vec3::splat(emission), double_sided }
 }
@@ -128,7 +128,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Over the seeds from 0 on.
+    /// Estimate over the seeds 0..`seeds`.
     pub fn over_seeds(seeds: u32, of_seed: impl Fn(u32) -> f64) -> Self {
         let values: Vec<f64> = (0..seeds).map(of_seed).collect();
         let count = f64::from(seeds);
@@ -137,13 +137,13 @@ impl Estimate {
         Self { mean, error: (squares / (count * (count - 1.0))).sqrt() }
     }
 
-    /// Distance from what is expected, in standard errors.
+    /// Distance from the expected value, in standard errors.
     pub fn z(&self, expected: f64) -> f64 {
         (self.mean - expected).abs() / self.error
     }
 }
 
-/// Whether `value` differs from `expected` by less than a fraction.
+/// Whether the relative error of `value` is less than `fraction`.
 pub fn within(value: f64, expected: f64, fraction: f64) -> bool {
     (value - expected).abs() < fraction * expected.abs()
 }

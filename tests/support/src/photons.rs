@@ -1,4 +1,4 @@
-//! Photons and points to search, by a fixed generator. Shared by the test and the benchmark of the
+//! Photons and query points from a fixed generator, shared by the test and the benchmark of the
 //! search.
 
 use caustica::layout::{Photon, VisiblePoint, octahedral};
@@ -47,12 +47,12 @@ pub fn on_walls(random: &mut Random) -> Vec3 {
     position
 }
 
-/// Photons all over the unit box.
+/// Photons uniform in the unit box.
 pub fn uniform_box(random: &mut Random, count: usize) -> Vec<Photon> {
     (0..count).map(|_| random.vector()).collect::<Vec<_>>().into_iter().map(|p| photon(random, p)).collect()
 }
 
-/// Photons on the walls of the unit box, a share of them in a spot on its floor, `width` wide.
+/// Photons on the walls of the unit box, a fraction of them in a spot on its floor, `width` wide.
 pub fn caustic_box(random: &mut Random, count: usize, share: f32, width: f32) -> Vec<Photon> {
     let place = |random: &mut Random| {
         if random.unit() < share { in_caustic(random, width) } else { on_walls(random) }
@@ -70,14 +70,14 @@ pub fn in_caustic(random: &mut Random, width: f32) -> Vec3 {
     Vec3::new(0.37 + width * random.unit(), 0.0, 0.61 + width * random.unit())
 }
 
-/// `spread` photons all over the box, then the rest on one spot.
+/// `spread` photons uniform in the box, then the rest at one position.
 pub fn coincident(random: &mut Random, count: usize, spread: usize) -> Vec<Photon> {
     let mut photons = uniform_box(random, spread);
     photons.extend((spread..count).map(|_| photon(random, Vec3::new(0.3, 0.4, 0.5))));
     photons
 }
 
-/// A point in the box, valid unless asked otherwise; the interpolated normal leans a little.
+/// A point in the box, in no map if `invalid`; its shading normal leans a little.
 pub fn point(random: &mut Random, invalid: bool) -> VisiblePoint {
     let ng = random.direction();
     VisiblePoint {

@@ -11,8 +11,8 @@ use glam::Vec3;
 
 use crate::gpu;
 
-/// Takes one step along rays, of origin and direction each, with these override constants: what was
-/// counted, and what each ray hit first.
+/// Traces one step of rays (origin and direction) with these override constants. Returns the
+/// counters and the first hit of each ray.
 pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) -> (Counters, Vec<FirstHit>) {
     let gpu = gpu();
     let count = rays.len() as u64;

@@ -1,6 +1,6 @@
-//! Places where the surface around a point is no whole flat disc, lit by one point light alone, so
-//! that the irradiance is I cos θ / d². Shared by the test of the estimate there and the benchmark
-//! that prints its errors.
+//! Surfaces on which the disc of an estimate is cut or bent, lit by one point light, so that the
+//! irradiance is I cos θ / d². The test of the estimate and the benchmark that prints its errors
+//! share them.
 
 use caustica::{
     bvh::Bvh,
@@ -18,7 +18,7 @@ use glam::{Vec3, vec3};
 
 use crate::photons::Random;
 
-/// A place, and the points at which light is asked for.
+/// A surface, and the query points on it.
 pub struct Place {
     pub name: &'static str,
     pub scene: Scene,
@@ -27,11 +27,11 @@ pub struct Place {
     pub points: Vec<VisiblePoint>,
     /// Irradiance at each, W/m².
     pub expected: Vec<f64>,
-    /// What errors are relative to, W/m²: the mean of `expected`, or of the lit side of a wall.
+    /// Scale of relative errors, W/m²: the mean of `expected`, or of the lit side of a wall.
     pub scale: f64,
 }
 
-/// The four ways to estimate: name, and options of the gather.
+/// The four estimates: name, and options of the gather.
 pub fn ways() -> [(&'static str, GatherOptions); 4] {
     let flat = GatherOptions::flat();
     [
@@ -42,7 +42,7 @@ pub fn ways() -> [(&'static str, GatherOptions); 4] {
     ]
 }
 
-/// All places; each has `count` points.
+/// All surfaces, with `count` points each.
 pub fn places(count: usize) -> Vec<Place> {
     let mut random = Random(21);
     vec![
@@ -54,8 +54,8 @@ pub fn places(count: usize) -> Vec<Place> {
     ]
 }
 
-/// Irradiance estimates at the points by each way, over the same photons: one map a seed, mean over
-/// the seeds.
+/// Irradiance estimates at the points by each method over the same photons, with one map per seed.
+/// Returns the mean over the seeds.
 pub fn estimates(gpu: &Gpu, place: &Place, seeds: u32) -> [Vec<f64>; 4] {
     let mut sums = ways().map(|_| vec![0.0; place.points.len()]);
     for seed in 0..seeds {

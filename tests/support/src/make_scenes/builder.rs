@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::json::text;
 
-/// A glTF file in the making.
+/// A glTF file under construction.
 pub struct Builder {
     name: &'static str,
     nodes: Vec<Value>,
@@ -23,16 +23,16 @@ pub struct Builder {
     bytes: Vec<u8>,
 }
 
-/// Attributes or indices as bytes, and how they are to be read.
+/// Attributes or indices as bytes, and their format.
 pub struct Data {
     pub bytes: Vec<u8>,
     pub count: usize,
-    /// glTF's number of the component type.
+    /// Component type, as numbered by glTF.
     pub component: u32,
     pub kind: &'static str,
     pub normalized: bool,
     pub stride: Option<usize>,
-    /// Corners of the box around positions, in the units of the components.
+    /// Bounds of positions, in the units of the components.
     pub range: Option<[Vec<f64>; 2]>,
 }
 
@@ -53,7 +53,7 @@ impl Builder {
         }
     }
 
-    /// Says that the file cannot be read without an extension.
+    /// Marks an extension as required.
     pub fn uses(&mut self, extension: &'static str) {
         self.extensions.insert(extension);
     }
@@ -63,7 +63,7 @@ impl Builder {
         self.materials.len() - 1
     }
 
-    /// Pure Lambert reflectance.
+    /// Lambertian reflectance only.
     pub fn diffuse(&mut self, name: &str, [r, g, b]: [f64; 3]) -> usize {
         self.uses("KHR_materials_specular");
         self.material(json!({
@@ -74,8 +74,8 @@ impl Builder {
         }))
     }
 
-    /// Lambert reflectance, and light of its own: radiance `strength` times `color`, W/(m² sr),
-    /// from the front side.
+    /// Lambertian reflectance and emission: radiance `strength` times `color`, W/(m² sr), from the
+    /// front side.
     pub fn emissive(&mut self, name: &str, reflectance: f64, color: [f64; 3], strength: f64) -> usize {
         let material = self.diffuse(name, [reflectance; 3]);
         self.uses("KHR_materials_emissive_strength");
@@ -125,8 +125,8 @@ impl Builder {
         self.light_node(light, json!({ "name": name, "translation": decimals(position) }));
     }
 
-    /// A spot light at a place, aimed at another: W/sr times `color` along its axis, half angles of
-    /// its cones in degrees.
+    /// A spot light at a position, aimed at another: W/sr times `color` along its axis, half angles
+    /// of its cones in degrees.
     pub fn spot(&mut self, name: &str, [from, to]: [Vec3; 2], intensity: f64, color: [f64; 3], cones: [f32; 2]) {
         let [inner, outer] = cones.map(|degrees| decimal(degrees.to_radians()));
         let spot = json!({ "innerConeAngle": inner, "outerConeAngle": outer });
@@ -135,8 +135,7 @@ impl Builder {
         self.light_node(light, node);
     }
 
-    /// Light from infinitely far away along a direction: W/m² times `color` where it falls
-    /// straight.
+    /// A directional light: irradiance at normal incidence of W/m² times `color`.
     pub fn sun(&mut self, name: &str, direction: Vec3, irradiance: f64, color: [f64; 3]) {
         let light = json!({ "type": "directional", "color": color, "intensity": irradiance });
         self.light_node(light, json!({ "name": name, "rotation": aim(direction) }));
@@ -149,7 +148,7 @@ impl Builder {
         self.nodes.push(node);
     }
 
-    /// The camera, looking along -Z and turned about X by `pitch` degrees (down < 0).
+    /// The camera, looking along -Z and rotated about X by `pitch` degrees (down < 0).
     pub fn camera(&mut self, position: Vec3, pitch: f32, yfov: f32, aspect: f32) {
         let rotation = Quat::from_rotation_x(pitch.to_radians()).to_array().map(decimal);
         self.camera = Some(json!({
@@ -164,7 +163,7 @@ impl Builder {
         }));
     }
 
-    /// Appends bytes; returns the number of their accessor.
+    /// Appends bytes. Returns the index of their accessor.
     pub fn accessor(&mut self, data: Data) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let mut view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": data.bytes.len() });
@@ -192,7 +191,7 @@ impl Builder {
         self.accessors.len() - 1
     }
 
-    /// Adds a mesh of one primitive; returns its number.
+    /// Adds a mesh of one primitive. Returns its index.
     pub fn mesh(&mut self, name: &str, positions: Data, normals: Data, indices: Data, material: usize) -> usize {
         let [positions, normals, indices] = [positions, normals, indices].map(|data| self.accessor(data));
         self.meshes.push(json!({
@@ -210,8 +209,7 @@ impl Builder {
         self.nodes.push(node);
     }
 
-    /// The file's text and its bytes: in a file of their own if that has a name, else in a data
-    /// URI.
+    /// The file's text and its buffer: in a file of its own if that has a name, else in a data URI.
     pub fn finish(mut self, bin: Option<&str>) -> (Vec<u8>, Vec<u8>) {
         if self.camera.is_none() {
             self.camera(Vec3::new(0.0, 1.0, 4.5), 0.0, 31.5, 1.0);
@@ -251,7 +249,7 @@ fn decimal(x: f32) -> f64 {
     x.to_string().parse().expect("a number's own text is a number")
 }
 
-/// The rotation that turns -Z into a direction.
+/// Rotation that takes -Z to a direction.
 fn aim(direction: Vec3) -> [f64; 4] {
     let rotation = Quat::from_rotation_arc(Vec3::NEG_Z, direction.normalize()).to_array();
     rotation.map(|x| decimal((x * 1e6).round() / 1e6))

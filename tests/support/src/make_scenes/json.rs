@@ -1,4 +1,4 @@
-//! JSON that reads well: one property a line, arrays of numbers on one line.
+//! Readable JSON: one property a line, arrays of numbers on one line.
 
 use serde_json::Value;
 
@@ -8,7 +8,7 @@ pub fn text(value: &Value, depth: usize) -> String {
     match value {
         Value::Object(map) if !map.is_empty() => {
             let mut keys: Vec<&String> = map.keys().collect();
-            // What describes the file comes first, what only lists bytes last.
+            // Members that describe the file come first, those that list bytes last.
             keys.sort_by_key(|key| (rank(key), key.as_str()));
             let lines =
                 keys.iter().map(|key| format!("{inner}{}: {}", Value::from(key.as_str()), text(&map[*key], depth + 1)));

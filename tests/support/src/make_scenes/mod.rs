@@ -64,7 +64,7 @@ fn diffuse_in_glass() -> Builder {
     b
 }
 
-/// A glass ball and a block in the room, under a luminous square of 0.25 m² that looks down from
+/// A glass ball and a block in the room, under an emissive square of 0.25 m² that faces down from
 /// the ceiling.
 fn area_light() -> Builder {
     let mut b = Builder::new("area light");

@@ -27,7 +27,7 @@ pub fn add_walls(b: &mut Builder, w: f32, h: f32, [floor, ceiling, back, left, r
     add_quads(b, "right", &[Quad(corner + x, z, y)], right);
 }
 
-/// The tall block of the Cornell box: 0.6 x 1.2 x 0.6, turned by 18 degrees.
+/// The tall block of the Cornell box: 0.6 x 1.2 x 0.6 m, rotated by 18 degrees.
 pub fn add_block(b: &mut Builder, material: usize) {
     let turn = Quat::from_rotation_y(18_f32.to_radians());
     let (x, y, z) = (turn * Vec3::X * 0.6, Vec3::Y * 1.2, turn * Vec3::Z * 0.6);
@@ -70,7 +70,7 @@ fn floats(vectors: &[Vec3], range: Option<[Vec3; 2]>) -> Data {
     }
 }
 
-/// Indices of two bytes.
+/// 16-bit indices.
 pub fn indices_u16(indices: &[u16]) -> Data {
     Data {
         bytes: indices.iter().copied().flat_map(u16::to_le_bytes).collect(),

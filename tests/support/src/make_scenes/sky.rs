@@ -1,5 +1,4 @@
-//! Balls and a block in the open, and the sky above them as a picture of its own: what `--env` is
-//! for.
+//! Balls and a block in the open, and the sky as an environment map of its own for `--env`.
 
 use glam::Vec3;
 use image::{Rgb, codecs::hdr::HdrEncoder};
@@ -9,10 +8,10 @@ use super::{
     room::{Quad, add_block, add_quads},
 };
 
-/// Size of the picture.
+/// Size of the map, pixels.
 const WIDTH: u32 = 128;
 const HEIGHT: u32 = 64;
-/// The pixel that is the sun: 32 degrees high, behind the camera on its right.
+/// Pixel of the sun: 32 degrees above the horizon, behind the camera on its right.
 const SUN: (u32, u32) = (86, 20);
 /// Radiance of the sun's pixel, W/(m² sr).
 const SUN_RADIANCE: [f32; 3] = [1200.0, 1050.0, 800.0];
@@ -30,7 +29,7 @@ pub fn scene() -> Builder {
     b
 }
 
-/// Unit vector to the middle of the sun's pixel: u = 0.5 + atan2(z, x)/2π, v = acos(y)/π.
+/// Unit vector to the centre of the sun's pixel: u = 0.5 + atan2(z, x)/2π, v = acos(y)/π.
 pub fn sun_direction() -> Vec3 {
     let (u, v) = ((SUN.0 as f32 + 0.5) / WIDTH as f32, (SUN.1 as f32 + 0.5) / HEIGHT as f32);
     let (sin, cos) = (std::f32::consts::TAU * (u - 0.5)).sin_cos();

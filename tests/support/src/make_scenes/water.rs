@@ -1,8 +1,8 @@
 //! A closed slab of water with a wavy top, hung above the floor of a room.
 //!
-//! The slab is one half (x in 0..1) shown twice, turned by half a turn about the vertical: its
-//! waves are even functions of the place, so the halves meet exactly. Coordinates are 16-bit, to
-//! keep the file small.
+//! The slab is one half (x in 0..1) shown twice, the second time rotated by 180° about the
+//! vertical: its waves are even functions of the position, so the halves meet exactly. Coordinates
+//! are 16-bit, to keep the file small.
 
 use glam::{DVec3, Vec3};
 use serde_json::json;
@@ -44,8 +44,8 @@ impl Half {
         (self.positions.len() - 1) as u16
     }
 
-    /// A wall from the wavy edge along `edge` down to the bottom; the outside is to the right of
-    /// the way.
+    /// A wall from the wavy edge along `edge` down to the bottom. The outside is to the right of
+    /// the direction of the edge.
     fn wall(&mut self, edge: impl Iterator<Item = (f64, f64)>, normal: DVec3) {
         let mut last = None;
         for (x, z) in edge {

@@ -1,0 +1,163 @@
+//! The scene: its contents, and what can be asked of them.
+
+use std::path::PathBuf;
+
+use glam::{DVec3, Vec3};
+
+use super::{Bounds, Camera, Environment, Light, Material, Sphere, Triangle};
+use crate::{
+    Error, Result,
+    image::{EnvironmentProvenance, Provenance},
+    settings::Settings,
+    stats::Stats,
+};
+
+/// A scene, ready to be traced.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// File name without folders.
+    pub file_name: String,
+    /// Files that the file refers to: buffers and images, read or not.
+    pub files: Vec<PathBuf>,
+    /// SHA-256 of the bytes of the file and its buffers, in hexadecimal.
+    pub hash: String,
+    /// Offset subtracted from all world coordinates of the file: the centre of its geometry.
+    pub center: DVec3,
+    /// Triangles of all meshes.
+    pub triangles: Vec<Triangle>,
+    /// Exact spheres.
+    pub spheres: Vec<Sphere>,
+    /// Materials; triangles and spheres refer to them by index.
+    pub materials: Vec<Material>,
+    /// Punctual lights.
+    pub lights: Vec<Light>,
+    /// Environment light, infinitely far away.
+    pub environment: Option<Environment>,
+    /// Never empty after [`Scene::load`]: a file without cameras gets one that frames the scene.
+    pub cameras: Vec<Camera>,
+    /// Features that were ignored or approximated, one line each.
+    pub warnings: Vec<String>,
+    /// Number of meshes in the file.
+    pub mesh_count: usize,
+}
+
+impl Scene {
+    /// Bounding box of all geometry in scene coordinates; [`Bounds::EMPTY`] if there is none.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let triangles = self.triangles.iter().map(Bounds::from);
+        triangles.chain(self.spheres.iter().map(Bounds::from)).fold(Bounds::EMPTY, Bounds::union)
+    }
+
+    /// Bounding sphere of all geometry, around the centre of its bounding box: centre and radius,
+    /// metres. Zero and zero if there is no geometry.
+    #[must_use]
+    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+        let bounds = self.bounds();
+        if bounds.min.x > bounds.max.x {
+            return (Vec3::ZERO, 0.0);
+        }
+        let center = 0.5 * (bounds.min + bounds.max);
+        let corners = self.triangles.iter().flat_map(|t| t.positions).map(|p| p.distance(center));
+        let balls = self.spheres.iter().map(|s| s.center.distance(center) + s.radius);
+        (center, corners.chain(balls).fold(0.0, f32::max))
+    }
+
+    /// Whether a surface has a delta BSDF, so that there can be caustics.
+    #[must_use]
+    pub fn has_delta(&self) -> bool {
+        self.uses_material(|material| material.surface.is_delta())
+    }
+
+    /// Whether a surface emits light.
+    #[must_use]
+    pub fn has_emission(&self) -> bool {
+        self.uses_material(|material| material.emission != Vec3::ZERO)
+    }
+
+    /// Whether a triangle or sphere has a material that satisfies the predicate.
+    fn uses_material(&self, predicate: impl Fn(&Material) -> bool) -> bool {
+        let satisfied: Vec<bool> = self.materials.iter().map(predicate).collect();
+        let satisfies = |material: u32| satisfied.get(material as usize) == Some(&true);
+        self.triangles.iter().any(|triangle| satisfies(triangle.material))
+            || self.spheres.iter().any(|sphere| satisfies(sphere.material))
+    }
+
+    /// Adds a soft uniform sky ([`Environment::sky`]) to a scene without any light, and a warning.
+    /// A scene with an environment keeps it, dark or not.
+    pub fn add_default_light(&mut self) {
+        if self.lights.is_empty() && !self.has_emission() && self.environment.is_none() {
+            self.environment = Some(Environment::sky());
+            self.warnings.push("no light: lit by a uniform sky of radiance 1".to_owned());
+        }
+    }
+
+    /// Provenance of a picture, for the metadata of its file.
+    #[must_use]
+    pub fn origin<'a>(&'a self, settings: &'a Settings, stats: &'a Stats) -> Provenance<'a> {
+        let environment = self.environment.as_ref().map(|environment| EnvironmentProvenance {
+            name: &environment.name,
+            hash: &environment.hash,
+            radiance: (environment.pixels.len() == 1).then(|| environment.pixels[0]),
+            strength: environment.strength,
+            rotation: environment.rotation,
+        });
+        Provenance { scene: &self.file_name, scene_hash: &self.hash, environment, settings, stats }
+    }
+
+    /// Finds a camera by its name or by its index in [`Scene::cameras`]; the first if `wanted` is
+    /// `None`.
+    ///
+    /// # Errors
+    /// [`Error::Setting`], which lists the cameras.
+    pub fn camera(&self, wanted: Option<&str>) -> Result<&Camera> {
+        Ok(&self.cameras[self.camera_number(wanted)?])
+    }
+
+    /// Index in [`Scene::cameras`] of the camera that [`Scene::camera`] finds.
+    ///
+    /// # Errors
+    /// As [`Scene::camera`].
+    pub fn camera_number(&self, wanted: Option<&str>) -> Result<usize> {
+        let numbered = |number: usize| (number < self.cameras.len()).then_some(number);
+        let found = match wanted {
+            None => numbered(0),
+            Some(wanted) => {
+                let named = self.cameras.iter().position(|camera| camera.name == wanted);
+                named.or_else(|| numbered(wanted.parse().ok()?))
+            }
+        };
+        found.ok_or_else(|| {
+            let list: Vec<String> =
+                self.cameras.iter().enumerate().map(|(i, camera)| format!("{i} {:?}", camera.name)).collect();
+            Error::Setting {
+                name: "picture.camera",
+                value: wanted.unwrap_or("0").to_owned(),
+                problem: format!("{} has the cameras {}", self.file_name, list.join(", ")),
+            }
+        })
+    }
+
+    /// Checks that the scene has geometry and light.
+    ///
+    /// # Errors
+    /// [`Error::Scene`], which names what is missing.
+    pub fn check_renderable(&self) -> Result<()> {
+        let error =
+            |place: &str, problem: String| Error::Scene { path: self.path.clone(), place: place.to_owned(), problem };
+        if self.triangles.is_empty() && self.spheres.is_empty() {
+            let notes =
+                if self.warnings.is_empty() { String::new() } else { format!(" ({})", self.warnings.join("; ")) };
+            return Err(error("scene", format!("nothing to draw: it holds no triangle and no sphere{notes}")));
+        }
+        if self.lights.is_empty() && !self.has_emission() && self.environment.as_ref().is_none_or(Environment::is_dark)
+        {
+            let problem = "no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give \
+                           `scene.environment`";
+            return Err(error("scene", problem.to_owned()));
+        }
+        Ok(())
+    }
+}
