@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use super::{load_options::LoadOptions, model::Scene};
+use super::{contents::Scene, load_options::LoadOptions};
 use crate::Result;
 
 impl Scene {
     /// Reads a `.gltf` or `.glb` file and the buffers beside it.
     ///
     /// # Errors
-    /// [`crate::Error::Io`] where the file cannot be read; [`crate::Error::Scene`] with the JSON path of what is
-    /// wrong in it.
+    /// [`crate::Error::Io`] where the file cannot be read; [`crate::Error::Scene`] with the JSON
+    /// path of what is wrong in it.
     pub fn load(path: &Path) -> Result<Self> {
         Self::load_with(path, &LoadOptions::default())
     }
@@ -18,8 +18,8 @@ impl Scene {
     /// Reads a file as [`Scene::load`], with options.
     ///
     /// # Errors
-    /// As [`Scene::load`]; [`crate::Error::Setting`], which lists the scenes of the file, if the requested
-    /// scene is not among them.
+    /// As [`Scene::load`]; [`crate::Error::Setting`], which lists the scenes of the file, if the
+    /// requested scene is not among them.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self> {
         super::gltf::load(path, options)
     }

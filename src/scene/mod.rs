@@ -10,7 +10,6 @@ mod light;
 mod load;
 mod load_options;
 mod material;
-mod model;
 mod shape;
 mod words;
 
@@ -21,5 +20,4 @@ pub use environment::Environment;
 pub use light::{LUMENS_PER_WATT, Light, LightKind, MIN_FALLOFF};
 pub use load_options::LoadOptions;
 pub use material::{Material, MediaTable, Medium, Surface};
-pub use model::Scene;
 pub use shape::{Bounds, Sphere, Triangle};
