@@ -26,7 +26,7 @@ impl Comparison {
     /// difference in false colours; the report as JSON and as a page that needs no other file.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`].
     pub fn write(&self, folder: &Path, origin: &Provenance, exposure: f32, tonemap: Tonemap) -> Result<()> {
         let place = |name: &str| folder.join(name);
         write_exr(&place("grid.exr"), &self.grid, origin)?;
