@@ -1,47 +1,99 @@
-//! Commands under way to the device: dispatches that are cut into parts, and submissions that end
-//! in time.
+//! Recording and submission: dispatches are cut into parts, and a submission is closed before it
+//! takes too long.
 
 use std::{
     mem,
     ops::{Deref, DerefMut},
+    sync::atomic::{AtomicU64, Ordering},
+    time::Duration,
 };
 
 use super::{
-    Gpu,
-    pace::{LEAST_TIMED, Part},
-    timer::{Timed, Timings},
+    pace::{LEAST_TIMED, Pace, Pacing, Part},
+    parts::Parts,
+    timer::{Timed, Timer, Timings},
 };
 
-/// Commands that are recorded, and handed over by [`Gpu::submit`] or, where they would keep the
-/// device for too long, before. A buffer must not be written by the host between the recording of
-/// two commands that use it.
+/// Time without an answer after which the device counts as hung. Submissions are kept far shorter
+/// than that on GPUs. Software works through all of them at the speed of its processor and cannot
+/// hang.
+pub(super) const HUNG_AFTER: Duration = Duration::from_secs(300);
+
+/// The queue of a device, with what is known of the time that its work takes.
+#[derive(Debug)]
+pub(super) struct Submissions {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    pub pace: Pace,
+    pub timer: Option<Timer>,
+    pub parts: Parts,
+    dispatches: AtomicU64,
+}
+
+impl Submissions {
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, pacing: Pacing) -> Self {
+        Self {
+            device: device.clone(),
+            queue: queue.clone(),
+            pace: Pace::new(pacing),
+            timer: Timer::new(device, queue),
+            parts: Parts::new(device),
+            dispatches: AtomicU64::new(0),
+        }
+    }
+
+    /// Number of dispatches recorded so far.
+    pub fn dispatches(&self) -> u64 {
+        self.dispatches.load(Ordering::Relaxed)
+    }
+
+    /// Waits for all submitted work, at most [`HUNG_AFTER`] where it is cut; then tells
+    /// the pace what the device's clock has measured.
+    pub fn poll(&self) -> Result<(), wgpu::PollError> {
+        let timeout = (self.pace.pacing == Pacing::Measured).then_some(HUNG_AFTER);
+        let polled = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout });
+        if let Some(timer) = &self.timer {
+            timer.collect(&self.pace);
+        }
+        polled.map(drop)
+    }
+
+    fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+}
+
+/// Recorded commands. [`super::Gpu::submit`] submits them; some are submitted earlier where
+/// together they would keep the device for too long. The host must not write to a buffer between
+/// the recording of two commands that use it.
 #[derive(Debug)]
 pub struct Commands<'g> {
-    pub(super) gpu: &'g Gpu,
+    pub(super) submissions: &'g Submissions,
     encoder: wgpu::CommandEncoder,
-    /// That the submission is likely to take so far.
+    /// Predicted duration of the submission so far.
     seconds: f64,
     timings: Timings,
 }
 
 impl<'g> Commands<'g> {
-    pub(super) fn new(gpu: &'g Gpu) -> Self {
-        Self { gpu, encoder: new_encoder(gpu), seconds: 0.0, timings: Timings::default() }
+    pub(super) fn new(submissions: &'g Submissions) -> Self {
+        Self { submissions, encoder: submissions.encoder(), seconds: 0.0, timings: Timings::default() }
     }
 
-    /// Hands over what was recorded; the recording goes on.
+    /// Submits what was recorded; recording goes on.
     pub(super) fn flush(&mut self) {
-        let encoder = mem::replace(&mut self.encoder, new_encoder(self.gpu));
+        let Submissions { device, queue, timer, .. } = self.submissions;
+        let encoder = mem::replace(&mut self.encoder, self.submissions.encoder());
         let timings = mem::take(&mut self.timings);
         self.seconds = 0.0;
-        match &self.gpu.timer {
-            Some(timer) => timer.submit(self.gpu, encoder, timings),
-            None => drop(self.gpu.queue.submit([encoder.finish()])),
+        match timer {
+            Some(timer) => timer.submit(device, queue, encoder, timings),
+            None => drop(queue.submit([encoder.finish()])),
         }
     }
 
-    /// Records `invocations` invocations of a kernel, part by part; `record` puts one part, of
-    /// which it is told the first invocation and the number of them, into a pass.
+    /// Records `invocations` invocations of a kernel, part by part. `record` puts one part into a
+    /// pass, given its first invocation and their number.
     pub(super) fn dispatch(
         &mut self,
         stem: &'static str,
@@ -50,25 +102,25 @@ impl<'g> Commands<'g> {
     ) {
         let mut first = 0;
         while first < invocations {
-            let part = self.gpu.pace.part(stem, invocations - first);
-            if !self.gpu.pace.fits(self.seconds, &part) || self.timings.is_full() {
+            let part = self.submissions.pace.part(stem, invocations - first);
+            if !self.submissions.pace.fits(self.seconds, &part) || self.timings.is_full() {
                 self.flush();
             }
             let is_last = first + part.invocations == invocations;
             self.record(stem, &part, |pass| record(pass, first, part.invocations));
             first += part.invocations;
             if !is_last && part.seconds.is_none() {
-                // The first part tells how large the others may be. A fault shows in the next wait.
+                // The first part measures how large the others may be. A fault shows in the next wait.
                 self.flush();
-                let _ = self.gpu.poll();
+                let _ = self.submissions.poll();
             }
         }
     }
 
     fn record(&mut self, stem: &'static str, part: &Part, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
-        self.gpu.dispatches.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        self.submissions.dispatches.fetch_add(1, Ordering::Relaxed);
         self.seconds += part.seconds.unwrap_or(f64::INFINITY);
-        let timer = self.gpu.timer.as_ref().filter(|_| part.invocations >= LEAST_TIMED);
+        let timer = self.submissions.timer.as_ref().filter(|_| part.invocations >= LEAST_TIMED);
         let timed = timer.map(|timer| timer.time(&mut self.timings, Timed { stem, invocations: part.invocations }));
         let mut pass = self
             .encoder
@@ -79,10 +131,6 @@ impl<'g> Commands<'g> {
     pub(super) fn finish(mut self) {
         self.flush();
     }
-}
-
-fn new_encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
-    gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
 }
 
 impl Deref for Commands<'_> {

@@ -1,4 +1,5 @@
-//! Compiles kernels ahead of their use, on threads of its own, while the device and others work.
+//! Compilation of kernels ahead of their use, on threads of its own, while the device and the host
+//! work.
 
 use std::{
     collections::HashMap,
@@ -9,37 +10,37 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use super::{kernel::Program, shaders::Shader};
+use super::{program::Program, shaders::Shader};
 
-/// Threads at most: there are some thirty kernels, few of them long.
-const MOST_THREADS: usize = 8;
+/// Maximum number of threads: there are some thirty kernels, few of them long.
+const MAX_THREADS: usize = 8;
 
 /// Stem and constants, these by their bits.
 type Key = (&'static str, Vec<(&'static str, u64)>);
 
-/// The programs of a device. Each is compiled once, in the order in which they are asked for,
-/// unless somebody needs it before.
+/// The programs of a device. Each is compiled once, in the order of the requests unless a dispatch
+/// needs it earlier.
 #[derive(Debug)]
 pub(super) struct Compiler {
     programs: Mutex<HashMap<Key, Arc<Program>>>,
-    /// Gone when the threads should end.
-    asked: Option<Sender<Arc<Program>>>,
-    waiting: Arc<Mutex<Receiver<Arc<Program>>>>,
+    /// `None` when the threads should end.
+    requests: Option<Sender<Arc<Program>>>,
+    queue: Arc<Mutex<Receiver<Arc<Program>>>>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Compiler {
     pub fn new() -> Self {
-        let (asked, waiting) = mpsc::channel();
-        let waiting = Arc::new(Mutex::new(waiting));
-        let count = thread::available_parallelism().map_or(1, usize::from).min(MOST_THREADS);
+        let (requests, queue) = mpsc::channel();
+        let queue = Arc::new(Mutex::new(queue));
+        let count = thread::available_parallelism().map_or(1, usize::from).min(MAX_THREADS);
         let spawn = |_| {
-            let waiting = Arc::clone(&waiting);
-            // Without a thread who needs a kernel compiles it.
-            thread::Builder::new().name("compiler".into()).spawn(move || compile_all(&waiting)).ok()
+            let queue = Arc::clone(&queue);
+            // Without a thread, the dispatch that needs a kernel compiles it.
+            thread::Builder::new().name("compiler".into()).spawn(move || compile_all(&queue)).ok()
         };
         let threads = (0..count).filter_map(spawn).collect();
-        Self { programs: Mutex::default(), asked: Some(asked), waiting, threads }
+        Self { programs: Mutex::default(), requests: Some(requests), queue, threads }
     }
 
     /// The kernel with these constants, compiled or soon to be.
@@ -54,9 +55,9 @@ impl Compiler {
         let mut programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
         let program = programs.entry(key).or_insert_with(|| {
             let program = Arc::new(Program::new(device, part_layout, shader, constants));
-            if let Some(asked) = &self.asked {
-                // The receiver is a field beside this one, so somebody listens.
-                let _ = asked.send(Arc::clone(&program));
+            if let Some(requests) = &self.requests {
+                // The receiver is a field beside this one, so sending cannot fail.
+                let _ = requests.send(Arc::clone(&program));
             }
             program
         });
@@ -65,22 +66,22 @@ impl Compiler {
 }
 
 impl Drop for Compiler {
-    /// Waits for the threads, for a driver that is unloaded under them ends the process; what they
-    /// have not begun is left.
+    /// Waits for the threads: a driver that is unloaded under them ends the process. Kernels that
+    /// they have not begun stay uncompiled.
     fn drop(&mut self) {
-        drop(self.asked.take());
-        while self.waiting.lock().is_ok_and(|waiting| waiting.try_recv().is_ok()) {}
+        drop(self.requests.take());
+        while self.queue.lock().is_ok_and(|queue| queue.try_recv().is_ok()) {}
         for thread in self.threads.drain(..) {
-            // One that panicked has said so.
+            // A panic was already reported by its thread.
             let _ = thread.join();
         }
     }
 }
 
-fn compile_all(waiting: &Mutex<Receiver<Arc<Program>>>) {
+fn compile_all(queue: &Mutex<Receiver<Arc<Program>>>) {
     loop {
-        let Ok(next) = waiting.lock().map(|waiting| waiting.recv()) else { return };
+        let Ok(next) = queue.lock().map(|queue| queue.recv()) else { return };
         let Ok(program) = next else { return };
-        program.compile();
+        program.compiled();
     }
 }

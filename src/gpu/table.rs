@@ -40,15 +40,15 @@ impl Table {
         assert_eq!(size_of::<T>() % texel, 0, "{label}: elements of a table fill texels");
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let texels = (bytes.len() / texel) as u64;
-        let most = most_texels(&gpu.limits);
-        if texels > most {
+        let max_texels = gpu.max_table_texels();
+        if texels > max_texels {
             return Err(Error::Limit {
                 what: label.to_string(),
                 needed: texels,
                 unit: "texels",
                 limit: "maxImageDimension2D",
                 adapter: gpu.name.clone(),
-                allowed: most,
+                allowed: max_texels,
                 advice: "ask for less or use another `device`".to_string(),
             });
         }
@@ -81,12 +81,7 @@ impl Table {
     }
 }
 
-/// Texels of the largest table.
-pub(super) fn most_texels(limits: &wgpu::Limits) -> u64 {
-    u64::from(TABLE_COLUMNS.min(limits.max_texture_dimension_2d)) * u64::from(limits.max_texture_dimension_2d)
-}
-
-/// Fills whole rows, then what is left in the last one.
+/// Writes the full rows, then the rest of the data to the last row.
 fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8], columns: u32, texel: u32) {
     let row = (columns * texel) as usize;
     let (whole, rest) = bytes.split_at(bytes.len() / row * row);

@@ -1,4 +1,5 @@
-//! The device's own clock: what each part of a dispatch took, known once the device has done it.
+//! The device's own clock: the duration of each part of a dispatch, known once the device has
+//! finished it.
 
 use std::{
     mem,
@@ -8,14 +9,14 @@ use std::{
     },
 };
 
-use super::{Gpu, pace::Pace};
+use super::pace::Pace;
 
-/// Parts that one submission can time.
+/// Maximum number of parts of a submission that are timed.
 const ROOM: usize = 128;
-/// Bytes of a time.
+/// Size of a time, bytes.
 const TIME: u64 = size_of::<u64>() as u64;
 
-/// A part whose time is taken.
+/// A part that is timed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timed {
     pub stem: &'static str,
@@ -39,14 +40,14 @@ pub(super) struct Timer {
     resolved: wgpu::Buffer,
     /// Seconds of a tick.
     tick: f64,
-    /// Submissions that have not been looked at.
+    /// Submissions whose times were not collected yet.
     pending: Mutex<Vec<Pending>>,
 }
 
 #[derive(Debug)]
 struct Pending {
     times: wgpu::Buffer,
-    is_there: Arc<AtomicBool>,
+    is_mapped: Arc<AtomicBool>,
     timings: Timings,
 }
 
@@ -70,25 +71,31 @@ impl Timer {
         })
     }
 
-    /// Where a pass notes when it begins and ends.
+    /// The queries that a pass writes when it begins and ends.
     pub fn time<'t>(&'t self, timings: &mut Timings, part: Timed) -> wgpu::ComputePassTimestampWrites<'t> {
-        let place = 2 * timings.0.len() as u32;
+        let query = 2 * timings.0.len() as u32;
         timings.0.push(part);
         wgpu::ComputePassTimestampWrites {
             query_set: &self.set,
-            beginning_of_pass_write_index: Some(place),
-            end_of_pass_write_index: Some(place + 1),
+            beginning_of_pass_write_index: Some(query),
+            end_of_pass_write_index: Some(query + 1),
         }
     }
 
-    /// Hands the commands over, and the times of their parts back to the host.
-    pub fn submit(&self, gpu: &Gpu, mut encoder: wgpu::CommandEncoder, timings: Timings) {
+    /// Submits the commands and has the times of their parts read back.
+    pub fn submit(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        mut encoder: wgpu::CommandEncoder,
+        timings: Timings,
+    ) {
         let bytes = 2 * timings.0.len() as u64 * TIME;
         if bytes == 0 {
-            gpu.queue.submit([encoder.finish()]);
+            queue.submit([encoder.finish()]);
             return;
         }
-        let times = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        let times = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("times read back"),
             size: bytes,
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
@@ -96,20 +103,20 @@ impl Timer {
         });
         encoder.resolve_query_set(&self.set, 0..2 * timings.0.len() as u32, &self.resolved, 0);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &times, 0, bytes);
-        gpu.queue.submit([encoder.finish()]);
-        let is_there = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&is_there);
-        times.slice(..).map_async(wgpu::MapMode::Read, move |result| told.store(result.is_ok(), Ordering::Release));
-        self.pending().push(Pending { times, is_there, timings });
+        queue.submit([encoder.finish()]);
+        let is_mapped = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&is_mapped);
+        times.slice(..).map_async(wgpu::MapMode::Read, move |result| flag.store(result.is_ok(), Ordering::Release));
+        self.pending().push(Pending { times, is_mapped, timings });
     }
 
-    /// Tells the pace what is known by now; call it when the device has done all that was
-    /// submitted.
+    /// Tells the pace the times read back so far. To be called when the device has finished all
+    /// submitted work.
     pub fn collect(&self, pace: &Pace) {
-        for Pending { times, is_there, timings } in mem::take(&mut *self.pending()) {
-            // Those of a device that was lost never come.
+        for Pending { times, is_mapped, timings } in mem::take(&mut *self.pending()) {
+            // Times of a lost device never arrive.
             let Some(mapped) =
-                is_there.load(Ordering::Acquire).then(|| times.slice(..).get_mapped_range().ok()).flatten()
+                is_mapped.load(Ordering::Acquire).then(|| times.slice(..).get_mapped_range().ok()).flatten()
             else {
                 continue;
             };
@@ -135,7 +142,7 @@ mod tests {
     #[test]
     fn the_clock_of_the_device_is_read() {
         let gpu = Gpu::open_paced(None, Some(Pacing::Measured)).expect("tests need an adapter");
-        assert!(gpu.timer.is_some(), "{} has no clock", gpu.name);
+        assert!(gpu.submissions.timer.is_some(), "{} has no clock", gpu.name);
         let kernel = Kernel::new(&gpu, "sum_spans", &[]);
         let span = u64::from(crate::layout::SCAN_SPAN);
         let values = gpu.storage::<u32>("values", LEAST_PART * span).expect("fits");
@@ -146,7 +153,7 @@ mod tests {
             kernel.dispatch(&mut commands, &bindings, invocations);
             gpu.submit(commands);
             gpu.wait().expect("it runs");
-            gpu.pace.cost("sum_spans")
+            gpu.submissions.pace.cost("sum_spans")
         };
         assert_eq!(cost(LEAST_TIMED - 64), None, "control: too few to tell");
         let seconds = cost(LEAST_PART).expect("it was timed") * LEAST_PART as f64;

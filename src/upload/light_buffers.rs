@@ -55,7 +55,7 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = delta_targets(scene);
-        let most = gpu.max_binding().min(gpu.max_table());
+        let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
         let probe = MediaProbe::new(scene, bvh);

@@ -160,9 +160,6 @@ fn circles<'a>(uses: &Uses<'a>) -> Vec<Vec<&'a str>> {
     knots.into_iter().collect()
 }
 
-/// Folders in which circles are left. One that has none any more must go from here.
-const OPEN: [&str; 1] = ["gpu/"];
-
 #[test]
 fn no_circle_of_files() {
     let texts = read_sources();
@@ -170,12 +167,8 @@ fn no_circle_of_files() {
     let uses = Sources::new(&sources).uses();
     assert!(uses.values().map(BTreeSet::len).sum::<usize>() > 300, "paths are resolved");
     let found = circles(&uses);
-    let is_open = |knot: &[&str]| OPEN.iter().any(|folder| knot.iter().all(|file| file.starts_with(folder)));
-    let new: Vec<String> = found.iter().filter(|knot| !is_open(knot)).map(|knot| told(knot, &uses)).collect();
-    assert!(new.is_empty(), "{}", new.join("\n"));
-    let closed = |folder: &&str| !found.iter().any(|knot| knot[0].starts_with(folder));
-    let closed: Vec<_> = OPEN.iter().copied().filter(closed).collect();
-    assert!(closed.is_empty(), "no circle is left in these, take them out of OPEN: {closed:?}");
+    let knots: Vec<String> = found.iter().map(|knot| told(knot, &uses)).collect();
+    assert!(knots.is_empty(), "{}", knots.join("\n"));
 }
 
 /// Circles among example files, one line each.

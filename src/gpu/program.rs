@@ -1,0 +1,99 @@
+//! A kernel's program: shader and constants, compiled once.
+
+use std::sync::OnceLock;
+
+use super::{
+    parts::PART_GROUP,
+    shaders::{BindingKind, Shader},
+};
+
+/// A kernel with its constants, compiled by the first thread that comes: one of the compiler's, or
+/// one that needs it.
+#[derive(Debug)]
+pub(super) struct Program {
+    pub shader: &'static Shader,
+    constants: Vec<(&'static str, f64)>,
+    device: wgpu::Device,
+    part_layout: wgpu::BindGroupLayout,
+    compiled: OnceLock<Compiled>,
+}
+
+#[derive(Debug)]
+pub(super) struct Compiled {
+    pub pipeline: wgpu::ComputePipeline,
+    /// Layouts of the groups that the caller fills.
+    pub layouts: Vec<Option<wgpu::BindGroupLayout>>,
+}
+
+impl Program {
+    pub fn new(
+        device: &wgpu::Device,
+        part_layout: &wgpu::BindGroupLayout,
+        shader: &'static Shader,
+        constants: Vec<(&'static str, f64)>,
+    ) -> Self {
+        let (device, part_layout) = (device.clone(), part_layout.clone());
+        Self { shader, constants, device, part_layout, compiled: OnceLock::new() }
+    }
+
+    /// Compiles the kernel, or waits for the thread that does.
+    pub fn compiled(&self) -> &Compiled {
+        self.compiled.get_or_init(|| {
+            let (device, shader) = (&self.device, self.shader);
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(shader.stem),
+                source: wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
+            });
+            let layouts: Vec<_> = (0..PART_GROUP).map(|g| group_layout(device, shader, g)).collect();
+            let part = self.can_be_cut().then_some(&self.part_layout);
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(shader.stem),
+                bind_group_layouts: &layouts.iter().map(Option::as_ref).chain([part]).collect::<Vec<_>>(),
+                immediate_size: 0,
+            });
+            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(shader.stem),
+                layout: Some(&layout),
+                module: &module,
+                entry_point: Some(shader.stem),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &self.constants,
+                    zero_initialize_workgroup_memory: false,
+                },
+                cache: None,
+            });
+            Compiled { pipeline, layouts }
+        })
+    }
+
+    /// Whether the kernel finds its index with `invocation_index`, so that its dispatches can be cut
+    /// into parts.
+    pub fn can_be_cut(&self) -> bool {
+        self.shader.bindings.iter().any(|b| b.group == PART_GROUP)
+    }
+}
+
+/// Layout of one group of a kernel; `None` if the kernel does not use the group.
+fn group_layout(device: &wgpu::Device, shader: &Shader, group: u32) -> Option<wgpu::BindGroupLayout> {
+    let entries: Vec<_> =
+        shader.bindings.iter().filter(|b| b.group == group).map(|b| layout_entry(b.index, b.kind)).collect();
+    let describe = |entries| {
+        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(shader.stem), entries })
+    };
+    (!entries.is_empty()).then(|| describe(&entries))
+}
+
+fn layout_entry(binding: u32, kind: BindingKind) -> wgpu::BindGroupLayoutEntry {
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let ty = match kind {
+        BindingKind::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+        BindingKind::ReadOnly => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+        BindingKind::ReadWrite => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+        BindingKind::Table => wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Uint,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        },
+    };
+    wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
+}
