@@ -21,8 +21,8 @@ pub const MAX_NORMAL_WEIGHT: f32 = 8.0;
 /// Rounding of a hit point, as a fraction of the largest coordinate that it is computed from:
 /// 2^-19.
 pub const OFFSET_SCALE: f32 = 1.907_348_6e-6;
-/// Media that a path can be inside of at once.
-pub const MEDIA_DEPTH: usize = 4;
+/// Words of a set of media, one bit for each slot of [`crate::scene::Solids`].
+pub const MEDIA_WORDS: usize = 4;
 
 /// One interior node of the BVH: its children's boxes and what they are, four words at a time as
 /// software Vulkan reads them fastest. Interior children come before leaves and lie side by side,
@@ -45,9 +45,23 @@ pub struct BvhNode {
 /// Set in [`Primitive::material`] when the primitive is a sphere.
 pub const SPHERE_BIT: u32 = 0x8000_0000;
 
-/// Set there when the primitive's material is a mirror or glass: where surfaces coincide, the
-/// others are met first.
+/// Set there when the primitive's material is a mirror, a pane or glass: where surfaces coincide,
+/// the others are met first.
 pub const DELTA_BIT: u32 = 0x4000_0000;
+/// Set there when another surface lies in the same plane: hits within rounding are one interface.
+pub const CONTACT_BIT: u32 = 0x2000_0000;
+/// Position there of the slot of the solid that the primitive bounds, and its mask;
+/// [`crate::scene::NO_SLOT`] if it bounds none.
+pub const SLOT_SHIFT: u32 = 22;
+pub const SLOT_MASK: u32 = 127;
+/// Mask there of the index into the materials.
+pub const MATERIAL_MASK: u32 = (1 << SLOT_SHIFT) - 1;
+/// In place of the primitive that a path has left: none.
+pub const NOTHING_LEFT: u32 = (1 << BVH_INDEX_BITS) - 1;
+/// Surfaces that a path of light through mirrors and glass may meet beyond its diffuse bounces.
+pub const CHAIN_LIMIT: u32 = 512;
+/// Units of lost light in a camera path of weight 1, see [`Counters::lost`].
+pub const LOST_SCALE: u32 = 4096;
 
 /// A triangle `v0, v0 + e1, v0 + e2`, or a sphere with centre `v0` and radius `e1.x`, in the order
 /// of the BVH's leaves.
@@ -55,8 +69,8 @@ pub const DELTA_BIT: u32 = 0x4000_0000;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Primitive {
     pub v0: [f32; 3],
-    /// Index into the materials, with [`SPHERE_BIT`] for a sphere, and on the device [`DELTA_BIT`]
-    /// for a delta surface.
+    /// Index into the materials, with [`SPHERE_BIT`] for a sphere; on the device also
+    /// [`DELTA_BIT`], [`CONTACT_BIT`] and the slot at [`SLOT_SHIFT`].
     pub material: u32,
     pub e1: [f32; 3],
     /// Index of the primitive in the scene before the BVH reordered it.
@@ -105,16 +119,17 @@ pub struct Material {
     pub ior: f32,
     /// 1 if its back sends out as much.
     pub double_sided: u32,
-    /// Index of the [`Medium`] in the solid, of glass.
-    pub medium: u32,
     pub pad0: u32,
     pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// What fills a solid.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Medium {
+    /// Factor on light that passes the surface of the solid, each 0..1.
+    pub tint: [f32; 3],
     /// Index of refraction.
     pub ior: f32,
 }
@@ -155,10 +170,10 @@ pub struct Light {
     pub emission: [f32; 3],
     /// Area of a surface, m²; 1 without one.
     pub area: f32,
-    /// Media in which paths start on the front, and on the back of a surface: their indices, each
-    /// plus one, outermost first; 0 for none. See [`crate::bvh::MediaProbe`].
-    pub media: [u32; MEDIA_DEPTH],
-    pub back_media: [u32; MEDIA_DEPTH],
+    /// Media in which paths start on the front, and on the back of a surface: a set of slots. See
+    /// [`crate::bvh::MediaProbe`].
+    pub media: [u32; MEDIA_WORDS],
+    pub back_media: [u32; MEDIA_WORDS],
 }
 
 /// One entry of a table by which lights are chosen.
@@ -201,15 +216,16 @@ pub struct Path {
     /// `shaders/lib/transport/path.wesl`.
     pub history: u32,
     pub direction: [f32; 3],
-    /// Surfaces met so far.
+    /// Surfaces met so far, in the low 16 bits; diffuse ones in the high 16.
     pub bounces: u32,
     /// Flux in W of a photon (before the division by the number of paths), or weight of a camera
     /// path.
     pub beta: [f32; 3],
-    /// Depth of the stack of media.
-    pub media_count: u32,
-    /// Indices of the media around the path, outermost first.
-    pub media: [u32; MEDIA_DEPTH],
+    /// Primitive that the path leaves and does not meet next, with [`SPHERE_BIT`] if it is in
+    /// contact with others, which it leaves as well; [`NOTHING_LEFT`] for none.
+    pub left: u32,
+    /// Media around the path, a set of slots.
+    pub media: [u32; MEDIA_WORDS],
 }
 
 /// A stored photon.
@@ -240,12 +256,12 @@ pub struct VisiblePoint {
     pub offset: f32,
     /// Geometric normal, unit, on the viewer's side.
     pub ng: [f32; 3],
-    /// Media around the point as in [`Light::media`], 16 bits each: the two outermost, and below
-    /// the others. 0 and 0 for none, and where one of them is not among the first 65,535.
-    pub media_outer: u32,
+    /// Media around the point: up to eight slots plus one, 8 bits each; 0 and 0 for none. All bits
+    /// are set where there are more.
+    pub media_low: u32,
     /// Interpolated normal, unit, on the viewer's side of the geometric one.
     pub ns: [f32; 3],
-    pub media_inner: u32,
+    pub media_high: u32,
 }
 
 /// What happens to a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^18
@@ -260,12 +276,14 @@ pub struct Counters {
     pub next: u32,
     /// Photons staged, also those that did not fit.
     pub staged: u32,
-    /// Flux that the bounce limit took, in units of `1 / PhotonBatch::lost_scale` W: low word.
+    /// Light that the limits of bounces took, low word: flux of photons in units of
+    /// `1 / PhotonBatch::lost_scale` W, weight of camera paths in units of 1 / [`LOST_SCALE`].
     pub lost: u32,
     /// Rays traced, low and high word.
     pub rays: u32,
     pub rays_high: u32,
-    /// Times that a path entered more media than the stack holds.
+    /// Times that a path met more surfaces in one place, or a ray started inside of more media,
+    /// than there is room for.
     pub media_overflows: u32,
     /// Rays given up after the loop budget.
     pub unfinished: u32,
@@ -307,6 +325,7 @@ pub struct PhotonBatch {
     /// paths in turn; and the part of the first path.
     pub turns: u32,
     pub first_turn: u32,
+    /// Diffuse surfaces that a path meets at most.
     pub max_bounces: u32,
     /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`], [`AIM`],
     /// [`CAUSTICS_APART`].
@@ -318,7 +337,8 @@ pub struct PhotonBatch {
     /// Targets at which paths are aimed: the first, and how many.
     pub first_target: u32,
     pub target_count: u32,
-    pub pad0: u32,
+    /// Surfaces that a path meets at most.
+    pub max_surfaces: u32,
     pub pad1: u32,
 }
 
@@ -403,7 +423,7 @@ pub struct CameraTile {
     /// First sample of each pixel, and samples of each pixel, in this tile.
     pub first_sample: u32,
     pub samples: u32,
-    pub max_bounces: u32,
+    pub pad0: u32,
     /// Places for paths of a sample: both ways are followed at its first log2(branches) dielectric
     /// interfaces.
     pub branches: u32,
@@ -420,7 +440,7 @@ pub struct CameraTile {
     /// Samples in the tile's margin: they follow those of its pixels.
     pub margin: u32,
     /// Media around the lens, as in [`Light::media`].
-    pub media: [u32; MEDIA_DEPTH],
+    pub media: [u32; MEDIA_WORDS],
 }
 
 /// What the first ray of a camera sample hit.

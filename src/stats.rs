@@ -55,7 +55,7 @@ pub struct PhotonStats {
     pub global: MapStats,
     /// The map of light over mirrors and glass.
     pub caustic: MapStats,
-    /// Flux in W that the bounce limit took, mean of the channels, over all emitted paths.
+    /// Flux in W that the limits of bounces took, mean of the channels, over all emitted paths.
     pub lost_to_bounce_limit: f64,
     /// Each light by itself.
     #[serde(default)]
@@ -106,7 +106,11 @@ pub struct Stats {
     pub photons: PhotonStats,
     /// Rays traced: photon paths' segments, camera rays and shadow rays.
     pub rays: u64,
-    /// Times that a path entered more media than its stack holds.
+    /// Weight of the camera paths that ended in mirrors and glass without having met anything else,
+    /// in paths.
+    #[serde(default)]
+    pub lost_camera_paths: f64,
+    /// Times that more solids met in one place than are told apart.
     pub media_overflows: u64,
     /// Rays given up after the loop budget; their light is lost.
     pub unfinished_rays: u64,

@@ -1,35 +1,34 @@
-//! Initial media stack: the dielectric solids that contain the start of a path.
+//! Media around a point: the solids of glass that contain it.
 //!
-//! A straight path from infinity to the point enters and leaves solids; those that it has not left
-//! contain the point. Six such paths run along the axes, and the most frequent result is taken, so
-//! that a hole in one solid does not change it. Along an axis, the crossing test of a triangle is a
-//! winding number in the plane perpendicular to the axis. Edges follow a half-open rule (Sunday
-//! 2021, "Practical Geometry Algorithms", winding number), which is the same for both triangles of
-//! an edge. A path through edges or corners of a closed mesh therefore enters it as often as it
-//! leaves it.
+//! A straight path from infinity to the point enters and leaves solids; those that it has entered
+//! more often than left contain the point. Six such paths run along the axes, and the most frequent
+//! result is taken, so that a hole in one solid does not change it. Along an axis, the crossing
+//! test of a triangle is a winding number in the plane perpendicular to the axis. Edges follow a
+//! half-open rule (Sunday 2021, "Practical Geometry Algorithms", winding number), which is the same
+//! for both triangles of an edge. A path through edges or corners of a closed mesh therefore enters
+//! it as often as it leaves it.
 
 use glam::{DVec2, DVec3};
 
 use super::{Bvh, BvhChild, FILLER};
 use crate::{
-    layout::{MEDIA_DEPTH, Primitive, SPHERE_BIT},
-    scene::{Bounds, MediaTable, Scene},
+    layout::{MEDIA_WORDS, Primitive},
+    scene::{Bounds, NO_SLOT, Scene, Solids},
 };
 
 /// Relative widening of boxes, which covers the rounding of their corners.
 const BOX_SLACK: f64 = 1e-6;
 
-/// Stack of media in the device's format: index of each medium plus one, outermost first; 0 for
-/// none.
-pub type Media = [u32; MEDIA_DEPTH];
+/// Set of the slots of [`Solids`] that contain a point: bit `i % 32` of word `i / 32` for slot `i`.
+pub type Media = [u32; MEDIA_WORDS];
 
 /// Finds the media around points of a scene.
 #[derive(Debug)]
 pub struct MediaProbe<'a> {
     scene: &'a Scene,
     bvh: &'a Bvh,
-    media: MediaTable,
-    /// Box around all solids that have a medium, metres.
+    solids: &'a Solids,
+    /// Box around all solids, metres.
     bounds: Bounds,
 }
 
@@ -40,39 +39,42 @@ struct Crossing {
     height: f64,
     /// Whether the outside lies ahead along the axis.
     outside_ahead: bool,
-    medium: u32,
+    slot: u32,
 }
 
 impl<'a> MediaProbe<'a> {
-    /// Prepares queries for points of `scene`, whose hierarchy is `bvh`.
+    /// Prepares queries for points of `scene`, whose hierarchy is `bvh` and whose solids these are.
     #[must_use]
-    pub fn new(scene: &'a Scene, bvh: &'a Bvh) -> Self {
-        let media = MediaTable::new(&scene.materials);
-        let is_such = |material: u32| media.of(material).is_some();
-        let triangles = scene.triangles.iter().filter(|t| is_such(t.material)).map(Bounds::from);
-        let spheres = scene.spheres.iter().filter(|s| is_such(s.material)).map(Bounds::from);
-        let bounds = triangles.chain(spheres).fold(Bounds::EMPTY, Bounds::union);
-        Self { scene, bvh, media, bounds }
+    pub fn new(scene: &'a Scene, bvh: &'a Bvh, solids: &'a Solids) -> Self {
+        let bounds = match solids.is_empty() {
+            true => Bounds::EMPTY,
+            false => {
+                let triangles = scene.triangles.iter().map(Bounds::from);
+                let all = triangles.chain(scene.spheres.iter().map(Bounds::from)).zip(0..);
+                let of_solids = all.filter(|(_, i)| solids.slot(*i) != NO_SLOT).map(|(bounds, _)| bounds);
+                of_solids.fold(Bounds::EMPTY, Bounds::union)
+            }
+        };
+        Self { scene, bvh, solids, bounds }
     }
 
-    /// Indices of the media that contain a point (coordinates in metres), outermost first.
+    /// The media that contain a point (coordinates in metres).
     #[must_use]
-    pub fn at(&self, point: DVec3) -> Vec<u32> {
+    pub fn at(&self, point: DVec3) -> Media {
         let (min, max) = (self.bounds.min.as_dvec3(), self.bounds.max.as_dvec3());
         if !(point.cmpge(min).all() && point.cmple(max).all()) {
-            return Vec::new();
+            return Media::default();
         }
-        let found: Vec<Vec<u32>> = (0..3)
+        let found: Vec<Media> = (0..3)
             .flat_map(|axis| {
-                let mut crossings = self.crossings(point, axis);
-                crossings.sort_by(|a, b| b.height.abs().total_cmp(&a.height.abs()).then(a.medium.cmp(&b.medium)));
-                [stack_along(&crossings, true), stack_along(&crossings, false)]
+                let crossings = self.crossings(point, axis);
+                [media_along(&crossings, true), media_along(&crossings, false)]
             })
             .collect();
-        let votes = |stack: &Vec<u32>| found.iter().filter(|other| *other == stack).count();
+        let votes = |media: &Media| found.iter().filter(|other| *other == media).count();
         // `max_by_key` returns the last of several maxima; the reversed order makes it the first
         // axis.
-        found.iter().rev().max_by_key(|stack| votes(stack)).cloned().unwrap_or_default()
+        found.iter().rev().max_by_key(|media| votes(media)).copied().unwrap_or_default()
     }
 
     /// Intersections of the line through `point` along an axis with solids that have a medium.
@@ -99,56 +101,40 @@ impl<'a> MediaProbe<'a> {
         if primitive.id == FILLER {
             return;
         }
-        let Some(medium) = self.media.of(primitive.material & !SPHERE_BIT) else { return };
+        let slot = self.solids.slot(primitive.id);
+        if slot == NO_SLOT {
+            return;
+        }
         let id = primitive.id as usize;
         if let Some(triangle) = self.scene.triangles.get(id) {
             let corners = triangle.positions.map(|corner| split(corner.as_dvec3() - point, axis));
             let crossed = cross_triangle(corners);
-            found.extend(crossed.map(|(height, outside_ahead)| Crossing { height, outside_ahead, medium }));
+            found.extend(crossed.map(|(height, outside_ahead)| Crossing { height, outside_ahead, slot }));
         } else {
             let sphere = &self.scene.spheres[id - self.scene.triangles.len()];
             let (aside, middle) = split(sphere.center.as_dvec3() - point, axis);
             let half_squared = f64::from(sphere.radius).powi(2) - aside.length_squared();
             if half_squared > 0.0 {
                 let half = half_squared.sqrt();
-                found.push(Crossing { height: middle - half, outside_ahead: false, medium });
-                found.push(Crossing { height: middle + half, outside_ahead: true, medium });
+                found.push(Crossing { height: middle - half, outside_ahead: false, slot });
+                found.push(Crossing { height: middle + half, outside_ahead: true, slot });
             }
         }
     }
 }
 
-/// Converts the stack to the device's format and tells whether it fits. If not, the outermost media
-/// are kept.
-#[must_use]
-pub fn packed(stack: &[u32]) -> (Media, bool) {
-    let mut media = Media::default();
-    media.iter_mut().zip(stack).for_each(|(slot, medium)| *slot = medium + 1);
-    (media, stack.len() <= MEDIA_DEPTH)
-}
-
-/// Warning for paths that start inside more media than the stack holds.
-#[must_use]
-pub fn too_deep(what: &str, count: usize) -> Option<String> {
-    (count > 0).then(|| {
-        format!(
-            "{count} {what} lie within more than {MEDIA_DEPTH} nested media: the outermost {MEDIA_DEPTH} count there"
-        )
-    })
-}
-
-/// Media that a path along the axis, from infinity ahead or behind, has not left at the point.
-/// `crossings` begins with the farthest.
-fn stack_along(crossings: &[Crossing], from_ahead: bool) -> Vec<u32> {
-    let mut stack = Vec::new();
+/// Media that a path along the axis, from infinity ahead or behind, has entered more often than
+/// left at the point.
+fn media_along(crossings: &[Crossing], from_ahead: bool) -> Media {
+    let mut winding = [0_i32; NO_SLOT as usize];
     for crossing in crossings.iter().filter(|c| if from_ahead { c.height > 0.0 } else { c.height < 0.0 }) {
-        if crossing.outside_ahead == from_ahead {
-            stack.push(crossing.medium);
-        } else if let Some(innermost) = stack.iter().rposition(|medium| *medium == crossing.medium) {
-            stack.remove(innermost);
-        }
+        winding[crossing.slot as usize] += if crossing.outside_ahead == from_ahead { 1 } else { -1 };
     }
-    stack
+    let mut media = Media::default();
+    for (slot, _) in winding.iter().enumerate().filter(|(_, winding)| **winding > 0) {
+        media[slot / 32] |= 1 << (slot % 32);
+    }
+    media
 }
 
 /// Components of a vector perpendicular to an axis, and the component along it.
@@ -198,9 +184,14 @@ mod tests {
     use crate::scene::{Material, Sphere, Surface, Triangle};
 
     fn scene(surfaces: usize) -> Scene {
-        let surface = Surface::Glass { ior: 1.5, tint: Vec3::ONE };
-        let material = Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false };
-        Scene { materials: vec![material; surfaces], ..Scene::default() }
+        let material = |i: usize| Material {
+            name: String::new(),
+            surface: Surface::Glass { ior: 1.0 + i as f32, tint: Vec3::ONE },
+            emission: Vec3::ZERO,
+            double_sided: false,
+            priority: 0,
+        };
+        Scene { materials: (0..surfaces).map(material).collect(), ..Scene::default() }
     }
 
     /// Cube about the origin whose corners, edges and diagonals lie on axis-parallel lines through
@@ -220,37 +211,39 @@ mod tests {
         }
     }
 
-    fn media(scene: &Scene, point: DVec3) -> Vec<u32> {
-        MediaProbe::new(scene, &Bvh::build(scene)).at(point)
+    /// Indices of refraction of the media around a point, the one that fills the space first.
+    fn media(scene: &Scene, point: DVec3) -> Vec<f32> {
+        let solids = Solids::new(scene);
+        let media = MediaProbe::new(scene, &Bvh::build(scene), &solids).at(point);
+        let holds = |slot: &usize| media[slot / 32] >> (slot % 32) & 1 == 1;
+        (0..solids.media.len()).filter(holds).map(|slot| solids.media[slot].ior).collect()
     }
 
     #[test]
-    fn nested_solids_are_found_from_the_outside_in() {
+    fn nested_solids_are_found_from_the_inside_out() {
         let mut scene = scene(3);
         scene.spheres.push(Sphere { center: Vec3::ZERO, radius: 1.0, material: 2 });
         add_cube(&mut scene, 2.0, 1, 6);
         add_cube(&mut scene, 4.0, 0, 6);
         // Points on and off the edges and diagonals of the faces as projected along all axes.
         for (point, around) in [
-            (dvec3(0.0, 0.0, 0.0), vec![0, 1, 2]),
-            (dvec3(1.5, 1.5, 1.5), vec![0, 1]),
-            (dvec3(1.25, -1.25, 0.5), vec![0, 1]),
-            (dvec3(3.0, 3.0, 2.0), vec![0]),
-            (dvec3(2.0 - 1e-9, 0.0, 0.1), vec![0, 1]),
-            (dvec3(2.0 + 1e-9, 0.0, 0.1), vec![0]),
+            (dvec3(0.0, 0.0, 0.0), vec![3.0, 2.0, 1.0]),
+            (dvec3(1.5, 1.5, 1.5), vec![2.0, 1.0]),
+            (dvec3(1.25, -1.25, 0.5), vec![2.0, 1.0]),
+            (dvec3(3.0, 3.0, 2.0), vec![1.0]),
+            (dvec3(2.0 - 1e-9, 0.0, 0.1), vec![2.0, 1.0]),
+            (dvec3(2.0 + 1e-9, 0.0, 0.1), vec![1.0]),
             (dvec3(5.0, 0.0, 0.0), vec![]),
         ] {
             assert_eq!(media(&scene, point), around, "at {point}");
         }
-        assert_eq!(packed(&[0, 2]), ([1, 3, 0, 0], true));
-        assert_eq!(packed(&[4, 3, 2, 1, 0]), ([5, 4, 3, 2], false));
     }
 
     #[test]
     fn a_missing_face_does_not_decide() {
         let mut open = scene(1);
         add_cube(&mut open, 2.0, 0, 5);
-        assert_eq!(media(&open, dvec3(0.3, 0.2, 0.1)), [0]);
+        assert_eq!(media(&open, dvec3(0.3, 0.2, 0.1)), [1.0]);
         let mut sheet = scene(1);
         add_cube(&mut sheet, 2.0, 0, 1);
         assert!(media(&sheet, dvec3(2.0, 0.2, 0.1)).is_empty(), "control: a single sheet is no solid");
@@ -264,7 +257,7 @@ mod tests {
         add_cube(&mut shell, 1.0, 0, 6);
         shell.triangles[outer..].iter_mut().for_each(|t| t.positions.swap(1, 2));
         assert!(media(&shell, dvec3(0.5, 0.5, 0.5)).is_empty());
-        assert_eq!(media(&shell, dvec3(1.5, 0.5, 0.5)), [0]);
+        assert_eq!(media(&shell, dvec3(1.5, 0.5, 0.5)), [1.0]);
         assert!(media(&shell, vec3(1.5, 9.0, 0.5).as_dvec3()).is_empty());
     }
 }

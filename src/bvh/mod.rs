@@ -7,6 +7,7 @@
 //! farther children and keeps at most [`BVH_STACK`](crate::layout::BVH_STACK) of them on its stack.
 
 mod build;
+mod contacts;
 mod convert;
 mod media;
 mod node;
@@ -15,5 +16,6 @@ mod tests;
 mod widen;
 
 pub use build::{Bvh, FILLER};
-pub use media::{Media, MediaProbe, packed, too_deep};
+pub use contacts::contacts;
+pub use media::{Media, MediaProbe};
 pub use node::{BvhChild, MAX_LEAF, WIDTH};

@@ -90,8 +90,8 @@ pub struct SharedOptions {
     pub max_paths: Option<u64>,
 
     #[arg(help = format!(
-        "Longest photon path, and longest chain of mirrors and glass on a camera path, in surfaces, up to {}; 0 leaves the \
-         end of paths to Russian roulette",
+        "Most diffuse surfaces on a photon path, up to {}; 0 leaves the end of paths to Russian roulette, as it always does \
+         in mirrors and glass",
         PhotonSettings::MAX_BOUNCES.most()
     ))]
     #[arg(long, value_name = "B", default_value_t = 20, help_heading = "Photons")]

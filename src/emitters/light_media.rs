@@ -3,14 +3,13 @@
 use glam::{DVec3, Vec3};
 
 use crate::{
-    bvh::{MediaProbe, packed},
+    bvh::MediaProbe,
     layout::{self, Light, OFFSET_SCALE},
 };
 
-/// Notes the media around a light; false if there are more than a path keeps, of which the
-/// outermost count. One place of a surface speaks for all of it, just off each side: the middle of
+/// Notes the media around a light. One place of a surface speaks for all of it, just off each side: the middle of
 /// a triangle, a point of a sphere.
-pub fn set_media(light: &mut Light, probe: &MediaProbe) -> bool {
+pub fn set_media(light: &mut Light, probe: &MediaProbe) {
     let [position, e1, e2] = [light.position, light.e1, light.e2].map(|v| Vec3::from_array(v).as_dvec3());
     let (place, normal, reach) = match light.kind {
         layout::POINT_LIGHT | layout::SPOT_LIGHT => (position, DVec3::ZERO, 0.0),
@@ -23,10 +22,8 @@ pub fn set_media(light: &mut Light, probe: &MediaProbe) -> bool {
             (position + e1.x * outward, outward, position.abs().max_element() + e1.x)
         }
         // What comes from infinitely far away starts outside of all.
-        _ => return true,
+        _ => return,
     };
-    let at = |side: f64| packed(&probe.at(place + side * reach * f64::from(OFFSET_SCALE) * normal));
-    let ((front, front_fits), (back, back_fits)) = (at(1.0), at(-1.0));
-    (light.media, light.back_media) = (front, back);
-    front_fits && back_fits
+    let at = |side: f64| probe.at(place + side * reach * f64::from(OFFSET_SCALE) * normal);
+    (light.media, light.back_media) = (at(1.0), at(-1.0));
 }

@@ -7,7 +7,7 @@ use super::{
     tiles::{CameraPass, Gatherer},
 };
 use crate::{
-    bvh::{Bvh, Media, MediaProbe, packed, too_deep},
+    bvh::{Bvh, Media, MediaProbe},
     error::Result,
     gpu::Gpu,
     image::{Film, Frame},
@@ -58,11 +58,9 @@ impl<'a> Session<'a> {
         progress.report(Stage::Bvh, 0, 1);
         let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
         let buffers = SceneBuffers::new(gpu, scene, &bvh, lights)?;
-        stats.warnings.extend(buffers.lights.warnings.iter().cloned());
-        let probe = MediaProbe::new(scene, &bvh);
-        let around = scene.cameras.iter().map(|camera| packed(&probe.at(camera.position.as_dvec3())));
-        let (camera_media, fits): (Vec<Media>, Vec<bool>) = around.unzip();
-        stats.warnings.extend(too_deep("cameras", fits.iter().filter(|fits| !**fits).count()));
+        stats.warnings.extend(buffers.lights.warnings.iter().cloned().chain(buffers.solids.warning()));
+        let probe = MediaProbe::new(scene, &bvh, &buffers.solids);
+        let camera_media = scene.cameras.iter().map(|camera| probe.at(camera.position.as_dvec3())).collect();
         Ok(Self { gpu, scene, buffers, camera_media, stats })
     }
 

@@ -3,7 +3,7 @@
 use crate::{
     emitters::LightGroup,
     gpu::Gpu,
-    layout::MEDIA_DEPTH,
+    layout::CHAIN_LIMIT,
     passes::{RawMap, StepCount},
     stats::{LightStats, MapStats, NonFinite, Stats},
     upload::SceneBuffers,
@@ -46,14 +46,24 @@ fn warn_of_faults(stats: &mut Stats) {
     }
     if stats.media_overflows > 0 {
         stats.warnings.push(format!(
-            "paths entered more than {} nested media {} times; the outer ones count there",
-            MEDIA_DEPTH, stats.media_overflows
+            "{} times more surfaces of glass lay in one place, or a ray of final gathering started in more solids, than \
+             are told apart; the rest counts as not there",
+            stats.media_overflows
         ));
     }
 }
 
+/// Warning for light that camera paths lost in mirrors and glass, as a fraction of all paths.
+pub(super) fn lost_in_chains(fraction: f64) -> Option<String> {
+    (fraction > 1e-4).then(|| {
+        let percent = 100.0 * fraction;
+        format!("{percent:.2} % of the camera's paths met {CHAIN_LIMIT} mirrors and glasses and ended there, dark")
+    })
+}
+
 pub(super) fn add_step(stats: &mut Stats, count: StepCount) {
     stats.rays += count.rays;
+    stats.lost_camera_paths += count.lost;
     count_faults(stats, count.media_overflows, count.unfinished);
 }
 

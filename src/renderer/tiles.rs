@@ -96,6 +96,8 @@ impl<'a> CameraPass<'a> {
         }
         progress.report(stage, tiles.len() as u64, tiles.len() as u64);
         stats.non_finite.film += films.iter().map(Film::non_finite).sum::<u64>();
+        let paths = f64::from(self.window.width) * f64::from(self.window.height) * f64::from(self.spp);
+        stats.warnings.extend(tally::lost_in_chains(stats.lost_camera_paths / paths));
         Ok(films)
     }
 

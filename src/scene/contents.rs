@@ -27,6 +27,9 @@ pub struct Scene {
     pub center: DVec3,
     /// Triangles of all meshes.
     pub triangles: Vec<Triangle>,
+    /// Index of the solid of glass that each triangle bounds, `u32::MAX` for none; empty where no
+    /// file says which triangles belong together.
+    pub shells: Vec<u32>,
     /// Exact spheres.
     pub spheres: Vec<Sphere>,
     /// Materials; triangles and spheres refer to them by index.

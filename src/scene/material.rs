@@ -62,7 +62,7 @@ impl Surface {
     #[must_use]
     pub fn medium(&self) -> Option<Medium> {
         match *self {
-            Surface::Glass { ior, .. } => Some(Medium { ior }),
+            Surface::Glass { ior, tint } => Some(Medium { ior, tint }),
             Surface::Diffuse { .. } | Surface::Mirror { .. } | Surface::Pane { .. } => None,
         }
     }
@@ -87,6 +87,8 @@ impl fmt::Display for Surface {
 pub struct Medium {
     /// Index of refraction.
     pub ior: f32,
+    /// Factor on light that passes the surface of the solid, each channel 0 to 1.
+    pub tint: Vec3,
 }
 
 /// A named surface.
@@ -102,58 +104,7 @@ pub struct Material {
     pub emission: Vec3,
     /// Whether the back side emits the same radiance.
     pub double_sided: bool,
-}
-
-/// Media of a scene. Each material that bounds a solid has its own medium, which identifies the
-/// solid that a path leaves.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct MediaTable {
-    /// The media, by index.
-    pub media: Vec<Medium>,
-    /// Index of the medium of each material, if it bounds a solid.
-    of_materials: Vec<Option<u32>>,
-}
-
-impl MediaTable {
-    /// Lists the media that `materials` bound, in the order of the materials.
-    #[must_use]
-    pub fn new(materials: &[Material]) -> Self {
-        let mut table = Self::default();
-        for material in materials {
-            let medium = material.surface.medium();
-            table.of_materials.push(medium.map(|_| table.media.len() as u32));
-            table.media.extend(medium);
-        }
-        table
-    }
-
-    /// Index of the medium that a material bounds.
-    #[must_use]
-    pub fn of(&self, material: u32) -> Option<u32> {
-        self.of_materials[material as usize]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_solids_have_media_and_each_its_own() {
-        let surfaces = [
-            Surface::Pane { ior: 1.3, tint: Vec3::ONE },
-            Surface::Glass { ior: 1.5, tint: Vec3::ONE },
-            Surface::Diffuse { albedo: Vec3::ONE },
-            Surface::Glass { ior: 1.5, tint: Vec3::ZERO },
-        ];
-        let materials = surfaces.map(|surface| Material {
-            name: String::new(),
-            surface,
-            emission: Vec3::ZERO,
-            double_sided: false,
-        });
-        let table = MediaTable::new(&materials);
-        assert_eq!(table.media, [Medium { ior: 1.5 }; 2]);
-        assert_eq!([0, 1, 2, 3].map(|material| table.of(material)), [None, Some(0), None, Some(1)]);
-    }
+    /// Of several solids that claim the same space, that of the highest priority fills it; among
+    /// equals the smallest. 0 unless the file says otherwise.
+    pub priority: i32,
 }

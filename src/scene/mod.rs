@@ -11,6 +11,7 @@ mod load;
 mod load_options;
 mod material;
 mod shape;
+mod solids;
 mod words;
 
 pub use camera::{Camera, Projection};
@@ -19,5 +20,6 @@ pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};
 pub use environment::Environment;
 pub use light::{LUMENS_PER_WATT, Light, LightKind, MIN_FALLOFF};
 pub use load_options::LoadOptions;
-pub use material::{Material, MediaTable, Medium, Surface};
+pub use material::{Material, Medium, Surface};
 pub use shape::{Bounds, Sphere, Triangle};
+pub use solids::{NO_SLOT, Solids};

@@ -107,8 +107,8 @@ pub struct PhotonSettings {
     pub max_paths: Option<u64>,
     /// Where photon paths are sent.
     pub emission: Emission,
-    /// Longest photon path and longest specular chain of a camera path, surfaces, in
-    /// [`Self::MAX_BOUNCES`]; 0: roulette alone ends paths.
+    /// Maximum number of diffuse surfaces on a photon path, in [`Self::MAX_BOUNCES`]; 0: roulette
+    /// alone ends paths. Chains of mirrors and glass go on beyond it.
     pub max_bounces: u32,
     /// Numbers for sampling.
     pub sampler: Sampler,

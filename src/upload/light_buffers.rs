@@ -2,7 +2,7 @@
 //! targets, environment.
 
 use crate::{
-    bvh::{Bvh, MediaProbe, too_deep},
+    bvh::MediaProbe,
     emitters::{
         environment_map::EnvironmentMap,
         light_table::{Choices, LightTable},
@@ -52,14 +52,13 @@ impl LightBuffers {
     ///
     /// # Errors
     /// As [`LightTable::new`], and [`crate::Error::Limit`] if the lights exceed a binding.
-    pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &Scene, probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = delta_targets(scene);
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
-        let probe = MediaProbe::new(scene, bvh);
-        let buried = table.lights.iter_mut().map(|light| set_media(light, &probe)).filter(|fits| !fits).count();
+        table.lights.iter_mut().for_each(|light| set_media(light, probe));
         let upload = |label: &str, choices: &Choices| -> Result<ChoiceBuffer> {
             Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, turns: choices.turns })
         };
@@ -82,7 +81,7 @@ impl LightBuffers {
             direct: upload("direct light choices", &table.for_direct_light())?,
             delta_targets: targets.len() as u32,
             has_environment: map.is_some(),
-            warnings: reduced(scene, map.as_ref()).into_iter().chain(too_deep("lights", buried)).collect(),
+            warnings: reduced(scene, map.as_ref()).into_iter().collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
             targets: gpu.storage_with("targets", &spheres)?,
             scene_sphere: gpu.uniform("scene sphere", &scene_sphere),

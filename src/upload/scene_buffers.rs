@@ -1,20 +1,18 @@
 //! Bind group 0: the scene on the device. Owner of `shaders/bindings/scene.wesl`.
 
-use std::borrow::Cow;
-
 use bytemuck::Pod;
 
 use super::light_buffers::LightBuffers;
 use crate::{
-    bvh::Bvh,
+    bvh::{Bvh, MediaProbe, contacts},
     emitters::light_table::{LightTable, emission_in},
-    error::Result,
+    error::{Error, Result},
     gpu::{
         Buffer, Gpu, Kernel, Table,
         shaders::{Shader, shader},
     },
-    layout::{self, DELTA_BIT, Primitive, SPHERE_BIT},
-    scene::{Material, MediaTable, Scene, Surface},
+    layout::{self, CONTACT_BIT, DELTA_BIT, MATERIAL_MASK, Primitive, SLOT_SHIFT, SPHERE_BIT},
+    scene::{Material, Medium, Scene, Solids, Surface},
     settings::{LightSettings, LightUnit, Sampler},
 };
 
@@ -29,9 +27,15 @@ pub struct SceneBuffers {
     has_spheres: bool,
     /// Children that a traversal can postpone.
     stack: usize,
+    /// Surfaces lie in each other.
+    has_contacts: bool,
+    /// Some surface scatters specularly.
+    pub has_specular: bool,
     /// Some surface both reflects and transmits.
     pub has_dielectrics: bool,
     pub lights: LightBuffers,
+    /// Which surfaces bound which solids.
+    pub solids: Solids,
 }
 
 /// The `override` constant that says where a kernel's numbers for sampling come from.
@@ -60,21 +64,29 @@ impl SceneBuffers {
     /// [`crate::Error::Limit`] if the primitives exceed two bindings, the nodes one, or normals,
     /// materials or media a table; as [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
-        let media = MediaTable::new(&scene.materials);
-        let row = |(m, i)| material(m, media.of(i), settings.unit);
-        let materials: Vec<_> = scene.materials.iter().zip(0..).map(row).collect();
-        let media: Vec<_> = media.media.iter().map(|medium| layout::Medium { ior: medium.ior }).collect();
-        let lights = LightBuffers::new(gpu, scene, bvh, settings)?;
+        let solids = Solids::new(scene);
+        if scene.materials.len() > MATERIAL_MASK as usize {
+            let problem = format!("{} materials in use; at most {MATERIAL_MASK}", scene.materials.len());
+            return Err(Error::Scene { path: scene.path.clone(), place: "materials".to_owned(), problem });
+        }
+        let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.unit)).collect();
+        let row = |m: &Medium| layout::Medium { tint: m.tint.to_array(), ior: m.ior };
+        let media: Vec<_> = solids.media.iter().map(row).collect();
+        let lights = LightBuffers::new(gpu, scene, &MediaProbe::new(scene, bvh, &solids), settings)?;
+        let contacts = contacts(scene, bvh);
         Ok(Self {
             nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
-            primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &lights.table))?,
+            primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &solids, &contacts, &lights.table))?,
             normals: Table::new(gpu, "normals", &bvh.normals)?,
             materials: Table::new(gpu, "materials", &materials)?,
             media: Table::new(gpu, "media", &media)?,
+            has_contacts: contacts.contains(&true),
+            has_specular: scene.has_delta(),
             has_dielectrics: scene.materials.iter().any(|m| m.surface.ior().is_some()),
             has_spheres: !scene.spheres.is_empty(),
             // In steps, so that few variants of a kernel are compiled.
             stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
+            solids,
             lights,
         })
     }
@@ -97,6 +109,7 @@ impl SceneBuffers {
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
+            ("HAS_CONTACTS", f64::from(u8::from(self.has_contacts))),
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
             ("SPLIT", f64::from(u8::from(self.primitives.window > 0))),
@@ -136,22 +149,26 @@ fn window_or_all(window: u64) -> f64 {
     if window == 0 { f64::from(u32::MAX) } else { window as f64 }
 }
 
-/// The primitives, each with the light that it is, and those of delta surfaces marked.
-fn marked<'a>(primitives: &'a [Primitive], scene: &Scene, lights: &LightTable) -> Cow<'a, [Primitive]> {
+/// The primitives, each with the light that it is, and marked as [`Primitive::material`] says.
+fn marked(
+    primitives: &[Primitive],
+    scene: &Scene,
+    solids: &Solids,
+    contacts: &[bool],
+    lights: &LightTable,
+) -> Vec<Primitive> {
     let is_delta: Vec<bool> = scene.materials.iter().map(|m| m.surface.is_delta()).collect();
-    if !lights.has_surfaces() && !is_delta.contains(&true) {
-        return Cow::Borrowed(primitives);
-    }
-    let bits = |material: u32| {
-        let delta = is_delta.get((material & !SPHERE_BIT) as usize) == Some(&true);
-        if delta { material | DELTA_BIT } else { material }
+    let mark = |(p, contact): (&Primitive, &bool)| {
+        let delta = is_delta.get((p.material & !SPHERE_BIT) as usize) == Some(&true);
+        let bits = if delta { DELTA_BIT } else { 0 } | if *contact { CONTACT_BIT } else { 0 };
+        let material = p.material | bits | (solids.slot(p.id) << SLOT_SHIFT);
+        Primitive { emitter: lights.emitter(p.id), material, ..*p }
     };
-    let mark = |p: &Primitive| Primitive { emitter: lights.emitter(p.id), material: bits(p.material), ..*p };
-    primitives.iter().map(mark).collect()
+    primitives.iter().zip(contacts).map(mark).collect()
 }
 
-/// Row of the material table; `medium` is the one that the material bounds.
-fn material(material: &Material, medium: Option<u32>, unit: LightUnit) -> layout::Material {
+/// Row of the material table.
+fn material(material: &Material, unit: LightUnit) -> layout::Material {
     let surface = &material.surface;
     layout::Material {
         color: surface.color().to_array(),
@@ -164,7 +181,6 @@ fn material(material: &Material, medium: Option<u32>, unit: LightUnit) -> layout
         emission: emission_in(material.emission, unit).to_array(),
         ior: surface.ior().unwrap_or(1.0),
         double_sided: u32::from(material.double_sided),
-        medium: medium.unwrap_or(0),
         ..Default::default()
     }
 }

@@ -9,7 +9,7 @@ use crate::{
     bvh::Media,
     error::{Error, Result},
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CameraTile, Counters, FirstHit, Gathered, MARGIN_CELL, MARGIN_SAMPLES, PixelSums, VisiblePoint},
+    layout::{self, CameraTile, Counters, FirstHit, Gathered, MARGIN_CELL, MARGIN_SAMPLES, PixelSums, VisiblePoint},
     passes::{
         estimate::SharedPoints,
         wavefront::{Step, Wavefront},
@@ -204,8 +204,8 @@ impl CameraTracer {
         let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
         let start = Step { kernel: start.kernel, buffers: &started };
         let trace = Step { kernel: trace.kernel, buffers: &followed };
-        // The surface that ends the chain comes after max_bounces specular surfaces.
-        let most_surfaces = self.view.max_bounces + 1;
+        // Without mirrors and glass, the first surface ends every path.
+        let most_surfaces = if scene.has_specular { layout::CHAIN_LIMIT } else { 1 };
         let counters =
             self.wavefront.run(gpu, scene, (&start, invocations.into()), &trace, most_paths, most_surfaces)?;
         Ok(StepCount::from(counters))
@@ -309,7 +309,6 @@ fn view(
         height,
         forward: camera.forward.to_array(),
         spp: picture.spp,
-        max_bounces: photons.bounce_limit(),
         parallel: u32::from(parallel),
         lens_radius: 0.5 * picture.aperture,
         focus: picture.focus.unwrap_or(1.0),

@@ -1,6 +1,6 @@
 //! Tiles: parts of a picture's samples, and what one step did to them.
 
-use crate::layout::Counters;
+use crate::layout::{Counters, LOST_SCALE};
 
 /// A part of the picture's samples.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +22,8 @@ pub struct StepCount {
     pub media_overflows: u64,
     pub unfinished: u64,
     pub non_finite: u64,
+    /// Weight of the camera paths that the chain limit ended, in paths.
+    pub lost: f64,
 }
 
 impl std::ops::AddAssign for StepCount {
@@ -30,6 +32,7 @@ impl std::ops::AddAssign for StepCount {
         self.media_overflows += other.media_overflows;
         self.unfinished += other.unfinished;
         self.non_finite += other.non_finite;
+        self.lost += other.lost;
     }
 }
 
@@ -40,6 +43,7 @@ impl From<Counters> for StepCount {
             media_overflows: u64::from(counters.media_overflows),
             unfinished: u64::from(counters.unfinished),
             non_finite: u64::from(counters.non_finite),
+            lost: counters.all_lost() as f64 / f64::from(LOST_SCALE),
         }
     }
 }

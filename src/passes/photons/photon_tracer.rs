@@ -15,7 +15,7 @@ use crate::{
     layout::{self, PhotonBatch},
     map_kind::{ByKind, MapKind},
     progress::{Progress, Stage},
-    settings::{Emission, PhotonSettings, Sampler},
+    settings::{Emission, MAX_BOUNCES, PhotonSettings, Sampler},
     upload::{SceneBuffers, light_buffers::ChoiceBuffer},
 };
 
@@ -210,6 +210,10 @@ impl EmissionPlan<'_> {
             light_count: scene.lights.table.lights.len() as u32,
             turns: self.choices.turns,
             max_bounces: settings.bounce_limit(),
+            max_surfaces: match scene.has_specular {
+                true => MAX_BOUNCES.min(settings.bounce_limit() + layout::CHAIN_LIMIT),
+                false => settings.bounce_limit(),
+            },
             rules: self.rules
                 | open(MapKind::Global, layout::STORE_GLOBAL)
                 | open(MapKind::Caustic, layout::STORE_CAUSTIC),

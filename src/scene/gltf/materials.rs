@@ -22,7 +22,7 @@ fn name(material: &json::Material, index: usize) -> String {
 pub(super) fn default_material(notes: &mut Notes) -> Read<Material> {
     let name = "default material".to_owned();
     let surface = surface(&json::Material::default(), &name, "materials", notes)?;
-    Ok(Material { name, surface, emission: Vec3::ZERO, double_sided: false })
+    Ok(Material { name, surface, emission: Vec3::ZERO, double_sided: false, priority: 0 })
 }
 
 /// A material of the file.
@@ -33,7 +33,17 @@ pub(super) fn read(root: &json::Root, index: usize, notes: &mut Notes) -> Read<M
     let surface = surface(material, &name, &place, notes)?;
     let emission = emission(material, &name, &place, notes)?;
     note_unread(material, notes);
-    Ok(Material { name, surface, emission, double_sided: material.double_sided })
+    Ok(Material { name, surface, emission, double_sided: material.double_sided, priority: priority(material, &place)? })
+}
+
+/// Rank among overlapping solids: `extras.caustica.priority`, an integer; 0 without one.
+fn priority(material: &json::Material, place: &str) -> Read<i32> {
+    let extras = material.extras.as_ref().and_then(|extras| serde_json::from_str::<serde_json::Value>(extras.get()).ok());
+    let Some(priority) = extras.as_ref().and_then(|extras| extras.get("caustica")?.get("priority")) else {
+        return Ok(0);
+    };
+    let integer = priority.as_i64().and_then(|priority| i32::try_from(priority).ok());
+    integer.map_or_else(|| fault(format!("{place}.extras.caustica.priority"), format!("{priority} is not an integer of 32 bits")), Ok)
 }
 
 /// Nearest surface model.

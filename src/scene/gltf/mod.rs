@@ -10,7 +10,10 @@ use glam::{DVec3, Vec3};
 use gltf::json;
 use sha2::{Digest as _, Sha256};
 
-use super::{Bounds, Camera, Light, LoadOptions, Scene, Sphere};
+use super::{
+    Bounds, Camera, Light, LoadOptions, Scene, Sphere,
+    solids::{self, MeshRange},
+};
 use crate::{Error, Result};
 
 mod accessor;
@@ -115,12 +118,26 @@ fn assemble(
     let mut scene = Scene { center, mesh_count: root.meshes.len(), ..Scene::default() };
     let slots = read_materials(root, &instances, &contents.spheres, &mut scene, &mut notes)?;
     let slot = |material: Option<usize>| slots[material.unwrap_or(root.materials.len())];
-    scene.triangles = placing::place(&instances, center, slot, &mut notes)?;
+    let (mut triangles, placed_meshes) = placing::place(&instances, center, slot, &mut notes)?;
+    let ranges: Vec<MeshRange> = placed_meshes.into_iter().map(|placed| mesh_range(root, placed)).collect();
+    let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges);
+    warnings.into_iter().for_each(|warning| notes.add(warning));
+    (scene.triangles, scene.shells) = (triangles, shells);
     scene.spheres = contents.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
     contents.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     scene.warnings = notes.into_lines();
     Ok(scene)
+}
+
+/// A copy of a mesh with its name in messages.
+fn mesh_range(root: &json::Root, (triangles, node): placing::PlacedMesh) -> MeshRange {
+    let mesh = root.nodes[node].mesh.map_or(0, |mesh| mesh.value());
+    let name = match root.meshes.get(mesh).and_then(|mesh| mesh.name.as_deref()) {
+        Some(name) if !name.is_empty() => format!("mesh {name:?}"),
+        _ => format!("meshes[{mesh}]"),
+    };
+    MeshRange { triangles, name }
 }
 
 /// Reads the materials in use. Returns the index in the scene for each of the file's materials,

@@ -1,5 +1,7 @@
 //! Meshes transformed to the world by their nodes, in f64 until the scene's centre is subtracted.
 
+use std::{collections::HashSet, ops::Range};
+
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::fault::{Notes, Read, fault};
@@ -62,13 +64,18 @@ pub(super) fn measure(instances: &[MeshInstance<'_>], bounds: &mut WorldBounds) 
     Ok(())
 }
 
-/// All shown triangles relative to `center`. `material` maps the file's materials to the scene's.
+/// The triangles of a copy of a mesh, with the node that shows it.
+pub(super) type PlacedMesh = (Range<usize>, usize);
+
+/// All shown triangles relative to `center`, and which copies of meshes they are of. `material` maps
+/// the file's materials to the scene's. A mesh that nodes show twice in exactly one place is there
+/// once.
 pub(super) fn place(
     instances: &[MeshInstance<'_>],
     center: DVec3,
     material: impl Fn(Option<usize>) -> u32,
     notes: &mut Notes,
-) -> Read<Vec<Triangle>> {
+) -> Read<(Vec<Triangle>, Vec<PlacedMesh>)> {
     let claimed: usize = instances
         .iter()
         .map(|instance| instance.copies() * total(instance.primitives, |primitive| primitive.claimed))
@@ -78,9 +85,18 @@ pub(super) fn place(
         .map(|instance| instance.copies() * total(instance.primitives, |primitive| primitive.corners.len()))
         .sum();
     let mut triangles = Vec::with_capacity(kept);
+    let (mut meshes, mut known, mut repeated, mut left_out) = (Vec::new(), HashSet::new(), 0, 0);
     for instance in instances {
+        let is_rigid = instance.primitives.iter().all(|primitive| primitive.influences.is_empty());
         for i in 0..instance.copies() {
             let to_scene = DMat4::from_translation(-center) * instance.world(i)?;
+            let place = (instance.primitives.as_ptr(), to_scene.to_cols_array().map(f64::to_bits));
+            if is_rigid && !known.insert(place) {
+                repeated += 1;
+                left_out += total(instance.primitives, |primitive| primitive.claimed);
+                continue;
+            }
+            let first = triangles.len();
             for primitive in instance.primitives {
                 let material = material(primitive.material);
                 if primitive.influences.is_empty() {
@@ -89,13 +105,17 @@ pub(super) fn place(
                     place_skinned(instance, primitive, center, material, &mut triangles);
                 }
             }
+            meshes.push((first..triangles.len(), instance.node));
         }
     }
-    let dropped = claimed - triangles.len();
+    if repeated > 0 {
+        notes.add(format!("{repeated} copies of meshes lie exactly where others do and are not drawn"));
+    }
+    let dropped = claimed - left_out - triangles.len();
     if dropped > 0 {
         notes.add(format!("{dropped} of {claimed} triangles have no area and are not drawn"));
     }
-    Ok(triangles)
+    Ok((triangles, meshes))
 }
 
 fn total(primitives: &[MeshPrimitive], of: impl Fn(&MeshPrimitive) -> usize) -> usize {

@@ -113,9 +113,8 @@ fn emitters_start_in_what_is_around_them() {
         SceneBuffers::new(gpu(), &scene, &Bvh::build(&scene), &LightSettings::default()).expect("the scene fits");
     let lights = &buffers.lights.table.lights;
     let found: Vec<_> = lights.iter().map(|light| (light.media, light.back_media)).collect();
-    // Media are numbered in the order of the materials that bound them: box, ball, glowing glass.
-    let (none, water, glow) = ([0; 4], [1, 2, 0, 0], [1, 3, 0, 0]);
-    let glass = [1, 0, 0, 0];
+    // Slots by size: glowing glass, ball, box.
+    let (none, water, glow, glass) = ([0; 4], [6, 0, 0, 0], [5, 0, 0, 0], [4, 0, 0, 0]);
     // The point light, the bulbs, the panel's two triangles, and glass that emits on both sides. No
     // path leaves from a bulb's inside.
     let fronts: Vec<_> = found.iter().map(|(front, _)| *front).collect();

@@ -1,0 +1,181 @@
+//! Meshes of glass that are not clean solids: what is amiss, and what is assumed instead.
+
+use std::{
+    collections::{HashMap, HashSet},
+    ops::Range,
+};
+
+use super::{
+    NONE, glass,
+    shells::{Shell, Shells},
+};
+use crate::scene::{Material, Surface, Triangle};
+
+/// Part of the surface below which a hole of few edges counts as a missing triangle.
+const SMALL_HOLE: f64 = 0.05;
+/// Edges of the largest hole that counts as missing triangles.
+const HOLE_EDGES: usize = 6;
+
+/// The triangles of one copy of a mesh, as a node shows it.
+#[derive(Clone, Debug)]
+pub(in crate::scene) struct MeshRange {
+    pub triangles: Range<usize>,
+    /// Name for messages.
+    pub name: String,
+}
+
+/// What was found in the shells of a mesh, each with the number of shells or triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Faults {
+    doubled: usize,
+    open: usize,
+    turned: usize,
+    holes: usize,
+    t_junctions: usize,
+}
+
+/// Repairs the glass of a scene: doubled faces count once, open sheets become thin panes, and
+/// outermost shells with faces inwards are turned. Returns the solid of each triangle, as
+/// [`Scene::shells`](crate::scene::Scene::shells), and one warning for each mesh that is not clean.
+pub(in crate::scene) fn repair(
+    triangles: &mut Vec<Triangle>,
+    materials: &mut Vec<Material>,
+    meshes: &[MeshRange],
+) -> (Vec<u32>, Vec<String>) {
+    let is_glass = glass(materials);
+    if !triangles.iter().any(|triangle| is_glass[triangle.material as usize]) {
+        return (vec![NONE; triangles.len()], Vec::new());
+    }
+    let mut faults: Vec<Faults> = vec![Faults::default(); meshes.len()];
+    let mut mesh_of = vec![0_usize; triangles.len()];
+    for (m, mesh) in meshes.iter().enumerate() {
+        mesh_of[mesh.triangles.clone()].fill(m);
+    }
+    let kept = without_doubles(triangles, &mesh_of, &is_glass, &mut faults);
+    let mut flags = kept.iter();
+    triangles.retain(|_| flags.next() == Some(&true));
+    let mut flags = kept.iter();
+    mesh_of.retain(|_| flags.next() == Some(&true));
+
+    let groups = groups(triangles, &mesh_of, &is_glass);
+    let mut found = Shells::new(triangles, &groups);
+    let mesh = |shell: &Shell| mesh_of[shell.triangles[0] as usize];
+    for (_, shell) in found.shells.iter().filter(|(_, shell)| is_sheet(shell)) {
+        faults[mesh(shell)].open += 1;
+        let solid = triangles[shell.triangles[0] as usize].material;
+        let pane = pane_of(materials, solid);
+        shell.triangles.iter().for_each(|i| triangles[*i as usize].material = pane);
+    }
+    found.shells.retain(|(_, shell)| !is_sheet(shell));
+    for i in 0..found.shells.len() {
+        let (group, shell) = &found.shells[i];
+        let fault = &mut faults[mesh(shell)];
+        fault.holes += usize::from(!shell.is_closed());
+        fault.t_junctions += usize::from(shell.has_t_junctions);
+        if shell.volume < 0.0 && found.around(triangles, *group, shell).is_none() {
+            fault.turned += 1;
+            shell.triangles.iter().for_each(|i| turn(&mut triangles[*i as usize]));
+            found.shells[i].1.volume *= -1.0;
+        }
+    }
+    let warnings = meshes.iter().zip(&faults).filter_map(|(mesh, faults)| warning(&mesh.name, faults));
+    (found.solids(triangles), merged(warnings.collect()))
+}
+
+/// A sheet encloses nothing: light goes through it as through a thin pane.
+fn is_sheet(shell: &Shell) -> bool {
+    !(shell.is_closed() || shell.openness < SMALL_HOLE && shell.hole_edges <= HOLE_EDGES)
+}
+
+/// Which triangles to keep: of glass that lies in one place several times the first, whichever way
+/// its faces look.
+fn without_doubles(
+    triangles: &[Triangle],
+    mesh_of: &[usize],
+    is_glass: &[bool],
+    faults: &mut [Faults],
+) -> Vec<bool> {
+    let corners = |triangle: &Triangle| {
+        let mut keys = triangle.positions.map(|p| (p + glam::Vec3::ZERO).to_array().map(f32::to_bits));
+        keys.sort_unstable();
+        keys
+    };
+    // Two triangles of a solid that look away from each other are a wall in it, unless all are
+    // doubled.
+    let mut known: HashMap<(u32, [[u32; 3]; 3]), Vec<usize>> = HashMap::new();
+    for (i, triangle) in triangles.iter().enumerate().filter(|(_, t)| is_glass[t.material as usize]) {
+        known.entry((triangle.material, corners(triangle))).or_default().push(i);
+    }
+    let mut kept = vec![true; triangles.len()];
+    let mut doubled: HashMap<(usize, u32), (usize, usize)> = HashMap::new();
+    for ((material, _), same) in &known {
+        for &i in same {
+            let counts = doubled.entry((mesh_of[i], *material)).or_default();
+            counts.0 += 1;
+            counts.1 += usize::from(same.iter().any(|j| *j != i && mesh_of[*j] == mesh_of[i]));
+        }
+    }
+    for ((material, _), same) in known.iter().filter(|(_, same)| same.len() > 1) {
+        let first = same[0];
+        for &i in &same[1..] {
+            let aligned = triangles[first].geometric_normal().dot(triangles[i].geometric_normal()) > 0.0;
+            let (all, twice) = doubled[&(mesh_of[i], *material)];
+            if aligned || (mesh_of[first] == mesh_of[i] && 10 * twice >= 9 * all) {
+                kept[i] = false;
+                faults[mesh_of[i]].doubled += 1;
+            }
+        }
+    }
+    kept
+}
+
+/// Triangles of glass by mesh and material.
+fn groups(triangles: &[Triangle], mesh_of: &[usize], is_glass: &[bool]) -> Vec<Vec<u32>> {
+    let mut groups: Vec<Vec<u32>> = Vec::new();
+    let mut known: HashMap<(usize, u32), usize> = HashMap::new();
+    for (i, triangle) in triangles.iter().enumerate().filter(|(_, t)| is_glass[t.material as usize]) {
+        let group = *known.entry((mesh_of[i], triangle.material)).or_insert_with(|| {
+            groups.push(Vec::new());
+            groups.len() - 1
+        });
+        groups[group].push(i as u32);
+    }
+    groups
+}
+
+/// The thin pane of the same glass; added where there is none yet.
+fn pane_of(materials: &mut Vec<Material>, solid: u32) -> u32 {
+    let glass = materials[solid as usize].clone();
+    let Surface::Glass { ior, tint } = glass.surface else { return solid };
+    let pane = Material { name: format!("{} (thin)", glass.name), surface: Surface::Pane { ior, tint }, ..glass };
+    let known = materials.iter().position(|material| *material == pane);
+    known.unwrap_or_else(|| {
+        materials.push(pane);
+        materials.len() - 1
+    }) as u32
+}
+
+/// Lets the face look the other way.
+fn turn(triangle: &mut Triangle) {
+    triangle.positions.swap(1, 2);
+    triangle.normals.swap(1, 2);
+    triangle.normals = triangle.normals.map(|normal| -normal);
+}
+
+fn warning(name: &str, faults: &Faults) -> Option<String> {
+    let parts = [
+        (faults.doubled > 0, "has doubled faces, which count once".to_owned()),
+        (faults.open > 0, "is an open sheet, taken for a thin pane (a solid has to be closed)".to_owned()),
+        (faults.turned > 0, "is wound inside out and was turned".to_owned()),
+        (faults.holes > 0, "has holes, but is taken for a solid".to_owned()),
+        (faults.t_junctions > 0, "has T-junctions, but is taken for closed".to_owned()),
+    ];
+    let said: Vec<String> = parts.into_iter().filter(|(holds, _)| *holds).map(|(_, text)| text).collect();
+    (!said.is_empty()).then(|| format!("{name}: its glass {}", said.join("; ")))
+}
+
+/// Each line once, in order.
+fn merged(lines: Vec<String>) -> Vec<String> {
+    let mut known = HashSet::new();
+    lines.into_iter().filter(|line| known.insert(line.clone())).collect()
+}

@@ -1,0 +1,200 @@
+//! Shells: connected parts of the surfaces of glass, and what they enclose.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, Vec3};
+
+use super::NONE;
+use crate::scene::Triangle;
+
+/// A connected part of a mesh: its triangles share vertices.
+#[derive(Clone, Debug)]
+pub(super) struct Shell {
+    /// Indices of its triangles.
+    pub triangles: Vec<u32>,
+    /// Enclosed volume, m³; negative if the faces look inwards.
+    pub volume: f64,
+    /// Area of what is missing to close it over that of its triangles.
+    pub openness: f64,
+    /// Edges of the largest hole.
+    pub hole_edges: usize,
+    /// Faces meet along parts of edges.
+    pub has_t_junctions: bool,
+}
+
+/// The shells of several meshes.
+#[derive(Debug, Default)]
+pub(super) struct Shells {
+    /// Each with the group of its triangles, in which shells can be cavities of others.
+    pub shells: Vec<(usize, Shell)>,
+    triangles: usize,
+}
+
+/// Holes smaller than this part of the surface are cracks of rounding.
+const CLOSED: f64 = 1e-4;
+
+impl Shells {
+    /// The shells of the triangles of each group.
+    pub(super) fn new(triangles: &[Triangle], groups: &[Vec<u32>]) -> Self {
+        let mut found = Self { shells: Vec::new(), triangles: triangles.len() };
+        for (g, group) in groups.iter().enumerate() {
+            found.shells.extend(connected(triangles, group).into_iter().map(|part| (g, measure(triangles, part))));
+        }
+        found
+    }
+
+    /// The shells of scenes that no file describes: a group for each material of glass.
+    pub(super) fn of_materials(triangles: &[Triangle], is_glass: &[bool]) -> Self {
+        let mut groups = vec![Vec::new(); is_glass.len()];
+        for (triangle, i) in triangles.iter().zip(0..).filter(|(t, _)| is_glass[t.material as usize]) {
+            groups[triangle.material as usize].push(i);
+        }
+        Self::new(triangles, &groups)
+    }
+
+    /// The solid of each triangle: a shell with faces outwards and the cavities in it.
+    pub(super) fn solids(&self, triangles: &[Triangle]) -> Vec<u32> {
+        let mut of = vec![NONE; self.triangles];
+        for (i, (group, shell)) in self.shells.iter().enumerate() {
+            let solid = if shell.volume < 0.0 { self.around(triangles, *group, shell).unwrap_or(i) } else { i };
+            shell.triangles.iter().for_each(|triangle| of[*triangle as usize] = solid as u32);
+        }
+        of
+    }
+
+    /// The smallest shell of the group with faces outwards that a shell lies in.
+    pub(super) fn around(&self, triangles: &[Triangle], group: usize, inner: &Shell) -> Option<usize> {
+        let corner = triangles[inner.triangles[0] as usize].positions[0].as_dvec3();
+        let outer = self.shells.iter().enumerate().filter(|(_, (g, shell))| {
+            *g == group && shell.volume > inner.volume.abs() && winding(triangles, shell, corner) > 0.5
+        });
+        outer.min_by(|(_, (_, a)), (_, (_, b))| a.volume.total_cmp(&b.volume)).map(|(i, _)| i)
+    }
+}
+
+impl Shell {
+    /// Nothing is missing but for rounding.
+    pub(super) fn is_closed(&self) -> bool {
+        self.openness < CLOSED
+    }
+}
+
+/// How often a shell winds around a point: the solid angle over 4π (van Oosterom and Strackee
+/// 1983).
+fn winding(triangles: &[Triangle], shell: &Shell, point: DVec3) -> f64 {
+    let angle = |i: &u32| {
+        let [a, b, c] = triangles[*i as usize].positions.map(|p| p.as_dvec3() - point);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        2.0 * a.dot(b.cross(c)).atan2(denominator)
+    };
+    shell.triangles.iter().map(angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
+/// Bits of a position, by which equal vertices are found; −0 is 0.
+fn key(position: Vec3) -> [u32; 3] {
+    (position + Vec3::ZERO).to_array().map(f32::to_bits)
+}
+
+/// Parts of a group whose triangles share vertices, in the order of their first triangles.
+fn connected(triangles: &[Triangle], group: &[u32]) -> Vec<Vec<u32>> {
+    let mut ids: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut parent: Vec<u32> = Vec::new();
+    let mut corner_ids = Vec::with_capacity(group.len());
+    for &triangle in group {
+        let corners = triangles[triangle as usize].positions.map(|p| {
+            *ids.entry(key(p)).or_insert_with(|| {
+                parent.push(parent.len() as u32);
+                parent.len() as u32 - 1
+            })
+        });
+        let root = find(&mut parent, corners[0]);
+        for corner in &corners[1..] {
+            let other = find(&mut parent, *corner);
+            let lower = root.min(other).min(find(&mut parent, root));
+            let (a, b) = (find(&mut parent, root), other);
+            parent[a.max(b) as usize] = a.min(b).min(lower);
+        }
+        corner_ids.push(corners[0]);
+    }
+    let mut parts: Vec<Vec<u32>> = Vec::new();
+    let mut part_of: HashMap<u32, usize> = HashMap::new();
+    for (&triangle, &corner) in group.iter().zip(&corner_ids) {
+        let root = find(&mut parent, corner);
+        let part = *part_of.entry(root).or_insert_with(|| {
+            parts.push(Vec::new());
+            parts.len() - 1
+        });
+        parts[part].push(triangle);
+    }
+    parts
+}
+
+fn find(parent: &mut [u32], mut i: u32) -> u32 {
+    while parent[i as usize] != i {
+        parent[i as usize] = parent[parent[i as usize] as usize];
+        i = parent[i as usize];
+    }
+    i
+}
+
+/// Volume and holes of a connected part.
+fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
+    let origin = triangles[part[0] as usize].positions[0].as_dvec3();
+    let (mut volume, mut area) = (0.0, 0.0);
+    // Directed edges without a partner in the other direction.
+    let mut edges: HashMap<([u32; 3], [u32; 3]), (i32, DVec3, DVec3)> = HashMap::new();
+    for &triangle in &part {
+        let positions = triangles[triangle as usize].positions;
+        let [a, b, c] = positions.map(|p| p.as_dvec3() - origin);
+        volume += a.dot(b.cross(c)) / 6.0;
+        area += 0.5 * (b - a).cross(c - a).length();
+        for (p, q, from, to) in
+            [(0, 1, a, b), (1, 2, b, c), (2, 0, c, a)].map(|(i, j, from, to)| (positions[i], positions[j], from, to))
+        {
+            let (p, q) = (key(p), key(q));
+            let (edge, direction) = if p < q { ((p, q), 1) } else { ((q, p), -1) };
+            let (from, to) = if p < q { (from, to) } else { (to, from) };
+            edges.entry(edge).or_insert((0, from, to)).0 += direction;
+        }
+    }
+    let open: Vec<_> = edges.into_iter().filter(|(_, (count, ..))| *count != 0).collect();
+    let loops = boundary(&open);
+    let missing: f64 = loops.iter().map(|(vector, _)| vector.length()).sum();
+    Shell {
+        triangles: part,
+        volume,
+        openness: missing / area.max(f64::MIN_POSITIVE),
+        hole_edges: loops.iter().filter(|(v, _)| v.length() > CLOSED * area).map(|(_, n)| *n).max().unwrap_or(0),
+        has_t_junctions: !open.is_empty() && loops.iter().any(|(v, _)| v.length() <= CLOSED * area),
+    }
+}
+
+/// Vector area and number of edges of each connected part of a boundary.
+fn boundary(open: &[(([u32; 3], [u32; 3]), (i32, DVec3, DVec3))]) -> Vec<(DVec3, usize)> {
+    let mut sorted: Vec<_> = open.iter().collect();
+    sorted.sort_by_key(|(edge, _)| *edge);
+    let mut ids: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut parent: Vec<u32> = Vec::new();
+    for ((p, q), _) in &sorted {
+        let [a, b] = [p, q].map(|corner| {
+            let id = *ids.entry(*corner).or_insert_with(|| {
+                parent.push(parent.len() as u32);
+                parent.len() as u32 - 1
+            });
+            find(&mut parent, id)
+        });
+        parent[a.max(b) as usize] = a.min(b);
+    }
+    let mut parts: HashMap<u32, (DVec3, usize)> = HashMap::new();
+    for ((p, _), (count, from, to)) in sorted {
+        let root = find(&mut parent, ids[p]);
+        let part = parts.entry(root).or_default();
+        // The hole's outline runs against the faces' edges.
+        part.0 -= 0.5 * f64::from(*count) * from.cross(*to);
+        part.1 += 1;
+    }
+    let mut found: Vec<_> = parts.into_iter().collect();
+    found.sort_by_key(|(root, _)| *root);
+    found.into_iter().map(|(_, part)| part).collect()
+}
