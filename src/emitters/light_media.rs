@@ -7,9 +7,9 @@ use crate::{
     layout::{self, Light, OFFSET_SCALE},
 };
 
-/// Notes the media around a light; false if there are more than a path keeps, of which the
-/// outermost count. One place of a surface speaks for all of it, just off each side: the middle of
-/// a triangle, a point of a sphere.
+/// Sets the media around a light. Returns false if there are more than a path keeps; then the
+/// outermost are kept. For a surface, the media just off each side of one point stand for the whole
+/// surface: the centroid of a triangle, any point of a sphere.
 pub fn set_media(light: &mut Light, probe: &MediaProbe) -> bool {
     let [position, e1, e2] = [light.position, light.e1, light.e2].map(|v| Vec3::from_array(v).as_dvec3());
     let (place, normal, reach) = match light.kind {
@@ -22,7 +22,7 @@ pub fn set_media(light: &mut Light, probe: &MediaProbe) -> bool {
             let outward = DVec3::ONE.normalize();
             (position + e1.x * outward, outward, position.abs().max_element() + e1.x)
         }
-        // What comes from infinitely far away starts outside of all.
+        // Light from infinitely far away starts outside of all media.
         _ => return true,
     };
     let at = |side: f64| packed(&probe.at(place + side * reach * f64::from(OFFSET_SCALE) * normal));
