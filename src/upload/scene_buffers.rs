@@ -27,14 +27,14 @@ pub struct SceneBuffers {
     materials: Table,
     media: Table,
     has_spheres: bool,
-    /// Children that a traversal can postpone.
+    /// Maximum number of deferred children in a traversal.
     stack: usize,
-    /// Some surface both reflects and transmits.
+    /// Some surface both reflects and transmits light.
     pub has_dielectrics: bool,
     pub lights: LightBuffers,
 }
 
-/// The `override` constant that says where a kernel's numbers for sampling come from.
+/// The `override` constant that selects a kernel's sampler: the source of its sample numbers.
 #[must_use]
 pub fn sampler_constant(sampler: Sampler) -> (&'static str, f64) {
     let number = match sampler {
@@ -73,7 +73,7 @@ impl SceneBuffers {
             media: Table::new(gpu, "media", &media)?,
             has_dielectrics: scene.materials.iter().any(|m| m.surface.ior().is_some()),
             has_spheres: !scene.spheres.is_empty(),
-            // In steps, so that few variants of a kernel are compiled.
+            // Rounded up to multiples of 16, so that few variants of a kernel are compiled.
             stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
             lights,
         })
@@ -85,13 +85,13 @@ impl SceneBuffers {
         self.kernel_with(gpu, stem, &[])
     }
 
-    /// The same with further `override` constants.
+    /// As [`Self::kernel`], with further `override` constants.
     #[must_use]
     pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
         self.kernel_of(gpu, shader(stem), others)
     }
 
-    /// The same of an entry of another table: the probes of the tests.
+    /// As [`Self::kernel_with`], for a shader of another table: the probes of the tests.
     #[doc(hidden)]
     #[must_use]
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
@@ -136,7 +136,7 @@ fn window_or_all(window: u64) -> f64 {
     if window == 0 { f64::from(u32::MAX) } else { window as f64 }
 }
 
-/// The primitives, each with the light that it is, and those of delta surfaces marked.
+/// The primitives, each with the index of its light, and with [`DELTA_BIT`] on specular surfaces.
 fn marked<'a>(primitives: &'a [Primitive], scene: &Scene, lights: &LightTable) -> Cow<'a, [Primitive]> {
     let is_delta: Vec<bool> = scene.materials.iter().map(|m| m.surface.is_delta()).collect();
     if !lights.has_surfaces() && !is_delta.contains(&true) {
@@ -150,7 +150,7 @@ fn marked<'a>(primitives: &'a [Primitive], scene: &Scene, lights: &LightTable) -
     primitives.iter().map(mark).collect()
 }
 
-/// Row of the material table; `medium` is the one that the material bounds.
+/// Row of the material table. `medium`: index of the medium that the material encloses.
 fn material(material: &Material, medium: Option<u32>, unit: LightUnit) -> layout::Material {
     let surface = &material.surface;
     layout::Material {
