@@ -312,8 +312,8 @@ pub struct PhotonBatch {
     pub light_count: u32,
     /// Number of strata of the random number that chooses a light, which are assigned to the paths
     /// in turn; and the stratum of the first path.
-    pub turns: u32,
-    pub first_turn: u32,
+    pub strata: u32,
+    pub first_stratum: u32,
     pub max_bounces: u32,
     /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`], [`AIM`],
     /// [`CAUSTICS_APART`].
@@ -334,8 +334,13 @@ impl PhotonBatch {
     /// `strata` are assigned to these in turn.
     #[must_use]
     pub fn starting_at(self, path: u64) -> Self {
-        let (round, turn) = (path / u64::from(self.turns), path % u64::from(self.turns));
-        Self { first_round: round as u32, first_round_high: (round >> 32) as u32, first_turn: turn as u32, ..self }
+        let (round, stratum) = (path / u64::from(self.strata), path % u64::from(self.strata));
+        Self {
+            first_round: round as u32,
+            first_round_high: (round >> 32) as u32,
+            first_stratum: stratum as u32,
+            ..self
+        }
     }
 }
 

@@ -55,7 +55,7 @@ pub struct Choices {
     pub entries: Vec<LightChoice>,
     /// Strata of the random number that chooses a light, assigned to the paths in turn; 0 if no
     /// light can be chosen.
-    pub turns: u32,
+    pub strata: u32,
 }
 
 impl LightTable {
@@ -131,7 +131,7 @@ impl LightTable {
     pub fn for_direct_light(&self) -> Choices {
         let mut powers = self.powers.clone();
         powers[..self.punctual].fill(0.0);
-        Choices { entries: entries(&powers), turns: 1 }
+        Choices { entries: entries(&powers), strata: 1 }
     }
 
     fn choices(&self, powers: Vec<f64>, settings: &LightSettings) -> Choices {
@@ -150,8 +150,8 @@ impl LightTable {
             if power > 0.0 { power * factors[light.group as usize] } else { 0.0 }
         };
         let weights: Vec<f64> = self.lights.iter().zip(powers).map(weigh).collect();
-        let turns = if settings.sampling == LightSampling::Uniform { shining } else { shining.min(1) };
-        Choices { entries: entries(&weights), turns }
+        let strata = if settings.sampling == LightSampling::Uniform { shining } else { shining.min(1) };
+        Choices { entries: entries(&weights), strata }
     }
 
     fn start_group(&mut self, name: &str, kind: &'static str) {

@@ -20,8 +20,8 @@ use crate::{
 #[derive(Debug)]
 pub struct ChoiceBuffer {
     pub buffer: Buffer,
-    /// See [`Choices::turns`].
-    pub turns: u32,
+    /// See [`Choices::strata`].
+    pub strata: u32,
 }
 
 /// The lights on the device.
@@ -62,7 +62,7 @@ impl LightBuffers {
         let probe = MediaProbe::new(scene, bvh);
         let buried = table.lights.iter_mut().map(|light| set_media(light, &probe)).filter(|fits| !fits).count();
         let upload = |label: &str, choices: &Choices| -> Result<ChoiceBuffer> {
-            Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, turns: choices.turns })
+            Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, strata: choices.strata })
         };
         let spheres: Vec<[f32; 4]> =
             [&around].into_iter().chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();

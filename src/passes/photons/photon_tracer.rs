@@ -198,7 +198,7 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool)
         fills: &[MapKind::Caustic],
     };
     let wanted = [Some(general), (aimed && caustics).then_some(caustic)];
-    wanted.into_iter().flatten().filter(|plan| plan.choices.turns > 0).collect()
+    wanted.into_iter().flatten().filter(|plan| plan.choices.strata > 0).collect()
 }
 
 impl EmissionPlan<'_> {
@@ -211,7 +211,7 @@ impl EmissionPlan<'_> {
         PhotonBatch {
             seed: settings.seed,
             light_count: scene.lights.table.lights.len() as u32,
-            turns: self.choices.turns,
+            strata: self.choices.strata,
             max_bounces: settings.bounce_limit(),
             rules: self.rules
                 | open(MapKind::Global, layout::STORE_GLOBAL)
