@@ -118,7 +118,13 @@ fn rays() -> Vec<Ray> {
 fn room(side: i32) -> Scene {
     let surface = Surface::Diffuse { albedo: Vec3::splat(0.5) };
     let mut scene = Scene {
-        materials: vec![Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false, priority: 0 }],
+        materials: vec![Material {
+            name: String::new(),
+            surface,
+            emission: Vec3::ZERO,
+            double_sided: false,
+            priority: 0,
+        }],
         ..Scene::default()
     };
     let mut quad = |corners: [Vec3; 4]| {

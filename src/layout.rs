@@ -1,4 +1,4 @@
-//! Every struct that crosses to the GPU, in one file.
+//! All structs shared with the GPU, in one file.
 //!
 //! Each struct here has a twin of the same name in `shaders/`; `tests/house/layouts.rs` reflects
 //! the shaders and compares names, order, offsets and sizes. Vectors are arrays so that `repr(C)`
@@ -9,36 +9,39 @@ use bytemuck::{Pod, Zeroable};
 
 /// Invocations per workgroup, in every kernel.
 pub const WORKGROUP_SIZE: u32 = 64;
-/// Bits of the index of a node or a primitive where more stands above it.
+/// Bits of the index of a node or a primitive in words whose higher bits hold another value.
 pub const BVH_INDEX_BITS: u32 = 28;
 /// Workgroups per dimension that every adapter can dispatch.
 pub const MAX_WORKGROUPS: u32 = 65_535;
-/// Children that a BVH traversal can postpone; [`crate::bvh`] builds no tree that needs more.
+/// Maximum number of deferred children in a BVH traversal; [`crate::bvh`] builds no tree that needs
+/// more.
 pub const BVH_STACK: usize = 48;
-/// Bound of the weight by which an interpolated normal changes flux that grazes the geometric
-/// surface.
+/// Maximum of the weight by which an interpolated normal changes flux; it grows without bound
+/// towards grazing angles to the geometric surface.
 pub const MAX_NORMAL_WEIGHT: f32 = 8.0;
-/// Rounding of a hit point, as a fraction of the largest coordinate that it is computed from:
+/// Rounding error of a hit point, as a fraction of the largest coordinate that it is computed from:
 /// 2^-19.
 pub const OFFSET_SCALE: f32 = 1.907_348_6e-6;
 /// Words of a set of media, one bit for each slot of [`crate::scene::Solids`].
 pub const MEDIA_WORDS: usize = 4;
 
-/// One interior node of the BVH: its children's boxes and what they are, four words at a time as
-/// software Vulkan reads them fastest. Interior children come before leaves and lie side by side,
-/// as do the primitives of all its leaves. Made by `BvhNode::new` in `src/bvh/node.rs`.
+/// One interior node of the BVH: boxes and kinds of its children. It consists of vectors of four
+/// words, which software Vulkan reads fastest. Interior children come before leaves and are
+/// consecutive, as are the primitives of all its leaves. Made by `BvhNode::new` in
+/// `src/bvh/node.rs`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct BvhNode {
-    /// Bits of the lower corner of the box around all children, metres; then the shape: for each
-    /// axis eight bits, the exponent of a unit as in a float's bits, and from bit 24 two bits for
-    /// each child, the primitives of a leaf less one.
+    /// Words 0 to 2: lower corner of the box around all children, metres, as bits of floats. Word
+    /// 3: the shape. Eight bits for each axis are the exponent of its unit, biased as in a float.
+    /// From bit 24 on, two bits for each child are the number of primitives of a leaf, less one.
     pub grid: [u32; 4],
-    /// For each axis the lower bounds of the children's boxes, eight bits each, in units from the
-    /// corner; then the first interior child in 28 bits and how many there are.
+    /// Words 0 to 2: for each axis the lower bounds of the children's boxes, eight bits each, in
+    /// units from the corner. Word 3: index of the first interior child in 28 bits, above it the
+    /// number of interior children.
     pub low: [u32; 4],
-    /// The upper bounds; then the leaves' first primitive in 28 bits and the number of all
-    /// children.
+    /// Words 0 to 2: the upper bounds. Word 3: index of the leaves' first primitive in 28 bits,
+    /// above it the number of all children.
     pub high: [u32; 4],
 }
 
@@ -76,7 +79,7 @@ pub struct Primitive {
     /// Index of the primitive in the scene before the BVH reordered it.
     pub id: u32,
     pub e2: [f32; 3],
-    /// Index of the primitive as a [`Light`], plus one; 0 if it does not shine.
+    /// Index of the primitive's [`Light`], plus one; 0 if it does not emit light.
     pub emitter: u32,
 }
 
@@ -93,7 +96,8 @@ pub struct Normals {
     pub flat_shaded: u32,
 }
 
-/// Texels in a row of a table (`gpu::Table`): the least width of a texture that every device has.
+/// Texels in a row of a table (`gpu::Table`): the maximum width of a texture that every device
+/// supports.
 pub const TABLE_COLUMNS: u32 = 2048;
 
 /// Kinds of [`Material`].
@@ -104,27 +108,27 @@ pub const GLASS: u32 = 2;
 /// Thin pane: light goes straight through.
 pub const PANE: u32 = 3;
 
-/// How a surface scatters and shines.
+/// Scattering and emission of a surface.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Material {
-    /// Diffuse: albedo. Mirror: tint of the reflection. Glass, pane: tint of what is transmitted.
+    /// Diffuse: albedo. Mirror: tint of the reflection. Glass, pane: tint of the transmitted light.
     /// Each 0..1.
     pub color: [f32; 3],
     /// One of [`DIFFUSE`], [`MIRROR`], [`GLASS`], [`PANE`].
     pub kind: u32,
-    /// Radiance that its front side sends out, W/(m² sr).
+    /// Radiance that the front side emits, W/(m² sr).
     pub emission: [f32; 3],
     /// Index of refraction of panes.
     pub ior: f32,
-    /// 1 if its back sends out as much.
+    /// 1 if the back emits as much.
     pub double_sided: u32,
     pub pad0: u32,
     pub pad1: u32,
     pub pad2: u32,
 }
 
-/// What fills a solid.
+/// The medium inside a solid.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Medium {
@@ -134,41 +138,42 @@ pub struct Medium {
     pub ior: f32,
 }
 
-/// Kinds of [`Light`]: punctual ones,
+/// Kinds of [`Light`]. First the punctual lights.
 pub const POINT_LIGHT: u32 = 0;
 pub const SPOT_LIGHT: u32 = 1;
 pub const DIRECTIONAL_LIGHT: u32 = 2;
-/// surfaces,
+/// Emissive surfaces.
 pub const TRIANGLE_LIGHT: u32 = 3;
 pub const SPHERE_LIGHT: u32 = 4;
-/// and what comes from all around.
+/// The environment.
 pub const ENVIRONMENT_LIGHT: u32 = 5;
 
-/// Anything that shines: a punctual light, an emissive triangle or sphere, or the environment. Its
-/// power is `emission · area · solid_angle`, but for directional lights and the environment.
+/// A punctual light, an emissive triangle or sphere, or the environment. Its power is `emission ·
+/// area · solid_angle`, except for directional lights and the environment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Light {
-    /// Point, spot: place, metres. Triangle: its first corner. Sphere: its centre.
+    /// Point, spot: position, metres. Triangle: its first corner. Sphere: its centre.
     pub position: [f32; 3],
     /// One of [`POINT_LIGHT`] … [`ENVIRONMENT_LIGHT`].
     pub kind: u32,
-    /// Spot, directional: unit direction in which it shines. Triangle: edge to the second corner.
-    /// Sphere: (radius, 0, 0).
+    /// Spot, directional: unit direction of emission. Triangle: edge to the second corner. Sphere:
+    /// (radius, 0, 0).
     pub e1: [f32; 3],
-    /// What a user calls one light: all that shines by one material is a group.
+    /// Index of the group, what a user calls one light: all surfaces of one emissive material are a
+    /// group.
     pub group: u32,
     /// Spot: 1 − cos of the outer angle, and width in cosines of the falloff. Triangle: edge to the
     /// third corner.
     pub e2: [f32; 3],
-    /// Integral over all directions of the share of `emission` that goes there, sr: point 4π, spot
-    /// as its falloff says, surfaces π for the front alone and 2π for both sides.
+    /// Integral over all directions of the fraction of `emission` that goes there, sr. Point: 4π.
+    /// Spot: by its falloff. Surfaces: π for the front alone, 2π for both sides.
     pub solid_angle: f32,
     /// Point, spot: radiant intensity (on the axis), W/sr. Directional: irradiance of a surface
     /// that faces it, W/m². Triangle, sphere: radiance, W/(m² sr). Environment: 1, a factor on its
     /// pixels.
     pub emission: [f32; 3],
-    /// Area of a surface, m²; 1 without one.
+    /// Surfaces: area, m². Others: 1.
     pub area: f32,
     /// Media in which paths start on the front, and on the back of a surface: a set of slots. See
     /// [`crate::bvh::MediaProbe`].
@@ -176,11 +181,12 @@ pub struct Light {
     pub back_media: [u32; MEDIA_WORDS],
 }
 
-/// One entry of a table by which lights are chosen.
+/// One entry of a table from which lights are sampled.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LightChoice {
-    /// Probability that this light or one before it is chosen; 1 for the last that can be.
+    /// Probability that this light or one before it is chosen; 1 for the last light that can be
+    /// chosen.
     pub cdf: f32,
     /// Probability of this light: the difference to its predecessor.
     pub probability: f32,
@@ -207,12 +213,12 @@ pub struct EnvironmentInfo {
     pub rotation_sin: f32,
 }
 
-/// A path on its way: a photon, or a camera ray. Rewritten in place by each bounce.
+/// State of a photon path or a camera path. Each bounce overwrites it in place.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Path {
     pub origin: [f32; 3],
-    /// What is remembered of the path, by accessors of its kind in
+    /// History of the path. Each kind of path has its accessors in
     /// `shaders/lib/transport/path.wesl`.
     pub history: u32,
     pub direction: [f32; 3],
@@ -242,7 +248,7 @@ pub struct Photon {
     pub normal: u32,
 }
 
-/// Where a camera path met a diffuse surface; asks for the light that leaves there.
+/// A visible point: where a camera path hit a diffuse surface, and the outgoing light is sought.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct VisiblePoint {
@@ -252,7 +258,7 @@ pub struct VisiblePoint {
     pub next_map: u32,
     /// Weight of the camera path times the BRDF, albedo/π: multiplies irradiance.
     pub weight: [f32; 3],
-    /// Distance by which a ray that leaves must be moved along `ng` off the surface, metres.
+    /// Distance along `ng` by which the origin of a ray must be moved off the surface, metres.
     pub offset: f32,
     /// Geometric normal, unit, on the viewer's side.
     pub ng: [f32; 3],
@@ -264,17 +270,17 @@ pub struct VisiblePoint {
     pub media_high: u32,
 }
 
-/// What happens to a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^18
-/// paths of at most 4095 bounces, so that what is counted once a bounce stays below 2^30; the host
-/// adds batches up in 64 bits.
+/// Counters of a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^18 paths
+/// of at most 4095 bounces, so that a counter that grows by one per bounce stays below 2^30. The
+/// host adds batches up in 64 bits.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Counters {
-    /// Paths in the list that the running bounce reads.
+    /// Paths in the queue that the current bounce reads.
     pub current: u32,
-    /// Paths put into the next list.
+    /// Paths put into the next queue.
     pub next: u32,
-    /// Photons staged, also those that did not fit.
+    /// Photons staged, including those that did not fit.
     pub staged: u32,
     /// Light that the limits of bounces took, low word: flux of photons in units of
     /// `1 / PhotonBatch::lost_scale` W, weight of camera paths in units of 1 / [`LOST_SCALE`].
@@ -285,10 +291,9 @@ pub struct Counters {
     /// Times that a path met more surfaces in one place, or a ray started inside of more media,
     /// than there is room for.
     pub media_overflows: u32,
-    /// Rays given up after the loop budget.
+    /// Rays abandoned when the loop budget was spent.
     pub unfinished: u32,
-    /// Infinite or undefined numbers that were left out, each with the path or sample that it
-    /// belonged to.
+    /// Infinite or NaN values that were left out, each with its path or sample.
     pub non_finite: u32,
     /// High word of `lost`.
     pub lost_high: u32,
@@ -303,7 +308,7 @@ impl Counters {
         u64::from(self.rays) | (u64::from(self.rays_high) << 32)
     }
 
-    /// Flux that the bounce limit took, in its unit.
+    /// Flux lost to the bounce limit, in the unit of [`Self::lost`].
     #[must_use]
     pub fn all_lost(&self) -> u64 {
         u64::from(self.lost) | (u64::from(self.lost_high) << 32)
@@ -315,16 +320,16 @@ impl Counters {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PhotonBatch {
     pub seed: u32,
-    /// Round of the first path, low and high word: paths before it over `turns`.
+    /// Round of the first path, low and high word: number of paths before it, divided by `strata`.
     pub first_round: u32,
     pub first_round_high: u32,
     pub paths: u32,
     /// Entries of the table of lights.
     pub light_count: u32,
-    /// The range of random numbers that choose lights is cut into this many parts, dealt to the
-    /// paths in turn; and the part of the first path.
-    pub turns: u32,
-    pub first_turn: u32,
+    /// Number of strata of the random number that chooses a light, which are assigned to the paths
+    /// in turn; and the stratum of the first path.
+    pub strata: u32,
+    pub first_stratum: u32,
     /// Diffuse surfaces that a path meets at most.
     pub max_bounces: u32,
     /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`], [`AIM`],
@@ -343,12 +348,17 @@ pub struct PhotonBatch {
 }
 
 impl PhotonBatch {
-    /// The same batch with its first path at that place among all paths of its kind, which are
-    /// dealt to `turns` in turn.
+    /// The same batch, starting with the path of that index among all paths of its kind. The
+    /// `strata` are assigned to these in turn.
     #[must_use]
     pub fn starting_at(self, path: u64) -> Self {
-        let (round, turn) = (path / u64::from(self.turns), path % u64::from(self.turns));
-        Self { first_round: round as u32, first_round_high: (round >> 32) as u32, first_turn: turn as u32, ..self }
+        let (round, stratum) = (path / u64::from(self.strata), path % u64::from(self.strata));
+        Self {
+            first_round: round as u32,
+            first_round_high: (round >> 32) as u32,
+            first_stratum: stratum as u32,
+            ..self
+        }
     }
 }
 
@@ -357,7 +367,7 @@ pub const STREAM_PHOTON: u32 = 0;
 pub const STREAM_CAUSTIC: u32 = 2;
 /// The global map still takes photons.
 pub const STORE_GLOBAL: u32 = 1;
-/// The global map takes photons that come straight from a light.
+/// The global map takes photons that come directly from a light.
 pub const STORE_DIRECT: u32 = 2;
 /// The caustic map still takes photons.
 pub const STORE_CAUSTIC: u32 = 4;
@@ -365,11 +375,11 @@ pub const STORE_CAUSTIC: u32 = 4;
 pub const FOLLOW_DIFFUSE: u32 = 8;
 /// Lights outside of the targets send paths towards them only.
 pub const AIM: u32 = 16;
-/// Caustic photons are those that come from a light through delta surfaces only; what a diffuse
-/// surface scattered before belongs to the global map.
+/// Caustic photons are those that come from a light through specular surfaces only. Photons that a
+/// diffuse surface scattered before belong to the global map.
 pub const CAUSTICS_APART: u32 = 32;
 
-/// Targets that caustic paths are aimed at, at most.
+/// Maximum number of targets that caustic paths are aimed at.
 pub const MAX_TARGETS: u32 = 32;
 
 /// Kinds of photon maps, as the shaders know [`MapKind`](crate::map_kind::MapKind), and how many
@@ -378,14 +388,15 @@ pub const GLOBAL_MAP: u32 = 0;
 pub const CAUSTIC_MAP: u32 = 1;
 pub const MAP_KINDS: u32 = 2;
 
-/// Key of a staged photon: the low bits are the path within its batch; from the shift on the
-/// photon's number on its path, as many bits as the mask has; then the kind of the map.
+/// Key of a staged photon. The lowest bits ([`PATH_MASK`]) are the index of the path in its batch.
+/// From bit [`PLACE_SHIFT`] on, the bits of [`PLACE_MASK`] are the photon's number on its path.
+/// From bit [`KIND_SHIFT`] on comes the kind of the map.
 pub const PATH_MASK: u32 = 0x3_ffff;
 pub const PLACE_SHIFT: u32 = 18;
 pub const PLACE_MASK: u32 = 0xfff;
 pub const KIND_SHIFT: u32 = 30;
 
-/// What `store_photons` needs to know; see there.
+/// Arguments of `store_photons`; see there.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Store {
@@ -396,21 +407,20 @@ pub struct Store {
     pub kind: u32,
 }
 
-/// Where the numbers for sampling come from; see `shaders/lib/core/sampler.wesl`.
+/// Samplers, the sources of sample numbers; see `shaders/lib/core/sampler.wesl`.
 pub const SAMPLER_RANDOM: u32 = 0;
 pub const SAMPLER_SOBOL: u32 = 1;
 
-/// A camera and the part of its samples that one tile holds; see
-/// `shaders/lib/camera/camera_tile.wesl`.
+/// A camera, and the samples of one tile; see `shaders/lib/camera/camera_tile.wesl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct CameraTile {
     pub position: [f32; 3],
     pub seed: u32,
-    /// From the centre of the picture, at distance 1, to its right edge.
+    /// Vector from the centre of the picture, at distance 1, to its right edge.
     pub right: [f32; 3],
     pub width: u32,
-    /// From the centre of the picture, at distance 1, to its upper edge.
+    /// Vector from the centre of the picture, at distance 1, to its upper edge.
     pub up: [f32; 3],
     pub height: u32,
     /// Unit direction of view.
@@ -424,8 +434,8 @@ pub struct CameraTile {
     pub first_sample: u32,
     pub samples: u32,
     pub pad0: u32,
-    /// Places for paths of a sample: both ways are followed at its first log2(branches) dielectric
-    /// interfaces.
+    /// Path slots per sample: reflection and refraction are both followed at its first
+    /// log2(branches) dielectric interfaces.
     pub branches: u32,
     /// Pixels of the tile, in Morton order.
     pub pixels: u32,
@@ -433,17 +443,17 @@ pub struct CameraTile {
     pub parallel: u32,
     /// Radius of the lens, metres; 0 for a pinhole.
     pub lens_radius: f32,
-    /// Distance of the sharp plane along the camera's axis, metres.
+    /// Distance of the plane of focus along the camera's axis, metres.
     pub focus: f32,
     /// Entries of the pixel filter's table, less 1.
     pub filter_steps: u32,
-    /// Samples in the tile's margin: they follow those of its pixels.
+    /// Samples in the tile's margin. They follow those of its pixels.
     pub margin: u32,
     /// Media around the lens, as in [`Light::media`].
     pub media: [u32; MEDIA_WORDS],
 }
 
-/// What the first ray of a camera sample hit.
+/// First hit of a camera sample.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct FirstHit {
@@ -459,11 +469,12 @@ pub struct FirstHit {
 /// Rows of four numbers that a camera sample writes for the output layers: those of [`FirstHit`].
 pub const LAYER_ROWS: usize = 2;
 
-/// Sums over a tile's samples of one pixel, by rows: radiance with the number of samples that are
-/// not in its sum, as it would not be finite with them; then the rows of the samples.
+/// Sums over a tile's samples of one pixel, by rows. The first row is the radiance, and the number
+/// of samples left out of it because the sum would not be finite with them. The others are the rows
+/// of the samples.
 pub type PixelSums = [[f32; 4]; LAYER_ROWS + 1];
 
-/// Which punctual light `light_directly` takes.
+/// Arguments of `light_directly`: one punctual light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DirectLight {
@@ -473,23 +484,23 @@ pub struct DirectLight {
     pub pad1: u32,
 }
 
-/// Which of the samples `sample_emitters` takes.
+/// Arguments of `sample_emitters`: one sample of each point.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct EmitterSample {
     pub points: u32,
-    /// The sample, and how many a point has.
+    /// Index of the sample, and number of samples per point.
     pub sample: u32,
     pub samples: u32,
     /// Entries of the table of lights.
     pub light_count: u32,
 }
 
-/// Which rays of final gathering `start_final_gather` starts.
+/// Arguments of `start_final_gather`: one ray of each visible point.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct FinalStep {
-    /// Which of the rays of a visible point, and how many it has.
+    /// Index of the ray, and number of rays per visible point.
     pub ray: u32,
     pub rays: u32,
     /// Visible points.
@@ -497,25 +508,25 @@ pub struct FinalStep {
     pub pad: u32,
 }
 
-/// Photons of a finest cell of the photon grid; cells of a coarser one.
+/// Photons of a cell of the finest level of the photon grid; cells of a coarser cell.
 pub const CELL_PHOTONS: u32 = 16;
 pub const CELL_FAN: u32 = 8;
 /// Bits per axis in one word of a Hilbert key.
 pub const KEY_BITS: u32 = 10;
-/// Packets that are searched together: a block.
+/// Packets of a block, which are searched together.
 pub const PACKET_BLOCK: u32 = 8;
 /// Queries of a block.
 pub const QUERY_BLOCK: u32 = 32;
-/// One block of so many is a pilot, which is searched before the others,
+/// One block in this many is a pilot, which is searched before the others.
 pub const PILOT_STRIDE: u32 = 8;
-/// and one of so many before these.
+/// One block in this many is searched before the other pilots.
 pub const FIRST_PILOT_STRIDE: u32 = 64;
-/// Rays that survey one disc at most.
+/// Maximum number of rays that survey one disc.
 pub const MOST_RAYS: u32 = 150;
 
-/// One cell of the photon grid: [`CELL_PHOTONS`] photons that follow each other along a Hilbert
-/// curve, or [`CELL_FAN`] cells of the next finer level. Cells lie level by level, the coarsest,
-/// which is one cell, first.
+/// One cell of the photon grid: [`CELL_PHOTONS`] consecutive photons along a Hilbert curve, or
+/// [`CELL_FAN`] cells of the next finer level. Cells are stored level by level, from the coarsest,
+/// which is one cell, to the finest.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Cell {
@@ -528,7 +539,7 @@ pub struct Cell {
     pub wi_hi: u32,
 }
 
-/// Position of a sorted photon and where it came from: all that a search needs.
+/// Position and incident direction of a sorted photon: all that a search reads.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PhotonPlace {
@@ -538,7 +549,7 @@ pub struct PhotonPlace {
     pub wi: u32,
 }
 
-/// What a sorted photon carries.
+/// Flux and surface normal of a sorted photon.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PhotonFlux {
@@ -565,19 +576,19 @@ pub struct MapInfo {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct GatherInfo {
-    /// Queries of the batch, also those without a point.
+    /// Queries of the batch, including those without a point.
     pub count: u32,
     /// Index of the batch's first point.
     pub first: u32,
-    /// k.
+    /// k: number of nearest photons of an estimate.
     pub neighbors: u32,
     /// 1: the radius is the maximum radius, whatever the number of photons.
     pub fixed_radius: u32,
-    /// Square of the largest radius, m²; negative if there is none.
+    /// Square of the maximum radius, m²; negative if there is none.
     pub max_radius_squared: f32,
     /// 1 / number of emitted paths.
     pub per_path: f32,
-    /// Of how many blocks of queries one is searched.
+    /// One block of queries in this many is searched.
     pub stride: u32,
     /// Mean of the kernel over the disc.
     pub kernel_mean: f32,
@@ -592,16 +603,16 @@ pub struct GatherInfo {
     pub pad1: u32,
 }
 
-/// What a query found.
+/// Result of a query.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Gathered {
-    /// Square of the radius of the estimate, m²: of the nearest photon that is not summed, or the
-    /// largest radius.
+    /// Square of the radius of the estimate, m²: the distance of the nearest photon that is not
+    /// summed, or the maximum radius.
     pub radius_squared: f32,
     /// Photons summed.
     pub count: u32,
-    /// Tells the set of photons from others, see `GatherOptions::fingerprint`.
+    /// Hash of the set of photons, see `GatherOptions::fingerprint`.
     pub fingerprint: u32,
 }
 
@@ -616,19 +627,19 @@ pub const MARGIN_SAMPLES: u32 = 16;
 pub struct ShareRound {
     /// Cells of the tile.
     pub cells: u32,
-    /// Pixels of a cell, a power of 4, that follow each other in the tile: a square.
+    /// Pixels of a cell: a power of 4, consecutive in the tile, hence a square.
     pub cell_pixels: u32,
     /// Samples of each pixel in the tile.
     pub samples: u32,
-    /// The samples of a pixel of which a query is chosen, and in which of the cell's pixels: every
-    /// step-th.
+    /// Samples of a pixel that are candidates for the query, and the stride of the pixels of a cell
+    /// that have candidates.
     pub candidates: u32,
     pub step: u32,
     /// Cells of the tile's margin that take part.
     pub margin: u32,
     pub branches: u32,
-    /// Square of the distance within which a point takes a query's estimate, over that of the
-    /// estimate's radius.
+    /// Maximum distance at which a point takes a query's estimate, relative to the radius of the
+    /// estimate; squared.
     pub reach_squared: f32,
     /// Visible points of the tile, without its margin.
     pub points: u32,
@@ -636,7 +647,7 @@ pub struct ShareRound {
     pub map_number: u32,
 }
 
-/// Consecutive entries that one invocation of the radix sort walks.
+/// Consecutive entries that one invocation of the radix sort processes.
 pub const RADIX_CHUNK: u32 = 256;
 /// Values of one digit of the radix sort.
 pub const RADIX_DIGITS: u32 = 256;
@@ -659,7 +670,7 @@ pub struct SortStep {
 /// Boxes per window of the first reduction of the photons' bounds.
 pub const BOUND_LANES: u32 = 1024;
 
-/// What `bound_photons` needs to know of its window.
+/// Arguments of `bound_photons` for one window.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BoundStep {
@@ -669,7 +680,7 @@ pub struct BoundStep {
     pub first_box: u32,
 }
 
-/// What `key_photons` needs to know.
+/// Arguments of `key_photons`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct KeyStep {
@@ -682,7 +693,7 @@ pub struct KeyStep {
     pub fine: u32,
 }
 
-/// What `sort_photons` needs to know.
+/// Arguments of `sort_photons`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct MoveStep {
@@ -694,7 +705,7 @@ pub struct MoveStep {
     pub window_count: u32,
 }
 
-/// What `build_grid` needs to know of the cells that it makes.
+/// Arguments of `build_grid`: the cells to make.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct GridStep {
@@ -702,7 +713,7 @@ pub struct GridStep {
     pub photons: u32,
     /// Level of the cells, 0 for the finest.
     pub level: u32,
-    /// Places of the first cell of the level and of the next finer one.
+    /// Indices of the first cell of the level and of the next finer one.
     pub base: u32,
     pub finer_base: u32,
     /// Cells of the next finer level.
@@ -713,9 +724,9 @@ pub struct GridStep {
     pub pad: u32,
 }
 
-/// Bytes of `SearchState` in the shaders, in which a query waits for its next dispatch.
+/// Bytes of `SearchState` in the shaders: the state of a query between dispatches.
 pub const SEARCH_STATE_BYTES: usize = 112;
-/// Bytes of `GatherState` in the shaders, in which the sums of a packet wait.
+/// Bytes of `GatherState` in the shaders: the sums of a packet between dispatches.
 pub const GATHER_STATE_BYTES: usize = 1072;
 
 /// Octahedral encoding of a unit vector in two 16-bit signed normalised numbers (Cigolle et al.

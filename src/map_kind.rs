@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::layout::{CAUSTIC_MAP, GLOBAL_MAP};
 
-/// Which photons a map holds. Its number is that of the photons' keys on the device.
+/// Which photons a map holds. The number of a kind is that in the photons' keys on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MapKind {
-    /// All that the mode stores but caustics.
+    /// All photons that the mode stores, except caustics.
     Global = GLOBAL_MAP as isize,
-    /// Photons that met specular surfaces last: L S+ D.
+    /// Photons that come from a specular surface: L S+ D.
     Caustic = CAUSTIC_MAP as isize,
 }
 

@@ -1,4 +1,4 @@
-//! What happened in a render, for scripts: the `--stats` file.
+//! Statistics of a render, for scripts: the `--stats` file.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct Seconds {
     /// Reading the scene.
     pub load: f64,
-    /// Building the hierarchy of the scene.
+    /// Building the BVH of the scene.
     pub bvh: f64,
     /// Tracing photons.
     pub photons: f64,
@@ -21,7 +21,7 @@ pub struct Seconds {
     pub direct: f64,
     /// Radiance estimates.
     pub gather: f64,
-    /// All of the above, and what lies between them where the caller measures it.
+    /// All of the above, and the time between them where the caller measures it.
     pub total: f64,
 }
 
@@ -34,35 +34,36 @@ pub struct MapStats {
     pub stored: u64,
 }
 
-/// One light: what shines by one material counts as one.
+/// One light. All surfaces of one emissive material count as one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LightStats {
-    /// Of the light, of the material, or of the environment.
+    /// Name of the light, of the material, or of the environment.
     pub name: String,
     /// `point`, `spot`, `directional`, `surface` or `environment`.
     pub kind: String,
-    /// W in each channel; of directional lights and environments what the sphere around the scene
-    /// catches.
+    /// Power, W in each channel. Of directional lights and environments: the power that the
+    /// bounding sphere of the scene receives.
     pub power: [f64; 3],
-    /// Photons of it in both maps.
+    /// Photons of this light in both maps.
     pub photons: u64,
 }
 
 /// Both maps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PhotonStats {
-    /// The map of light over at least one diffuse surface, or of all light where the mode says so.
+    /// The map of light scattered by at least one diffuse surface, or of all light where the mode
+    /// says so.
     pub global: MapStats,
-    /// The map of light over mirrors and glass.
+    /// The map of light from mirrors and glass.
     pub caustic: MapStats,
     /// Flux in W that the limits of bounces took, mean of the channels, over all emitted paths.
     pub lost_to_bounce_limit: f64,
-    /// Each light by itself.
+    /// Each light.
     #[serde(default)]
     pub lights: Vec<LightStats>,
 }
 
-/// Infinite or undefined numbers that a stage made. What they belonged to was left out of the
+/// Number of infinite or NaN values by stage. The path or sample of each was left out of the
 /// picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NonFinite {
@@ -79,7 +80,7 @@ pub struct NonFinite {
 }
 
 impl NonFinite {
-    /// Of all stages.
+    /// Sum over all stages.
     #[must_use]
     pub fn total(&self) -> u64 {
         self.photons + self.camera + self.direct + self.gather + self.film
@@ -98,7 +99,7 @@ pub struct DeviceStats {
 /// Everything that one render reports.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stats {
-    /// What the picture was made on.
+    /// The device that rendered the picture.
     pub device: DeviceStats,
     /// Time by stage.
     pub seconds: Seconds,
@@ -112,14 +113,14 @@ pub struct Stats {
     pub lost_camera_paths: f64,
     /// Times that more solids met in one place than are told apart.
     pub media_overflows: u64,
-    /// Rays given up after the loop budget; their light is lost.
+    /// Rays abandoned when the loop budget was spent; their light is lost.
     pub unfinished_rays: u64,
-    /// Numbers that were left out.
+    /// Infinite or NaN values that were left out.
     #[serde(default)]
     pub non_finite: NonFinite,
-    /// The most device memory that buffers took at once, bytes.
+    /// Peak device memory of buffers, bytes.
     pub peak_device_bytes: u64,
-    /// What the user should know, one line each.
+    /// Warnings for the user, one line each.
     pub warnings: Vec<String>,
 }
 

@@ -67,7 +67,8 @@ fn touching(bvh: &Bvh, i: u32) -> Vec<u32> {
 
 /// Largest coordinate that a primitive is computed from, metres.
 fn reach(primitive: &Primitive) -> f64 {
-    let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(|v| f64::from(Vec3::from_array(v).abs().max_element()));
+    let [v0, e1, e2] =
+        [primitive.v0, primitive.e1, primitive.e2].map(|v| f64::from(Vec3::from_array(v).abs().max_element()));
     v0.max(e1).max(e2)
 }
 
@@ -140,22 +141,19 @@ mod tests {
     use super::*;
     use crate::scene::{Material, Sphere, Triangle};
 
-    /// Contacts of triangles and spheres, in the order of the scene; material 0 is glass, 1 diffuse.
+    /// Contacts of triangles and spheres, in the order of the scene; material 0 is glass, 1
+    /// diffuse.
     fn found(triangles: &[([Vec3; 3], u32)], spheres: &[(f32, u32)]) -> Vec<bool> {
         let surfaces = [Surface::Glass { ior: 1.5, tint: Vec3::ONE }, Surface::Diffuse { albedo: Vec3::ONE }];
-        let material = |surface| Material {
-            name: String::new(),
-            surface,
-            emission: Vec3::ZERO,
-            double_sided: false,
-            priority: 0,
-        };
+        let material =
+            |surface| Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false, priority: 0 };
         let triangle = |(positions, material): &([Vec3; 3], u32)| Triangle {
             positions: *positions,
             normals: [Vec3::Y; 3],
             material: *material,
         };
-        let sphere = |(radius, material): &(f32, u32)| Sphere { center: Vec3::ONE, radius: *radius, material: *material };
+        let sphere =
+            |(radius, material): &(f32, u32)| Sphere { center: Vec3::ONE, radius: *radius, material: *material };
         let scene = Scene {
             materials: surfaces.map(material).to_vec(),
             triangles: triangles.iter().map(triangle).collect(),

@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// Maximum number of photons in one tie that is examined.
-const MOST_TIED: usize = 16;
+const MAX_TIED: usize = 16;
 
 /// Result of the grid at each point of a tile.
 pub(super) struct GridAnswer {
@@ -133,11 +133,11 @@ pub(super) fn explained_by_ties(
     if !cut && grid.count != estimate.count {
         return false;
     }
-    let near = map.search(point, settings.estimate.neighbors + MOST_TIED as u32, edge * (1.0 + 2.0 * TIE));
+    let near = map.search(point, settings.estimate.neighbors + MAX_TIED as u32, edge * (1.0 + 2.0 * TIE));
     let tied: Vec<u32> = near.iter().filter(|n| are_tied(n.0, edge)).map(|n| mix(n.1)).collect();
     let nearer = near.iter().take_while(|n| !are_tied(n.0, edge));
     let (base, certain) = nearer.fold((0_u32, 0), |(sum, n), photon| (sum.wrapping_add(mix(photon.1)), n + 1));
-    tied.len() < MOST_TIED
+    tied.len() < MAX_TIED
         && (certain..=certain + tied.len() as u32).contains(&grid.count)
         && some_add_up(&tied, grid.count - certain, grid.fingerprint.wrapping_sub(base))
 }

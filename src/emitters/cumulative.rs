@@ -1,14 +1,15 @@
-//! Tables by which the shaders choose one of many with a given probability.
+//! Discrete CDFs, from which the shaders sample one of several choices.
 
-/// Steps of the shaders' random numbers in [0, 1).
+/// Number of values that a random number of the shaders can have: multiples of 1 / `STEPS` in [0,
+/// 1).
 const STEPS: u64 = 1 << 24;
-/// Weights above 0 that a table can hold: each needs a step of its own.
+/// Maximum number of weights above 0 in a table: each needs a step of its own.
 pub const MAX_CHOICES: usize = 1 << 22;
 
-/// Cumulative probabilities of `weights`, each ≥ 0: the first entry above a random number is
-/// chosen. Entries are multiples of the random numbers' step, so that the difference to its
-/// predecessor is exactly the probability with which an entry is chosen. No weight above 0 gets
-/// less than one step, none of 0 gets any, and from the last above 0 on all are 1.
+/// CDF of `weights`, each ≥ 0. The first entry above a random number is the choice. Entries are
+/// multiples of 1 / `STEPS`, as random numbers are, so that the difference of an entry to its
+/// predecessor is exactly the probability of its choice. A weight above 0 gets at least one step, a
+/// weight of 0 gets none. From the last weight above 0 on, all entries are 1.
 ///
 /// # Panics
 /// If more than [`MAX_CHOICES`] weights are above 0.
@@ -28,14 +29,15 @@ pub fn cumulative(weights: &[f64]) -> Vec<f32> {
             ((shared * share).round() as u64 + own_steps) as f32 / STEPS as f32
         })
         .collect();
-    // The sums are the same f64 in the same order, but of no promise at the end.
+    // Both sums add the same f64 values in the same order, but nothing guarantees that they end in
+    // the same bits.
     if let Some(last) = weights.iter().rposition(|w| *w > 0.0) {
         table[last..].fill(1.0);
     }
     table
 }
 
-/// Probability of each entry of such a table.
+/// Probability of each entry of a table of [`cumulative`].
 #[must_use]
 pub fn probabilities(cumulative: &[f32]) -> Vec<f32> {
     let before = [0.0].iter().chain(cumulative);

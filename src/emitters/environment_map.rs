@@ -1,9 +1,10 @@
-//! The environment as the device reads it: pixels, and tables by which directions are drawn.
+//! The environment on the device: pixels, and tables from which directions are sampled.
 //!
-//! A cell has the centres of four pixels for its corners; those of the first and the last row reach
-//! from a pole to the centres of the outer pixels. It is chosen in proportion to its corners' mean
-//! luminance and its solid angle; within it the density follows the interpolated luminance
-//! (`shaders/lib/transport/environment.wesl`), so that it is above 0 wherever the radiance is.
+//! The corners of a cell are the centres of four adjacent pixels. Cells of the first and the last
+//! row reach from a pole to the centres of the outermost pixels. A cell is sampled in proportion to
+//! the mean luminance of its corners times its solid angle. Within a cell the density follows the
+//! interpolated luminance (`shaders/lib/transport/environment.wesl`), so that it is above 0
+//! wherever the radiance is.
 
 use std::f64::consts::{PI, TAU};
 
@@ -17,18 +18,18 @@ pub struct EnvironmentMap {
     pub rows: u32,
     /// Radiance, W/(m² sr), and its mean over the channels.
     pub pixels: Vec<[f32; 4]>,
-    /// Cumulative probability of the cells in their row; `rows + 1` rows of `columns`.
+    /// CDF of the cells within their row; `rows + 1` rows of `columns`.
     pub cells: Vec<f32>,
-    /// Cumulative probability of the rows of cells.
+    /// CDF of the rows of cells.
     pub marginal: Vec<f32>,
     /// Integral of the radiance over all directions, W/m² in each channel.
     pub integral: [f64; 3],
-    /// Turn about +Y, radians.
+    /// Rotation about +Y, radians.
     pub rotation: f32,
 }
 
 impl EnvironmentMap {
-    /// The map, averaged down by 2 x 2 until its pixels take at most `bytes`.
+    /// The map, with pixels averaged 2 x 2 repeatedly until they take at most `bytes`.
     #[must_use]
     pub fn new(environment: &Environment, bytes: u64) -> Self {
         let mut size = (environment.width as usize, environment.height as usize);
@@ -66,13 +67,14 @@ impl EnvironmentMap {
     }
 }
 
-/// Steradians of a row of cells.
+/// Solid angle of a row of cells, sr.
 fn cell_solid_angle(row: usize, rows: usize) -> f64 {
     let edge = |row: usize| (PI * (row as f64 - 0.5).clamp(0.0, rows as f64) / rows as f64).cos();
     TAU * (edge(row) - edge(row + 1))
 }
 
-/// Half as many columns and rows, rounded up; pixels at an odd edge stand for themselves.
+/// Averages 2 x 2 pixels: half as many columns and rows, rounded up. Pixels at an odd edge are
+/// repeated.
 fn halved(pixels: &[[f32; 3]], (columns, rows): (usize, usize)) -> (Vec<[f32; 3]>, (usize, usize)) {
     let half = (columns.div_ceil(2), rows.div_ceil(2));
     let mean = |i: usize| {
@@ -106,7 +108,7 @@ mod tests {
     fn a_map_that_is_too_large_is_averaged_down() {
         let map = map(9, 5, 16 * 15);
         assert_eq!((map.columns, map.rows, map.cells.len(), map.marginal.len()), (5, 3, 20, 4));
-        // The bright pixel 5 of row 0 is one of the four of pixel 2.
+        // Pixel 5 of row 0, the bright one, is one of the four averaged into pixel 2.
         assert_eq!(map.pixels[2][..3], [0.0, 1.5, 2.0]);
         assert_eq!(map.pixels[1][..3], [0.0, 0.0, 2.0]);
     }
@@ -116,7 +118,7 @@ mod tests {
         let pixels = (0..8 * 4).map(|i| [if i == 16 { 1.0 } else { 0.0 }; 3]).collect();
         let environment = Environment { width: 8, height: 4, pixels, ..Environment::uniform(glam::Vec3::ZERO) };
         let map = EnvironmentMap::new(&environment, u64::MAX);
-        // Pixel 0 of row 2: the last and the first cells of rows 2 and 3.
+        // Pixel 0 of row 2 is a corner of the last and the first cells of rows 2 and 3.
         for row in [2, 3] {
             let cells = &map.cells[8 * row..8 * row + 8];
             assert!((cells[0] - 0.5).abs() < 1e-6 && cells[6] == cells[0] && cells[7] == 1.0, "{cells:?}");

@@ -7,8 +7,8 @@ use crate::{
     layout::{self, Light, OFFSET_SCALE},
 };
 
-/// Notes the media around a light. One place of a surface speaks for all of it, just off each side: the middle of
-/// a triangle, a point of a sphere.
+/// Notes the media around a light. One place of a surface speaks for all of it, just off each side:
+/// the middle of a triangle, a point of a sphere.
 pub fn set_media(light: &mut Light, probe: &MediaProbe) {
     let [position, e1, e2] = [light.position, light.e1, light.e2].map(|v| Vec3::from_array(v).as_dvec3());
     let (place, normal, reach) = match light.kind {

@@ -1,9 +1,9 @@
-//! All that shines in a scene, as one list for the device, and the tables by which passes choose
-//! from it.
+//! All lights of a scene, as one list for the device, and the tables by which passes choose from
+//! it.
 //!
 //! Punctual lights come first, then emissive triangles and spheres, material by material, then the
-//! environment. What a user calls one light is a group: a punctual light, all that shines by one
-//! material, the environment.
+//! environment. A group is what a user calls one light: a punctual light, all surfaces of one
+//! emissive material, or the environment.
 
 use std::{
     collections::BTreeMap,
@@ -24,14 +24,14 @@ use crate::{
     settings::{LightSampling, LightSettings, LightUnit},
 };
 
-/// What a user calls one light.
+/// A group of lights: what a user calls one light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightGroup {
     pub name: String,
     /// `point`, `spot`, `directional`, `surface` or `environment`.
     pub kind: &'static str,
-    /// W in each channel; of directional lights and environments what the sphere around the scene
-    /// catches.
+    /// Power, W in each channel. Of directional lights and environments: the power that the
+    /// bounding sphere of the scene receives.
     pub power: DVec3,
 }
 
@@ -41,27 +41,26 @@ pub struct LightTable {
     /// Sorted by group.
     pub lights: Vec<layout::Light>,
     pub groups: Vec<LightGroup>,
-    /// How many of the lights are punctual: the first ones.
+    /// Number of punctual lights, the first ones in `lights`.
     pub punctual: usize,
     /// Power of each light, W, mean of the channels.
     powers: Vec<f64>,
-    /// The light that a primitive of the scene is, by its index there.
+    /// Index into `lights` of each emissive primitive, by the index of the primitive in the scene.
     emitters: BTreeMap<u32, u32>,
 }
 
-/// A table by which lights are chosen.
+/// A table from which lights are sampled.
 #[derive(Clone, Debug, Default)]
 pub struct Choices {
     pub entries: Vec<LightChoice>,
-    /// Parts into which the numbers that choose are cut, dealt to the paths in turn; 0 if no light
-    /// can be chosen.
-    pub turns: u32,
+    /// Strata of the random number that chooses a light, assigned to the paths in turn; 0 if no
+    /// light can be chosen.
+    pub strata: u32,
 }
 
 impl LightTable {
-    /// # Errors
-    /// [`Error::Scene`] if more triangles shine than a table can hold; [`Error::Setting`] if
-    /// `light_photons` names no light.
+    /// # Errors [`Error::Scene`] if there are more lights and emissive primitives than a table can
+    /// hold; [`Error::Setting`] if `light_photons` names no light.
     pub fn new(
         scene: &Scene,
         environment: Option<&EnvironmentMap>,
@@ -88,19 +87,19 @@ impl LightTable {
         Ok(table)
     }
 
-    /// Index, plus one, of the light that a primitive of the scene is; 0 if it does not shine.
+    /// Index of a primitive's light, plus one; 0 if the primitive does not emit light.
     #[must_use]
     pub fn emitter(&self, primitive: u32) -> u32 {
         self.emitters.get(&primitive).map_or(0, |light| light + 1)
     }
 
-    /// Some primitive shines.
+    /// Some primitive emits light.
     #[must_use]
     pub fn has_surfaces(&self) -> bool {
         !self.emitters.is_empty()
     }
 
-    /// Some emitter has an extent, so that its direct light must be sampled.
+    /// Some light is not punctual, so that its direct light must be sampled.
     #[must_use]
     pub fn has_extent(&self) -> bool {
         self.powers[self.punctual..].iter().any(|power| *power > 0.0)
@@ -112,26 +111,27 @@ impl LightTable {
         self.powers.iter().sum()
     }
 
-    /// For photon paths: by power, or every group alike, times the factors that the settings ask
-    /// for.
+    /// Table for photon paths: in proportion to power, or with equal probability for every group,
+    /// times the factors of the settings.
     #[must_use]
     pub fn for_photons(&self, settings: &LightSettings) -> Choices {
         self.choices(self.powers.clone(), settings)
     }
 
-    /// For paths aimed at `targets`: as [`Self::for_photons`], of the power that goes towards them.
+    /// Table for paths aimed at `targets`: as [`Self::for_photons`], with the power that goes
+    /// towards the targets.
     #[must_use]
     pub fn for_aimed_photons(&self, targets: &[Target], around: &Target, settings: &LightSettings) -> Choices {
         let aimed = |(light, power): (&layout::Light, &f64)| power * aimed_fraction(light, targets, around);
         self.choices(self.lights.iter().zip(&self.powers).map(aimed).collect(), settings)
     }
 
-    /// For direct light of what has an extent: by power.
+    /// Table for direct light of all lights but the punctual ones: in proportion to power.
     #[must_use]
     pub fn for_direct_light(&self) -> Choices {
         let mut powers = self.powers.clone();
         powers[..self.punctual].fill(0.0);
-        Choices { entries: entries(&powers), turns: 1 }
+        Choices { entries: entries(&powers), strata: 1 }
     }
 
     fn choices(&self, powers: Vec<f64>, settings: &LightSettings) -> Choices {
@@ -150,8 +150,8 @@ impl LightTable {
             if power > 0.0 { power * factors[light.group as usize] } else { 0.0 }
         };
         let weights: Vec<f64> = self.lights.iter().zip(powers).map(weigh).collect();
-        let turns = if settings.sampling == LightSampling::Uniform { shining } else { shining.min(1) };
-        Choices { entries: entries(&weights), turns }
+        let strata = if settings.sampling == LightSampling::Uniform { shining } else { shining.min(1) };
+        Choices { entries: entries(&weights), strata }
     }
 
     fn start_group(&mut self, name: &str, kind: &'static str) {
@@ -201,7 +201,7 @@ impl LightTable {
             let solid_angle = if material.double_sided { TAU } else { PI };
             for primitive in primitives {
                 let light = surface_light(scene, primitive);
-                // Without area nothing shines.
+                // A degenerate surface emits nothing.
                 if light.area > 0.0 {
                     self.emitters.insert(primitive as u32, self.lights.len() as u32);
                     let power = emission.as_dvec3() * f64::from(light.area) * solid_angle;
@@ -223,7 +223,7 @@ impl LightTable {
     }
 }
 
-/// A material's emission in the unit that the file's numbers are taken for.
+/// Radiometric emission of a material whose numbers in the file are in `unit`.
 pub(crate) fn emission_in(emission: Vec3, unit: LightUnit) -> Vec3 {
     match unit {
         LightUnit::Radiometric => emission,
@@ -231,7 +231,7 @@ pub(crate) fn emission_in(emission: Vec3, unit: LightUnit) -> Vec3 {
     }
 }
 
-/// Shape of the triangle or sphere with that index in the scene, triangles first.
+/// Shape of the primitive with that index in the scene; triangles come before spheres.
 fn surface_light(scene: &Scene, primitive: usize) -> layout::Light {
     if let Some(triangle) = scene.triangles.get(primitive) {
         let [a, b, c] = triangle.positions;
@@ -246,7 +246,8 @@ fn surface_light(scene: &Scene, primitive: usize) -> layout::Light {
     layout::Light { position, kind: layout::SPHERE_LIGHT, e1, area: area as f32, ..Default::default() }
 }
 
-/// About what part of a light's power goes towards the targets; above 0 if any can.
+/// Approximate fraction of a light's power that goes towards the targets; above 0 if any light can
+/// reach them.
 fn aimed_fraction(light: &layout::Light, targets: &[Target], around: &Target) -> f64 {
     let cross_sections = targets.iter().map(|t| (t.radius / around.radius).powi(2));
     if matches!(light.kind, layout::DIRECTIONAL_LIGHT | layout::ENVIRONMENT_LIGHT) {
@@ -262,7 +263,7 @@ fn aimed_fraction(light: &layout::Light, targets: &[Target], around: &Target) ->
     seen.map(|target| target.solid_angle(from).map_or(1.0, |angle| (angle / own).min(1.0))).sum::<f64>().min(1.0)
 }
 
-/// Whether light can go from there to the target at all.
+/// Light emitted at `from` can reach the target.
 fn can_reach(light: &layout::Light, target: &Target, from: Vec3) -> bool {
     let [axis, e2] = [light.e1, light.e2].map(Vec3::from_array);
     let to = target.center - from;

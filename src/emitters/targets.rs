@@ -1,6 +1,6 @@
-//! What photon paths are aimed at: spheres around clusters of mirrors and glass, so that no path
-//! that could become a caustic is left out and few others are traced (the projection map of Jensen
-//! 2001, section 5.3, as bounding spheres).
+//! Targets that photon paths are aimed at: spheres around clusters of mirrors and glass. No path
+//! that could become a caustic is left out, and few others are traced. This is the projection map
+//! of Jensen 2001, section 5.3, as bounding spheres.
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ use crate::{
     scene::{Bounds, Scene},
 };
 
-/// A sphere that holds something.
+/// A bounding sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     pub center: Vec3,
@@ -18,7 +18,7 @@ pub struct Target {
 }
 
 impl Target {
-    /// Solid angle under which it is seen, sr; `None` from inside.
+    /// Solid angle that the sphere subtends at `from`, sr; `None` inside of it.
     #[must_use]
     pub fn solid_angle(&self, from: Vec3) -> Option<f64> {
         let sin2 = f64::from(self.radius).powi(2) / self.center.as_dvec3().distance_squared(from.as_dvec3());
@@ -30,7 +30,7 @@ impl Target {
     }
 }
 
-/// What one delta primitive needs to be bounded.
+/// Geometry of one specular primitive, for its bounds.
 #[derive(Clone, Copy)]
 enum Item {
     Triangle([Vec3; 3]),
@@ -50,7 +50,7 @@ impl Item {
         0.5 * (min + max)
     }
 
-    /// Distance of its farthest point.
+    /// Distance from `from` to the farthest point of the primitive.
     fn reach(&self, from: Vec3) -> f32 {
         match *self {
             Item::Triangle(corners) => corners.into_iter().map(|p| p.distance(from)).fold(0.0, f32::max),
@@ -59,7 +59,7 @@ impl Item {
     }
 }
 
-/// A cluster, and its halves where it was split.
+/// A cluster of primitives. `halves`: indices of its two halves, if it was split.
 struct Cluster {
     target: Target,
     items: Vec<Item>,
@@ -79,9 +79,10 @@ pub fn scene_target(scene: &Scene) -> Target {
     Target { center, radius }
 }
 
-/// Spheres that together hold all delta surfaces, at most [`MAX_TARGETS`]; none where there are
-/// none. The largest cluster is split along its longest axis until there are as many as may be;
-/// then halves are kept only where their cross-sections together are smaller than the whole's.
+/// Spheres that together contain all specular surfaces, at most [`MAX_TARGETS`]; none if there are
+/// no such surfaces. The largest cluster is split along its longest axis until there are
+/// [`MAX_TARGETS`] clusters. Then halves are kept only where the sum of their cross-sections is
+/// smaller than that of the whole cluster.
 #[must_use]
 pub fn delta_targets(scene: &Scene) -> Vec<Target> {
     let delta = items(scene, |material| scene.materials[material as usize].surface.is_delta());
@@ -100,7 +101,7 @@ pub fn delta_targets(scene: &Scene) -> Vec<Target> {
     best_cut(&tree, 0).1
 }
 
-/// The summed cross-section of the best spheres for a cluster, and these.
+/// Sum of the cross-sections of the best spheres for a cluster, over π, and the spheres.
 fn best_cut(tree: &[Cluster], cluster: usize) -> (f64, Vec<Target>) {
     let whole = tree[cluster].target;
     let kept = (whole.cross_section(), vec![whole]);
@@ -113,7 +114,8 @@ fn best_cut(tree: &[Cluster], cluster: usize) -> (f64, Vec<Target>) {
     (left + right, targets)
 }
 
-/// The items on either side of the middle of their longest extent; `None` if they lie on one spot.
+/// Items on either side of the middle of the longest extent of their centres; `None` if one side is
+/// empty, as when all centres coincide.
 fn split(items: Vec<Item>) -> Option<[Vec<Item>; 2]> {
     let middles = items.iter().map(Item::middle);
     let box_ = middles.fold(Bounds::EMPTY, |b, p| b.union(Bounds { min: p, max: p }));
@@ -126,7 +128,7 @@ fn split(items: Vec<Item>) -> Option<[Vec<Item>; 2]> {
 fn sphere_around(items: &[Item]) -> Target {
     let Bounds { min, max } = items.iter().map(Item::bounds).fold(Bounds::EMPTY, Bounds::union);
     let center = 0.5 * (min + max);
-    // Rounding must leave nothing outside.
+    // Slightly enlarged, so that rounding leaves nothing outside.
     let radius = items.iter().map(|item| item.reach(center)).fold(0.0, f32::max);
     Target { center, radius: radius * 1.00001 }
 }
@@ -146,7 +148,8 @@ mod tests {
 
     fn scene(centers: &[Vec3], radius: f32) -> Scene {
         let surface = Surface::Mirror { tint: Vec3::ONE };
-        let material = Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false, priority: 0 };
+        let material =
+            Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false, priority: 0 };
         let spheres = centers.iter().map(|&center| Sphere { center, radius, material: 0 }).collect();
         Scene { materials: vec![material], spheres, ..Scene::default() }
     }

@@ -110,7 +110,8 @@ impl<'g> Commands<'g> {
             self.record(stem, &part, |pass| record(pass, first, part.invocations));
             first += part.invocations;
             if !is_last && part.seconds.is_none() {
-                // The first part measures how large the others may be. A fault shows in the next wait.
+                // The first part measures how large the others may be. A fault shows in the next
+                // wait.
                 self.flush();
                 let _ = self.submissions.poll();
             }

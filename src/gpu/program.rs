@@ -66,8 +66,8 @@ impl Program {
         })
     }
 
-    /// Whether the kernel finds its index with `invocation_index`, so that its dispatches can be cut
-    /// into parts.
+    /// Whether the kernel finds its index with `invocation_index`, so that its dispatches can be
+    /// cut into parts.
     pub fn can_be_cut(&self) -> bool {
         self.shader.bindings.iter().any(|b| b.group == PART_GROUP)
     }

@@ -1,6 +1,6 @@
-//! The wavefront: one dispatch moves every living path on by one surface, and the queue of living
-//! paths is compacted in between. Photons, camera paths and rays of final gathering go through it.
-//! Kernel: `advance_queue`.
+//! The wavefront: one dispatch advances every living path by one surface, and the queue of living
+//! paths is compacted between dispatches. It traces photons, camera paths and rays of final
+//! gathering. Kernel: `advance_queue`.
 
 use crate::{
     error::Result,
@@ -9,16 +9,16 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Surfaces after which the host asks whether any path is left.
+/// Surfaces per submission. After each submission, the host checks whether any path is left.
 const SURFACES_PER_SUBMISSION: u32 = 32;
 
-/// Paths under way, two queues of their indices, and what is counted of them.
+/// Living paths, two queues of their slots, and their counters.
 #[derive(Debug)]
 pub struct Wavefront {
     advance: Kernel,
     /// [`Path`] per slot.
     pub paths: Buffer,
-    /// Slots of living paths: one queue is read by a step while the other is filled.
+    /// Slots of living paths. A step reads one queue and fills the other.
     queues: [Buffer; 2],
     /// One [`Counters`], cleared by each run.
     pub counters: Buffer,
@@ -48,8 +48,8 @@ impl Wavefront {
         })
     }
 
-    /// Starts paths by `start` in that many invocations, then moves them on by `step` until none is
-    /// left or each has met `most_surfaces`. At most `most_paths` live at once.
+    /// Starts paths by `start` in that many invocations, then advances them by `step` until none is
+    /// left or each has hit `most_surfaces` surfaces. At most `most_paths` paths live at once.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -85,7 +85,7 @@ impl Wavefront {
         }
     }
 
-    /// Buffers by name, with the queue `input` to be read.
+    /// Buffers by name; the queue with the index `input` is read.
     fn bindings<'a>(
         &'a self,
         scene: &'a SceneBuffers,

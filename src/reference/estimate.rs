@@ -21,7 +21,7 @@ fn normal_weight(point: &VisiblePoint, wi: Vec3) -> f32 {
 }
 
 /// Radiance that leaves `point` towards the viewer: L = beta f_r / (mean π r²) Σ K(d/r) w_n Φ /
-/// paths, where the interpolated normal's w_n is 1 without the side test.
+/// paths. The weight w_n of the interpolated normal is 1 without the side test.
 #[must_use]
 pub fn estimate(
     (places, fluxes): (&[PhotonPlace], &[PhotonFlux]),

@@ -1,5 +1,5 @@
-//! The lights' part of bind group 0: all that shines, the tables by which passes choose from it,
-//! targets, environment.
+//! The lights in bind group 0: all lights, the tables by which passes choose from them, targets,
+//! environment.
 
 use crate::{
     bvh::MediaProbe,
@@ -16,25 +16,26 @@ use crate::{
     settings::LightSettings,
 };
 
-/// A table on the device, `array<LightChoice>`.
+/// A table of [`Choices`] on the device, `array<LightChoice>`.
 #[derive(Debug)]
 pub struct ChoiceBuffer {
     pub buffer: Buffer,
-    /// See [`Choices::turns`].
-    pub turns: u32,
+    /// See [`Choices::strata`].
+    pub strata: u32,
 }
 
 /// The lights on the device.
 #[derive(Debug)]
 pub struct LightBuffers {
-    /// As uploaded.
+    /// The lights on the host, as uploaded.
     pub table: LightTable,
-    /// For photon paths, for those aimed at mirrors and glass, and for direct light of what has an
-    /// extent.
+    /// Tables for photon paths, for paths aimed at mirrors and glass, and for direct light of all
+    /// lights but the punctual ones.
     pub photons: ChoiceBuffer,
     pub aimed: ChoiceBuffer,
     pub direct: ChoiceBuffer,
-    /// Spheres around mirrors and glass; the sphere around the scene lies before them.
+    /// Number of spheres around mirrors and glass. In `targets` they follow the sphere around the
+    /// scene.
     pub delta_targets: u32,
     pub has_environment: bool,
     pub warnings: Vec<String>,
@@ -48,7 +49,7 @@ pub struct LightBuffers {
 }
 
 impl LightBuffers {
-    /// Uploads all that shines.
+    /// Uploads all lights.
     ///
     /// # Errors
     /// As [`LightTable::new`], and [`crate::Error::Limit`] if the lights exceed a binding.
@@ -60,7 +61,7 @@ impl LightBuffers {
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
         table.lights.iter_mut().for_each(|light| set_media(light, probe));
         let upload = |label: &str, choices: &Choices| -> Result<ChoiceBuffer> {
-            Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, turns: choices.turns })
+            Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, strata: choices.strata })
         };
         let spheres: Vec<[f32; 4]> =
             [&around].into_iter().chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
@@ -93,7 +94,7 @@ impl LightBuffers {
         })
     }
 
-    /// The variables that all passes share; a pass binds its `choices` besides.
+    /// The variables that all passes share. Each pass also binds its own `choices`.
     #[must_use]
     pub fn bindings(&self) -> [(&'static str, &Buffer); 4] {
         [
@@ -115,7 +116,7 @@ impl LightBuffers {
     }
 }
 
-/// What to say where the environment map had to be made smaller.
+/// Warning that the environment map was reduced, if it was.
 fn reduced(scene: &Scene, map: Option<&EnvironmentMap>) -> Option<String> {
     let (environment, map) = (scene.environment.as_ref()?, map?);
     let (from, to) = ((environment.width, environment.height), (map.columns, map.rows));

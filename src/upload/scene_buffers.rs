@@ -25,7 +25,7 @@ pub struct SceneBuffers {
     materials: Table,
     media: Table,
     has_spheres: bool,
-    /// Children that a traversal can postpone.
+    /// Maximum number of deferred children in a traversal.
     stack: usize,
     /// Surfaces lie in each other.
     has_contacts: bool,
@@ -38,7 +38,7 @@ pub struct SceneBuffers {
     pub solids: Solids,
 }
 
-/// The `override` constant that says where a kernel's numbers for sampling come from.
+/// The `override` constant that selects a kernel's sampler: the source of its sample numbers.
 #[must_use]
 pub fn sampler_constant(sampler: Sampler) -> (&'static str, f64) {
     let number = match sampler {
@@ -76,7 +76,11 @@ impl SceneBuffers {
         let contacts = contacts(scene, bvh);
         Ok(Self {
             nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
-            primitives: Windows::new::<Primitive>(gpu, "primitives", &marked(&bvh.primitives, scene, &solids, &contacts, &lights.table))?,
+            primitives: Windows::new::<Primitive>(
+                gpu,
+                "primitives",
+                &marked(&bvh.primitives, scene, &solids, &contacts, &lights.table),
+            )?,
             normals: Table::new(gpu, "normals", &bvh.normals)?,
             materials: Table::new(gpu, "materials", &materials)?,
             media: Table::new(gpu, "media", &media)?,
@@ -84,7 +88,7 @@ impl SceneBuffers {
             has_specular: scene.has_delta(),
             has_dielectrics: scene.materials.iter().any(|m| m.surface.ior().is_some()),
             has_spheres: !scene.spheres.is_empty(),
-            // In steps, so that few variants of a kernel are compiled.
+            // Rounded up to multiples of 16, so that few variants of a kernel are compiled.
             stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
             solids,
             lights,
@@ -97,13 +101,13 @@ impl SceneBuffers {
         self.kernel_with(gpu, stem, &[])
     }
 
-    /// The same with further `override` constants.
+    /// As [`Self::kernel`], with further `override` constants.
     #[must_use]
     pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
         self.kernel_of(gpu, shader(stem), others)
     }
 
-    /// The same of an entry of another table: the probes of the tests.
+    /// As [`Self::kernel_with`], for a shader of another table: the probes of the tests.
     #[doc(hidden)]
     #[must_use]
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {

@@ -63,12 +63,12 @@ fn read(path: &Path) -> Vec<u8> {
 }
 
 /// Directions of `count` paths from path `first` on, as drawn by the kernel.
-fn emitted_directions(first: u64, count: u32, sampler: Sampler, turns: u32) -> Vec<Vec3> {
-    emitted_directions_of(LightKind::Point, first, count, sampler, turns)
+fn emitted_directions(first: u64, count: u32, sampler: Sampler, strata: u32) -> Vec<Vec3> {
+    emitted_directions_of(LightKind::Point, first, count, sampler, strata)
 }
 
 /// As [`emitted_directions`], for another kind of light.
-fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampler, turns: u32) -> Vec<Vec3> {
+fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampler, strata: u32) -> Vec<Vec3> {
     let gpu = gpu();
     let mut scene = scene(&[diffuse(0.5)]);
     scene.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
@@ -76,7 +76,7 @@ fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampl
     let bvh = Bvh::build(&scene);
     let buffers = SceneBuffers::new(gpu, &scene, &bvh, &LightSettings::default()).expect("the scene fits");
     let emit = buffers.kernel_with(gpu, "emit_photons", &[sampler_constant(sampler)]);
-    let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, turns, target_count: 1, ..Default::default() };
+    let batch = PhotonBatch { seed: 3, paths: count, light_count: 1, strata, target_count: 1, ..Default::default() };
     let batch = batch.starting_at(first);
     let uniform = gpu.uniform("batch", &batch);
     let paths = gpu.storage::<layout::Path>("paths", u64::from(count)).expect("fits");
@@ -151,17 +151,17 @@ fn closed_form_and_rejection_draw_the_same_directions() {
 #[test]
 fn random_numbers_go_on_after_four_billion_paths() {
     const HALF: u32 = 200;
-    for (sampler, turns) in [(Sampler::Sobol, 1), (Sampler::Random, 1), (Sampler::Sobol, 3)] {
-        let from = |first, count| emitted_directions(first, count, sampler, turns);
+    for (sampler, strata) in [(Sampler::Sobol, 1), (Sampler::Random, 1), (Sampler::Sobol, 3)] {
+        let from = |first, count| emitted_directions(first, count, sampler, strata);
         // The path at which the low word of the round overflows.
-        let border = u64::from(turns) << 32;
+        let border = u64::from(strata) << 32;
         let across = from(border - u64::from(HALF), 2 * HALF);
         let (before, after) = across.split_at(HALF as usize);
-        assert_eq!(after, from(border, HALF), "{sampler:?}, {turns} turns: a batch that begins there");
-        assert_eq!(before, from(border - u64::from(HALF), HALF), "{sampler:?}, {turns} turns: one that ends there");
+        assert_eq!(after, from(border, HALF), "{sampler:?}, {strata} strata: a batch that begins there");
+        assert_eq!(before, from(border - u64::from(HALF), HALF), "{sampler:?}, {strata} strata: one that ends there");
         let begun = from(0, HALF);
-        assert!(after.iter().chain(before).all(|v| !begun.contains(v)), "{sampler:?}, {turns} turns: numbers repeat");
-        let cut_to_32_bits = (border / u64::from(turns)) as u32;
-        assert_eq!(from(cut_to_32_bits.into(), HALF), begun, "control: {sampler:?}, {turns} turns");
+        assert!(after.iter().chain(before).all(|v| !begun.contains(v)), "{sampler:?}, {strata} strata: numbers repeat");
+        let cut_to_32_bits = (border / u64::from(strata)) as u32;
+        assert_eq!(from(cut_to_32_bits.into(), HALF), begun, "control: {sampler:?}, {strata} strata");
     }
 }

@@ -1,5 +1,6 @@
-//! The camera pass: the picture's samples, tile by tile: camera rays to their visible points,
-//! direct light, and the sum over each pixel's samples. Memory depends on the size of a tile alone.
+//! The camera pass renders the picture's samples, tile by tile. It traces camera rays to their
+//! visible points, adds direct light, and sums over each pixel's samples. Memory depends only on
+//! the size of a tile.
 
 use super::{
     direct_light::DirectLighting,
@@ -19,17 +20,17 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Visible points that a tile has room for, without its margin.
+/// Maximum number of visible points of a tile, without its margin.
 const TILE_POINTS: u64 = 1 << 16;
-/// Places for paths of a sample where the scene has dielectrics: both ways are followed at the
-/// first two interfaces.
+/// Path slots per sample if the scene has dielectrics: reflection and refraction are both followed
+/// at the first two interfaces.
 const BRANCHES: u32 = 4;
-/// Samples of one pixel that a tile holds at most.
+/// Maximum number of samples of one pixel in a tile.
 const PIXEL_SAMPLES: u32 = 256;
-/// Dispatches of direct light whose shadow rays are counted together: with one ray of each point
-/// they stay far below 2^32.
+/// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
+/// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
-/// Pixels of a tile at least.
+/// Minimum number of pixels of a tile.
 const MIN_TILE_PIXELS: u32 = 64;
 
 /// Kernels of the camera pass.
@@ -54,7 +55,7 @@ impl CameraKernels {
         }
     }
 
-    /// Has them compiled ahead of their use.
+    /// Has the kernels compiled ahead of their use.
     pub fn prefetch(gpu: &Gpu, scene: &SceneBuffers, photons: &PhotonSettings, light_samples: u32) {
         let _ = Self::new(gpu, scene, photons, light_samples);
     }
@@ -65,11 +66,11 @@ impl CameraKernels {
 pub struct CameraTracer {
     kernels: CameraKernels,
     wavefront: Wavefront,
-    /// A [`VisiblePoint`] per path slot, some without a point.
+    /// A [`VisiblePoint`] per path slot; some slots have no point.
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
     pub radiance: Buffer,
-    /// What the last gather found at each visible point, [`Gathered`].
+    /// Result of the last gather at each visible point, [`Gathered`].
     pub gathered: Buffer,
     first_hits: Buffer,
     /// Sums over the samples of each pixel, [`LAYER_ROWS`] + 1 rows a pixel.
@@ -80,11 +81,10 @@ pub struct CameraTracer {
 }
 
 impl CameraTracer {
-    /// All rays start inside of `media`, those around the middle of the camera. `shares`: estimates
-    /// are shared among points, for which a tile needs a margin.
+    /// `media`: the media around the camera's centre, in which all rays start. `shares`: points
+    /// share estimates, for which a tile needs a margin.
     ///
-    /// # Errors
-    /// Limits of the adapter; a lens before an orthographic camera.
+    /// # Errors Limits of the adapter; a lens on an orthographic camera.
     pub fn new(
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -119,8 +119,8 @@ impl CameraTracer {
         })
     }
 
-    /// The tiles of the whole picture that the asked part of it touches, in order: a tile is the
-    /// same whatever the part, down to the last bit.
+    /// The tiles of the whole picture that overlap the data window, in order. A tile is the same
+    /// for every data window, to the last bit.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
@@ -140,19 +140,19 @@ impl CameraTracer {
         tiles
     }
 
-    /// Visible points of a tile, at most, without its margin.
+    /// Maximum number of visible points of this tile, without its margin.
     #[must_use]
     pub fn point_count(&self, tile: &Tile) -> u32 {
         self.view.branches * tile.pixels * tile.samples
     }
 
-    /// Visible points that any tile has at most, without its margin.
+    /// Maximum number of visible points of any tile, without its margin.
     #[must_use]
     pub fn room(&self) -> u64 {
         TILE_POINTS
     }
 
-    /// What a tile's estimates are shared among.
+    /// The visible points of a tile, which share estimates.
     #[must_use]
     pub fn shared_points(&self, tile: &Tile) -> SharedPoints<'_> {
         SharedPoints {
@@ -166,8 +166,7 @@ impl CameraTracer {
         }
     }
 
-    /// Column and row of the `i`-th pixel of a tile in the asked part of the picture; `None`
-    /// outside.
+    /// Column and row of the `i`-th pixel of a tile within the data window; `None` outside of it.
     #[must_use]
     pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
         let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
@@ -177,7 +176,7 @@ impl CameraTracer {
         (x < window.width && y < window.height).then_some((x, y))
     }
 
-    /// Traces the tile's camera paths to their visible points; sets all radiance to 0.
+    /// Traces the tile's camera paths to their visible points, and sets all radiance to 0.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -189,8 +188,8 @@ impl CameraTracer {
         self.follow(gpu, scene, (&start, tile.pixels * tile.samples + self.view.margin), &trace)
     }
 
-    /// Starts paths by `start` in that many invocations and follows them by `trace`, each with its
-    /// own buffers besides the wavefront's and the tile's.
+    /// Starts paths by `start` in that many invocations and traces them by `trace`. Both steps have
+    /// their own buffers besides those of the wavefront and the tile.
     pub(super) fn follow(
         &self,
         gpu: &Gpu,
@@ -211,7 +210,7 @@ impl CameraTracer {
         Ok(StepCount::from(counters))
     }
 
-    /// Adds the light that reaches the tile's visible points straight from the lights.
+    /// Adds direct light at the tile's visible points.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -238,7 +237,7 @@ impl CameraTracer {
         Ok(count)
     }
 
-    /// Sums over the tile's samples of each of its pixels.
+    /// Sums over the tile's samples, for each of its pixels.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -280,13 +279,13 @@ fn tile_sides(view: &CameraTile) -> (u32, u32) {
     (1 << bits.div_ceil(2), 1 << (bits / 2))
 }
 
-/// Cells around a tile.
+/// Number of cells in the margin of a tile of that size.
 fn margin_cells((width, height): (u32, u32)) -> u32 {
     2 * (width / MARGIN_CELL + 2) + 2 * (height / MARGIN_CELL)
 }
 
-/// The camera for a picture of that size: the vertical angle is kept, the horizontal one follows
-/// from the aspect.
+/// The camera for a picture of that size. The vertical angle of view is kept; the horizontal one
+/// follows from the aspect ratio.
 fn view(
     camera: &Camera,
     (width, height): (u32, u32),

@@ -1,5 +1,5 @@
-//! Light that reaches visible points straight from what shines: shadow rays to each light without
-//! extent, and samples of emissive surfaces and the environment.
+//! Direct light at visible points: shadow rays to each punctual light, and samples of emissive
+//! surfaces and the environment.
 
 use crate::{
     gpu::{Buffer, Commands, Gpu, Kernel},
@@ -12,25 +12,26 @@ use crate::{
 #[derive(Debug)]
 pub struct DirectLighting {
     punctual: Kernel,
-    /// With the number of samples; `None` if nothing with an extent shines.
+    /// Kernel and number of samples for the other lights; `None` if there are none.
     emitters: Option<(Kernel, u32)>,
 }
 
 impl DirectLighting {
-    /// Compiles what the scene's lights need; `samples` of each point for those with an extent.
+    /// Compiles the kernels that the scene's lights need. `samples`: samples per point of emissive
+    /// surfaces and the environment.
     pub fn new(gpu: &Gpu, scene: &SceneBuffers, sampler: Sampler, samples: u32) -> Self {
         let sample = || scene.kernel_with(gpu, "sample_emitters", &[sampler_constant(sampler)]);
         let emitters = scene.lights.table.has_extent().then(|| (sample(), samples));
         Self { punctual: scene.kernel(gpu, "light_directly"), emitters }
     }
 
-    /// Dispatches that make up all of it.
+    /// Number of steps, each one dispatch: one per punctual light, then one per sample.
     pub fn steps(&self, scene: &SceneBuffers) -> u32 {
         scene.lights.table.punctual as u32 + self.emitters.as_ref().map_or(0, |(_, samples)| *samples)
     }
 
-    /// Adds the light of one step to the radiance of the points. `buffers` are `tile`, `points`,
-    /// `radiance` and `counters`.
+    /// Adds the direct light of one step to the radiance of the points. `buffers` are `tile`,
+    /// `points`, `radiance` and `counters`.
     pub fn add(
         &self,
         gpu: &Gpu,

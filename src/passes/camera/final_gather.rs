@@ -1,4 +1,4 @@
-//! Final gathering: light that visible points get from what rays of theirs see (Jensen 2001,
+//! Final gathering: light at visible points from the surfaces that rays from them hit (Jensen 2001,
 //! "Realistic Image Synthesis Using Photon Mapping", section 8.2). Kernels: `start_final_gather`,
 //! `trace_camera`.
 
@@ -16,15 +16,15 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Kernels, and room for what one ray of each visible point sees: memory does not grow with the
-/// rays.
+/// Kernels, and a buffer for the hits of one ray of each visible point. Memory does not grow with
+/// the number of rays.
 #[derive(Debug)]
 pub struct FinalGather {
     start: Kernel,
     trace: Kernel,
     rays: u32,
-    /// A [`VisiblePoint`] per visible point of the camera, whose weight brings its light to the
-    /// camera; some slots have no point.
+    /// Hits of the current ray: a [`VisiblePoint`] per visible point of the camera. Its weight
+    /// includes the camera path. Some slots have no point.
     pub seen: Buffer,
 }
 
@@ -37,7 +37,7 @@ impl FinalGather {
         let sampler = sampler_constant(sampler);
         Ok(Self {
             start: scene.kernel_with(gpu, "start_final_gather", &[sampler]),
-            // What shines straight into a visible point is direct light, which it has already.
+            // An emitter that a ray hits gives direct light, which the visible point has already.
             trace: scene.kernel_with(gpu, "trace_camera", &[sampler, ("SEES_LIGHTS", 0.0)]),
             rays,
             seen: gpu.storage::<VisiblePoint>("points seen in final gathering", tracer.room())?,
@@ -50,7 +50,7 @@ impl FinalGather {
         self.rays
     }
 
-    /// Sends the `ray`-th ray of each visible point of the tile on to the first diffuse surface.
+    /// Traces the `ray`-th ray of each visible point of the tile to the first diffuse surface.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -66,8 +66,8 @@ impl FinalGather {
         let points = tracer.point_count(tile);
         let step = gpu.uniform("final step", &FinalStep { ray, rays: self.rays, points, pad: 0 });
         let camera = gpu.uniform("camera tile", &view);
-        // Each visible point is a sample of its own, which follows glass one way by chance: another
-        // way with each ray.
+        // Each visible point is a sample of its own. At glass, each of its rays chooses reflection
+        // or refraction at random.
         let own = gpu.uniform(
             "final gather tile",
             &CameraTile {

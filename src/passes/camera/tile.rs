@@ -1,4 +1,4 @@
-//! Tiles: parts of a picture's samples, and what one step did to them.
+//! Tiles: parts of a picture's samples, and counts of one step over a tile.
 
 use crate::layout::{Counters, LOST_SCALE};
 
@@ -15,7 +15,7 @@ pub struct Tile {
     pub samples: u32,
 }
 
-/// What one step did, for the statistics.
+/// Counts of one step, for the statistics.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepCount {
     pub rays: u64,

@@ -1,5 +1,5 @@
-//! Order of the queries of a batch: points that wait are marked, keyed along the Hilbert curve of
-//! the map and sorted. Kernels: `mark_points`, `key_points`.
+//! Order of the queries of a batch: the points that wait for the map are marked, keyed along its
+//! Hilbert curve and sorted. Kernels: `mark_points`, `key_points`.
 
 use crate::{
     error::Result,
@@ -13,9 +13,9 @@ use crate::{
 
 /// Bits of a point's key: the upper word of its Hilbert key.
 const POINT_KEY_BITS: u32 = 3 * layout::KEY_BITS;
-/// Maximum number of points, and how many of the highest bits of their keys are sorted by. Few
-/// points make few blocks of packets to distribute, and their pixel order already keeps near points
-/// together. More points are sorted by all bits.
+/// Maximum number of points, and number of key bits to sort by, from the highest. Few points make
+/// few blocks of packets to distribute, and their pixel order already keeps near points together.
+/// More points are sorted by all bits.
 const SORT_BITS_BY_COUNT: [(u32, u32); 2] = [(4096, 8), (16_384, 16)];
 
 /// The compiled kernels.
@@ -32,8 +32,8 @@ impl QueryOrder {
         Self { mark: kernel("mark_points"), key: kernel("key_points"), radix: RadixSort::new(gpu) }
     }
 
-    /// Sorts the points of a batch that wait, with two buffers for their entries. Returns the
-    /// buffer that holds the order, and the number of points.
+    /// Sorts the points of a batch that wait for the map. `entries`: two buffers for the sort.
+    /// Returns the buffer that holds the order, and the number of points.
     pub(super) fn sort<'b>(
         &self,
         gpu: &Gpu,

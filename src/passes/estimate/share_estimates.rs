@@ -1,6 +1,6 @@
-//! Light at the visible points of a tile by fewer queries than points: where an estimate is a mean
-//! over a disc much wider than points are apart, they share it. Kernels: `choose_queries`,
-//! `share_estimates`.
+//! Light at the visible points of a tile with fewer queries than points. An estimate is a mean over
+//! a disc; points share it where the disc is much wider than the distance between them. Kernels:
+//! `choose_queries`, `share_estimates`.
 
 use crate::{
     error::Result,
@@ -8,17 +8,16 @@ use crate::{
     layout::{MARGIN_CELL, MARGIN_SAMPLES, ShareRound, VisiblePoint},
 };
 
-/// Pixels of a cell in each round. A coarser cell than 8 x 8 saves little, for its points are few
-/// already; so do sizes between these, for each round costs time of its own.
+/// Pixels of a cell in each round. Cells coarser than 8 x 8 save little, because the queries are
+/// few already. Sizes between these save little too, because each round costs time of its own.
 const ROUNDS: [u32; 3] = [64, 4, 1];
-/// Samples that a cell has at least: of fewer, most would be queries themselves.
+/// Minimum number of samples of a cell. Of fewer, most would be queries themselves.
 const LEAST_CELL: u32 = 4;
-/// Of the pixels of a cell of the first round, one in so many has a sample from which its query is
-/// chosen.
+/// Stride of the pixels of a cell in the first round that have a candidate sample for its query.
 const FIRST_STEP: u32 = ROUNDS[0] / MARGIN_SAMPLES;
 const _: () = assert!(ROUNDS[0] == MARGIN_CELL * MARGIN_CELL);
 
-/// What of a tile is shared.
+/// The visible points of a tile that share estimates.
 #[derive(Debug)]
 pub struct SharedPoints<'a> {
     /// [`VisiblePoint`]s: for each pixel, in Morton order, its samples, each with its branches;
@@ -30,27 +29,27 @@ pub struct SharedPoints<'a> {
     pub branches: u32,
     /// Cells of the margin.
     pub margin: u32,
-    /// Radiance from each point, `vec4f`, and room for what gathers find,
+    /// Radiance from each point, `vec4f`, and room for results of gathers,
     /// [`Gathered`](crate::layout::Gathered).
     pub radiance: &'a Buffer,
     pub gathered: &'a Buffer,
 }
 
-/// Points at which estimates are asked for.
+/// Points at which estimates are requested.
 #[derive(Debug)]
 pub struct EstimateRequest<'a> {
-    /// [`VisiblePoint`]s, of which those take part that wait for the map.
+    /// [`VisiblePoint`]s. Those that wait for the map take part.
     pub points: &'a Buffer,
     pub count: u32,
     /// Number of the map gathered, from 1.
     pub map_number: u32,
-    /// What the estimates are added to, `vec4f`, and what is said of them,
+    /// Radiance that the estimates are added to, `vec4f`, and result of each query,
     /// [`Gathered`](crate::layout::Gathered).
     pub radiance: &'a Buffer,
     pub gathered: &'a Buffer,
 }
 
-/// Makes the estimates over one map.
+/// Computes estimates over one map.
 pub type Estimates<'a> = dyn FnMut(&EstimateRequest) -> Result<()> + 'a;
 
 /// The kernels, and room for queries.
@@ -58,7 +57,7 @@ pub type Estimates<'a> = dyn FnMut(&EstimateRequest) -> Result<()> + 'a;
 pub struct EstimateSharing {
     choose: Kernel,
     share: Kernel,
-    /// Distance within which points share an estimate, as a fraction of its radius.
+    /// Distance within which points share an estimate, as a fraction of the estimate's radius.
     reach: f32,
     scratch: Option<Scratch>,
 }
@@ -72,7 +71,7 @@ struct Scratch {
 
 impl EstimateSharing {
     /// Compiles the kernels. `reach`: distance within which points share an estimate, as a fraction
-    /// of its radius; 0: none do.
+    /// of the estimate's radius; 0: no sharing.
     #[must_use]
     pub fn new(gpu: &Gpu, reach: f32) -> Self {
         let kernel = |stem| Kernel::new(gpu, stem, &[]);
@@ -84,9 +83,9 @@ impl EstimateSharing {
         let _ = Self::new(gpu, 0.0);
     }
 
-    /// Adds the light of a map's photons to the radiance of the tile's points: by queries in large
-    /// cells of pixels, then in smaller ones for the points that are left, and at last by a query
-    /// for each point. Maps are numbered from 1.
+    /// Adds the light of a map's photons to the radiance of the tile's points. Queries are made in
+    /// large cells of pixels, then in smaller cells for the points that are left, and finally for
+    /// each remaining point. Maps are numbered from 1.
     ///
     /// # Errors
     /// Those of `estimates`.
@@ -145,7 +144,7 @@ impl EstimateSharing {
         let mut encoder = gpu.encoder();
         self.choose.dispatch(&mut encoder, &self.choose.bind(gpu, &buffers), queries.into());
         gpu.submit(encoder);
-        // There are fewer queries than points.
+        // The tile's buffer has room for the results, since there are fewer queries than points.
         let (radiance, gathered) = (&scratch.irradiance, tile.gathered);
         estimates(&EstimateRequest { points: &scratch.queries, count: queries, map_number: 1, radiance, gathered })?;
         let mut encoder = gpu.encoder();

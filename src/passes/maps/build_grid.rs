@@ -17,8 +17,8 @@ impl BuildGrid {
         Self(Kernel::new(gpu, "build_grid", &[]))
     }
 
-    /// The cells of `count` photons, which lie in windows of `window` each, and the number of
-    /// levels.
+    /// Builds the cells of `count` photons, which lie in windows of `window` photons. Returns the
+    /// cells and the number of levels.
     pub(crate) fn build(&self, gpu: &Gpu, places: &[Buffer], window: u32, count: u32) -> Result<(Buffer, u32)> {
         let sizes = level_sizes(count.div_ceil(CELL_PHOTONS));
         let base = |level: usize| sizes.iter().skip(level + 1).sum::<u32>();
@@ -51,7 +51,8 @@ impl BuildGrid {
     }
 }
 
-/// Cells of each level, finest first, up to a single one; none for no photons.
+/// Number of cells of each level, from the finest to the single coarsest cell; empty without
+/// photons.
 fn level_sizes(finest: u32) -> Vec<u32> {
     let coarser = |&n: &u32| (n > 1).then(|| n.div_ceil(CELL_FAN));
     std::iter::successors((finest > 0).then_some(finest), coarser).collect()

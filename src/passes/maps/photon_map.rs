@@ -3,14 +3,15 @@
 //!
 //! Photons come unsorted in a [`PhotonStore`]: windows of `array<Photon>`, each within one binding
 //! (4,194,304 photons where a binding holds 128 MiB, so that up to that number there is one
-//! window). [`PhotonMap::build`] sorts them along a Hilbert curve of 20 bits per axis and splits
-//! them into what a search reads (`places`: position and direction, 16 bytes) and what an estimate
-//! reads besides (`fluxes`, 16 bytes); where these exceed a binding, into two windows.
+//! window). [`PhotonMap::build`] sorts them along a Hilbert curve of 20 bits per axis. It splits
+//! each photon into the data that a search reads (`places`: position and direction, 16 bytes) and
+//! the data that only an estimate reads (`fluxes`, 16 bytes). Arrays that exceed a binding are
+//! split into two windows.
 //!
-//! Over the sorted photons lies the grid: a finest cell is 16 photons that follow each other on the
-//! curve, a coarser one eight finer cells, each with its exact bounds. Cells thus follow the
-//! density of the photons at every scale: a caustic has small cells, an empty region none, and
-//! photons on one spot have cells of size zero.
+//! The grid is built over the sorted photons. A cell of the finest level holds 16 consecutive
+//! photons of the curve, a coarser cell eight finer cells. Each has its exact bounds. Cells thus
+//! follow the density of the photons at every scale: a caustic has small cells, an empty region
+//! none, and photons at one point have cells of size zero.
 
 use super::{
     build_grid::BuildGrid,
@@ -65,8 +66,8 @@ pub struct PhotonMap {
 }
 
 impl PhotonMap {
-    /// Sorts the first `count` photons of `photons` and builds the grid; `emitted` paths shot them.
-    /// The same photons give the same bits, whatever the device's schedule.
+    /// Sorts the first `count` photons of `photons` and builds the grid. `emitted`: number of paths
+    /// that they come from. The same photons give the same bits, whatever the device's schedule.
     ///
     /// # Errors
     /// [`crate::Error::Limit`] if the map does not fit the device, [`crate::Error::Gpu`] if the

@@ -1,4 +1,4 @@
-//! Unsorted photons on the device, and how many a map may hold there.
+//! Unsorted photons on the device, and the maximum size of a map there.
 
 use crate::{
     error::{Error, Result},
@@ -6,7 +6,7 @@ use crate::{
     layout::{Photon, PhotonPlace},
 };
 
-/// Most windows of a sorted map; `shaders/bindings/photon_map.wesl` binds that many.
+/// Maximum number of windows of a sorted map; `shaders/bindings/photon_map.wesl` binds that many.
 pub(super) const MAX_WINDOWS: usize = 2;
 
 /// Unsorted photons in windows that one binding can hold.
@@ -38,7 +38,7 @@ impl PhotonStore {
         Ok(Self { windows, window_photons })
     }
 
-    /// Holds a copy of `photons`.
+    /// A store with a copy of `photons`.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -49,11 +49,12 @@ impl PhotonStore {
         Ok(store)
     }
 
-    /// Writes `photons` from the first place on.
+    /// Writes `photons` from index 0 on.
     pub fn write(&self, gpu: &Gpu, photons: &[Photon]) {
         for (window, part) in self.windows.iter().zip(photons.chunks(self.window_photons as usize)) {
             gpu.write(window, 0, part);
-            // Written in pieces: the staging memory of a write is given back with its submission.
+            // One submission per window, because the staging memory of a write is freed with its
+            // submission.
             gpu.submit(gpu.encoder());
         }
     }
@@ -70,7 +71,8 @@ impl PhotonStore {
         self.window_photons
     }
 
-    /// Photons of `count` in all that lie in each window: its first index and their number.
+    /// Windows of the first `count` photons: buffer, index of its first photon, number of its
+    /// photons.
     pub(crate) fn parts(&self, count: u32) -> impl Iterator<Item = (&Buffer, u32, u32)> {
         self.windows.iter().zip(0..).filter_map(move |(buffer, w)| {
             let first = w * self.window_photons;
@@ -84,19 +86,19 @@ pub(super) fn window_elements<T>(gpu: &Gpu) -> u32 {
     elements_within::<T>(gpu.max_binding())
 }
 
-/// The same for bindings of that many bytes. Photons are counted in 31 bits: a window has no more
-/// than 2^29.
+/// As [`window_elements`], for bindings of that many bytes. Photons are counted in 31 bits, so that
+/// a window has at most 2^29.
 fn elements_within<T>(binding: u64) -> u32 {
     let most = (binding / size_of::<T>() as u64).clamp(64, 1 << 29);
     1 << most.ilog2()
 }
 
-/// Photons of the largest map where bindings have that many bytes.
+/// Maximum number of photons of a map, where bindings have that many bytes.
 fn most_photons(binding: u64) -> u64 {
     MAX_WINDOWS as u64 * u64::from(elements_within::<PhotonPlace>(binding))
 }
 
-/// Finds out, before a photon is traced, whether a map of so many can be built.
+/// Fails if a map of so many photons cannot be built. Called before any photon is traced.
 pub(crate) fn check_capacity(gpu: &Gpu, photons: u32) -> Result<()> {
     if u64::from(photons) > most_photons(gpu.max_binding()) { Err(too_many(gpu, photons.into())) } else { Ok(()) }
 }
@@ -129,12 +131,12 @@ mod tests {
             (1 << 60, 1 << 30),
         ] {
             assert_eq!(most_photons(binding), photons, "bindings of {binding} bytes");
-            // All else that is made of a photon fits then as well: its key and place in two buffers
-            // of the sort, its part of the counts of digits, of the cells and of what a search
+            // All other data per photon then fits as well: key and index in two buffers of the
+            // sort, and its part of the digit counts, of the cells and of the data that a search
             // reads.
             assert!(photons * 8 <= binding.max(1024), "sort entries in {binding} bytes");
             assert!(photons / u64::from(CELL_PHOTONS) * 37 <= binding.max(1024), "cells in {binding} bytes");
-            // A path that found no place is sent beyond 2^31.
+            // Photons that do not fit get positions from 2^31 on.
             assert!(photons < 1 << 31);
         }
         assert!(most_photons((1 << 31) - 4) > 100_000_000 && most_photons(128 << 20) < 100_000_000);

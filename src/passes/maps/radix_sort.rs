@@ -36,9 +36,9 @@ impl RadixSort {
         }
     }
 
-    /// Sorts the first `count` pairs of `entries[0]` by those bits of their keys, 0 the lowest;
-    /// equal ones keep their order. Returns which of the two buffers holds the result; the other
-    /// one is overwritten.
+    /// Sorts the first `count` pairs of `entries[0]` by those bits of their keys; bit 0 is the
+    /// lowest. Pairs with equal bits keep their order. Returns which of the two buffers holds the
+    /// result; the other one is overwritten.
     ///
     /// # Errors
     /// [`crate::Error::Limit`] if the digit counts exceed a binding.
@@ -77,7 +77,7 @@ impl RadixSort {
         for l in 0..levels.len() - 1 {
             self.sum.dispatch(encoder, &self.sum.bind(gpu, &buffers(l)), spans(l));
         }
-        // Nothing lies before the one span of the last level.
+        // The prefix sum of the only span of the last level is 0.
         encoder.clear_buffer(&levels[levels.len() - 1], 0, None);
         for l in (0..levels.len() - 1).rev() {
             self.scan.dispatch(encoder, &self.scan.bind(gpu, &buffers(l)), spans(l));
@@ -85,7 +85,8 @@ impl RadixSort {
     }
 }
 
-/// Buffers for `count` values and for the sums of their spans, of the spans' spans, down to one.
+/// Buffers for the levels of a prefix sum: `count` values, the sums of their spans, the sums of
+/// spans of these, down to a single sum.
 pub(crate) fn scan_levels(gpu: &Gpu, mut count: u64) -> Result<Vec<Buffer>> {
     let mut levels = vec![gpu.storage::<u32>("values to sum", count)?];
     while count > 1 {

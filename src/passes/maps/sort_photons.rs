@@ -40,8 +40,8 @@ impl SortPhotons {
             gpu.storage::<[u32; 2]>("sort entries", count.into())?,
             gpu.storage::<[u32; 2]>("sort entries", count.into())?,
         ];
-        // By the fine half of the key first: the sort by the coarse half keeps that order among
-        // equals.
+        // Sorts by the fine half of the key first. The sort by the coarse half is stable, so that
+        // equal keys keep that order.
         for fine in [1, 0] {
             let mut encoder = gpu.encoder();
             // A buffer may not be dropped before the commands that use it are submitted.
@@ -63,7 +63,7 @@ impl SortPhotons {
         Ok(sorted)
     }
 
-    /// A buffer whose first box holds all photons.
+    /// Buffer of boxes, the first of which bounds all photons.
     fn bounds(&self, gpu: &Gpu, photons: &PhotonStore, count: u32) -> Result<Buffer> {
         let windows = photons.parts(count).count() as u32;
         let boxes = gpu.storage::<Cell>("photon bounds", u64::from((windows * BOUND_LANES).max(1)))?;

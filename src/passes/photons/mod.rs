@@ -1,4 +1,4 @@
-//! First pass: photon paths from the lights, and the photons that they leave.
+//! First pass: photon paths from the lights, and the photons that they store.
 
 mod photon_batch;
 pub mod photon_tracer;

@@ -11,8 +11,8 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Photons that the staging buffer holds per path of a batch; a batch that has more is traced again
-/// in smaller ones.
+/// Capacity of the staging buffer, photons per path of a batch. A batch that exceeds it is traced
+/// again in smaller batches.
 const STAGED_PER_PATH: u64 = 2;
 
 const _: () = assert!(MAX_BOUNCES <= PLACE_MASK, "a key has room for the photons of a path");
@@ -37,10 +37,10 @@ pub(crate) struct BatchBuffers {
     pub staging_capacity: u64,
 }
 
-/// What one batch did.
+/// Result of one batch.
 pub(crate) struct BatchResult {
     pub counters: Counters,
-    /// Photons of each path, for each [`MapKind`].
+    /// Number of photons of each path, for each [`MapKind`].
     counts: Vec<u32>,
 }
 
@@ -54,7 +54,8 @@ impl PhotonKernels {
         }
     }
 
-    /// Emits a batch from lights by the table `choices` and bounces it until no path is left.
+    /// Emits a batch from lights sampled by the table `choices`, and bounces it until no path is
+    /// left.
     pub fn run(
         &self,
         gpu: &Gpu,
@@ -78,7 +79,7 @@ impl PhotonKernels {
         Ok(BatchResult { counters, counts: gpu.read(&buffers.counts, 0, paths * u64::from(MAP_KINDS))? })
     }
 
-    /// Moves a batch's photons of one kind to their places in the map, up to the first path that
+    /// Moves a batch's photons of one kind to their positions in the map, up to the first path that
     /// does not fit as a whole.
     pub fn store(
         &self,
@@ -114,7 +115,7 @@ impl PhotonKernels {
 }
 
 impl BatchBuffers {
-    /// For batches of that many paths from that many groups of lights.
+    /// Buffers for batches of up to `paths` paths, from `groups` groups of lights.
     pub fn new(gpu: &Gpu, paths: u64, groups: usize) -> Result<Self> {
         let staging_capacity = (paths * STAGED_PER_PATH).max(2 * u64::from(MAX_BOUNCES));
         Ok(Self {

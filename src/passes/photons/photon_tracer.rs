@@ -1,9 +1,9 @@
 //! The photon pass: emission by emission, batch by batch, until the maps are full.
 //!
-//! Aimed, there are two emissions: general paths fill the global map, and paths aimed at mirrors
-//! and glass the caustic map, which then holds L S+ D only. Unaimed, the same paths fill both.
-//! Which photons a map holds, and in which order, depends on the indices of the paths alone: never
-//! on the size of the batches or on the order in which the device runs them.
+//! With aimed emission there are two emissions: general paths fill the global map, and paths aimed
+//! at mirrors and glass fill the caustic map, which then holds L S+ D only. Without it, the same
+//! paths fill both maps. The photons of a map and their order depend only on the indices of the
+//! paths: never on the size of the batches or on the order in which the device runs them.
 
 use super::{
     photon_batch::{BatchBuffers, PhotonKernels},
@@ -23,24 +23,25 @@ use crate::{
 /// staged photon holds its path.
 const MIN_BATCH: u64 = 1 << 16;
 const MAX_BATCH: u64 = layout::PATH_MASK as u64 + 1;
-/// Paths over which the growth of a map is watched, at least; a map's capacity if that is more.
+/// Minimum number of paths over which the growth of a map is measured. The capacity of the map is
+/// used if it is larger.
 const GROWTH_WINDOW: u64 = 1 << 17;
 /// Fixed-point unit of lost flux, as a fraction of a path's mean flux.
 const LOST_UNIT: f64 = 1.0 / 4096.0;
 
-/// What the photon pass leaves.
+/// Result of the photon pass.
 #[derive(Debug)]
 pub struct TracedPhotons {
     pub maps: ByKind<RawMap>,
     /// Photons stored of each group of lights.
     pub of_lights: Vec<u32>,
-    /// Flux that the bounce limit took, W, mean of the channels; of the general paths.
+    /// Flux that the general paths lost to the bounce limit, W, mean of the channels.
     pub lost: f64,
     pub rays: u64,
     pub media_overflows: u64,
-    /// Rays given up after the loop budget.
+    /// Rays abandoned when the loop budget was spent.
     pub unfinished: u64,
-    /// Paths that ended as a number of theirs was not finite.
+    /// Paths that ended because one of their values was not finite.
     pub non_finite: u64,
     pub warnings: Vec<String>,
 }
@@ -51,14 +52,14 @@ pub struct PhotonTracer {
     kernels: PhotonKernels,
 }
 
-/// Paths of one kind, numbered from 0.
+/// One emission: paths of one kind, numbered from 0.
 struct EmissionPlan<'a> {
     choices: &'a ChoiceBuffer,
     stream: u32,
     first_target: u32,
     target_count: u32,
-    /// [`layout::AIM`], [`layout::CAUSTICS_APART`], and what of the modes' rules holds for these
-    /// paths.
+    /// Rules of all batches: [`layout::AIM`], [`layout::CAUSTICS_APART`], and the rules of the mode
+    /// that apply to these paths.
     rules: u32,
     fills: &'static [MapKind],
 }
@@ -75,7 +76,7 @@ impl PhotonTracer {
     }
 
     /// Traces photons until both maps are full, hardly grow, or all paths have been emitted.
-    /// `caustics`: the scene has a delta surface.
+    /// `caustics`: the scene has a specular surface.
     ///
     /// # Errors
     /// Limits of the adapter, faults of the driver, and [`crate::Error::Stopped`].
@@ -170,7 +171,7 @@ impl PhotonTracer {
     }
 }
 
-/// The emissions that fill the maps; none of lights that are all dark.
+/// The emissions that fill the maps, without those that have no light to choose.
 fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool) -> Vec<EmissionPlan<'a>> {
     let lights = &scene.lights;
     let rule = |holds: bool, bit: u32| if holds { bit } else { 0 };
@@ -180,7 +181,8 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool)
         stream: layout::STREAM_PHOTON,
         first_target: 0,
         target_count: 1,
-        // Rays of final gathering see what was scattered before it came through glass.
+        // Rays of final gathering see light that was scattered diffusely before it came through
+        // glass.
         rules: rule(aimed, layout::AIM)
             | rule(aimed || settings.final_gather > 0, layout::CAUSTICS_APART)
             | rule(settings.stores_direct(), layout::STORE_DIRECT)
@@ -196,11 +198,12 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool)
         fills: &[MapKind::Caustic],
     };
     let wanted = [Some(general), (aimed && caustics).then_some(caustic)];
-    wanted.into_iter().flatten().filter(|plan| plan.choices.turns > 0).collect()
+    wanted.into_iter().flatten().filter(|plan| plan.choices.strata > 0).collect()
 }
 
 impl EmissionPlan<'_> {
-    /// What the batches of it share, and what follows from the maps that are still open.
+    /// Settings that all batches of the emission share, and the rules for the maps that are still
+    /// open.
     fn batch(&self, scene: &SceneBuffers, settings: &PhotonSettings, traced: &TracedPhotons) -> PhotonBatch {
         let open = |kind: MapKind, bit: u32| {
             if self.fills.contains(&kind) && traced.maps[kind].open { bit } else { 0 }
@@ -208,7 +211,7 @@ impl EmissionPlan<'_> {
         PhotonBatch {
             seed: settings.seed,
             light_count: scene.lights.table.lights.len() as u32,
-            turns: self.choices.turns,
+            strata: self.choices.strata,
             max_bounces: settings.bounce_limit(),
             max_surfaces: match scene.has_specular {
                 true => MAX_BOUNCES.min(settings.bounce_limit() + layout::CHAIN_LIMIT),

@@ -1,4 +1,4 @@
-//! Photons as they come from the photon pass: a map that fills up, and the paths that it is
+//! Unsorted photons of the photon pass: a map that fills up, and the number of paths that it is
 //! normalised by.
 
 use crate::{
@@ -8,8 +8,8 @@ use crate::{
     passes::maps::photon_store::{PhotonStore, check_capacity},
 };
 
-/// A map that gains less than this fraction of its capacity while a window of paths is traced is
-/// idle.
+/// Minimum growth of a map over a window of paths, as a fraction of its capacity. A map that gains
+/// less is idle.
 const LEAST_GROWTH: f64 = 1e-4;
 
 /// Photons in the order of their paths.
@@ -19,16 +19,16 @@ pub struct RawMap {
     pub capacity: u64,
     /// Photons in it.
     pub stored: u64,
-    /// Paths that they stem from: what their flux must be divided by.
+    /// Number of emitted paths: the divisor of their flux.
     pub emitted: u64,
-    /// It takes photons.
+    /// The map takes photons.
     pub(crate) open: bool,
-    /// Photons in it when its growth was looked at last.
+    /// Photons in it at the last check of its growth.
     stored_before: u64,
 }
 
 impl RawMap {
-    /// An empty map; without room if it is not `wanted`.
+    /// An empty map; with capacity 0 if it is not `wanted`.
     pub(crate) fn new(gpu: &Gpu, capacity: u32, wanted: bool) -> Result<Self> {
         let capacity = if wanted { capacity } else { 0 };
         check_capacity(gpu, capacity)?;
@@ -42,10 +42,10 @@ impl RawMap {
         })
     }
 
-    /// Place of the first photon of each path of a batch. The first path that does not fit closes
-    /// the map, which is then normalised by the paths before it.
+    /// Assigns each path of a batch the position of its first photon in the map. The first path
+    /// that does not fit closes the map, which is then normalised by the paths before it.
     pub(crate) fn place(&mut self, counts: impl Iterator<Item = u32>, first_path: u64) -> Vec<u32> {
-        // Beyond the end of any map, also when a path's photons are counted from there.
+        // A position beyond the end of any map. So are those of the path's further photons.
         const DROPPED: u32 = 1 << 31;
         counts
             .zip(first_path..)
@@ -76,7 +76,7 @@ impl RawMap {
             .map(|p| p.concat())
     }
 
-    /// Paths that are likely to fill the map from here on.
+    /// Number of further paths that are likely to fill the map.
     pub(crate) fn paths_wanted(&self, first_path: u64) -> u64 {
         if !self.open {
             return 0;
@@ -88,12 +88,12 @@ impl RawMap {
         ((self.capacity - self.stored) as f64 * per_photon * 1.02) as u64 + 1024
     }
 
-    /// Photons that it holds in the end, as far as is known.
+    /// Expected number of photons when the pass ends.
     pub(crate) fn expected(&self) -> u64 {
         if self.open { self.capacity } else { self.stored }
     }
 
-    /// Closes it if it hardly grew since the last call; says so then.
+    /// Closes the map if it hardly grew since the last call, and then returns a warning.
     pub(crate) fn close_if_idle(&mut self, name: &str, window: u64) -> Option<String> {
         let gained = self.stored - self.stored_before;
         self.stored_before = self.stored;
@@ -120,7 +120,7 @@ mod tests {
         let first = (1_u64 << 32) - 2;
         assert_eq!(map.place([1, 2, 3].into_iter(), first), [0, 1, 3]);
         assert_eq!((map.stored, map.emitted), (6, first + 3));
-        // 4 more fit, but the second path does not as a whole.
+        // There is room for 4 more photons, but not for the second path as a whole.
         let places = map.place([3, 2, 1].into_iter(), first + 3);
         assert_eq!((places[0], map.stored, map.emitted, map.open), (6, 9, first + 4, false));
         assert!(places[1..].iter().all(|&place| place >= 1 << 31));

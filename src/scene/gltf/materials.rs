@@ -38,12 +38,16 @@ pub(super) fn read(root: &json::Root, index: usize, notes: &mut Notes) -> Read<M
 
 /// Rank among overlapping solids: `extras.caustica.priority`, an integer; 0 without one.
 fn priority(material: &json::Material, place: &str) -> Read<i32> {
-    let extras = material.extras.as_ref().and_then(|extras| serde_json::from_str::<serde_json::Value>(extras.get()).ok());
+    let extras =
+        material.extras.as_ref().and_then(|extras| serde_json::from_str::<serde_json::Value>(extras.get()).ok());
     let Some(priority) = extras.as_ref().and_then(|extras| extras.get("caustica")?.get("priority")) else {
         return Ok(0);
     };
     let integer = priority.as_i64().and_then(|priority| i32::try_from(priority).ok());
-    integer.map_or_else(|| fault(format!("{place}.extras.caustica.priority"), format!("{priority} is not an integer of 32 bits")), Ok)
+    integer.map_or_else(
+        || fault(format!("{place}.extras.caustica.priority"), format!("{priority} is not an integer of 32 bits")),
+        Ok,
+    )
 }
 
 /// Nearest surface model.

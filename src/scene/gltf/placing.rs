@@ -67,9 +67,9 @@ pub(super) fn measure(instances: &[MeshInstance<'_>], bounds: &mut WorldBounds) 
 /// The triangles of a copy of a mesh, with the node that shows it.
 pub(super) type PlacedMesh = (Range<usize>, usize);
 
-/// All shown triangles relative to `center`, and which copies of meshes they are of. `material` maps
-/// the file's materials to the scene's. A mesh that nodes show twice in exactly one place is there
-/// once.
+/// All shown triangles relative to `center`, and which copies of meshes they are of. `material`
+/// maps the file's materials to the scene's. A mesh that nodes show twice in exactly one place is
+/// there once.
 pub(super) fn place(
     instances: &[MeshInstance<'_>],
     center: DVec3,

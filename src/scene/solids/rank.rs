@@ -70,7 +70,8 @@ pub(super) fn slots(solids: &[Solid]) -> (Vec<u8>, Vec<u32>, usize) {
         let around: Vec<(u8, u32)> =
             neighbours[solid].iter().filter(ranked).map(|i| (slot_of[*i], solids[*i].material)).collect();
         // Among equal media either may fill the space; of others those before it rank higher.
-        let first = around.iter().filter(|(_, m)| *m != material).map(|(slot, _)| *slot as usize + 1).max().unwrap_or(0);
+        let first =
+            around.iter().filter(|(_, m)| *m != material).map(|(slot, _)| *slot as usize + 1).max().unwrap_or(0);
         let free = |slot: &usize| materials[*slot] == material && around.iter().all(|(s, _)| *s as usize != *slot);
         let slot = match (first..materials.len()).find(free) {
             Some(slot) => slot,

@@ -89,12 +89,7 @@ fn is_sheet(shell: &Shell) -> bool {
 
 /// Which triangles to keep: of glass that lies in one place several times the first, whichever way
 /// its faces look.
-fn without_doubles(
-    triangles: &[Triangle],
-    mesh_of: &[usize],
-    is_glass: &[bool],
-    faults: &mut [Faults],
-) -> Vec<bool> {
+fn without_doubles(triangles: &[Triangle], mesh_of: &[usize], is_glass: &[bool], faults: &mut [Faults]) -> Vec<bool> {
     let corners = |triangle: &Triangle| {
         let mut keys = triangle.positions.map(|p| (p + glam::Vec3::ZERO).to_array().map(f32::to_bits));
         keys.sort_unstable();

@@ -37,7 +37,13 @@ pub fn glass() -> Surface {
 pub fn scene(surfaces: &[Surface]) -> Scene {
     let materials = surfaces
         .iter()
-        .map(|&surface| Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false, priority: 0 })
+        .map(|&surface| Material {
+            name: String::new(),
+            surface,
+            emission: Vec3::ZERO,
+            double_sided: false,
+            priority: 0,
+        })
         .collect();
     Scene { materials, ..Scene::default() }
 }
@@ -54,7 +60,13 @@ pub fn point_light(position: Vec3, intensity: f32) -> Light {
 
 /// An emissive diffuse material.
 pub fn emissive(name: &str, albedo: f32, emission: f32, double_sided: bool) -> Material {
-    Material { name: name.to_owned(), surface: diffuse(albedo), emission: Vec3::splat(emission), double_sided, priority: 0 }
+    Material {
+        name: name.to_owned(),
+        surface: diffuse(albedo),
+        emission: Vec3::splat(emission),
+        double_sided,
+        priority: 0,
+    }
 }
 
 /// A camera at `position` that looks at `target`; full vertical angle in degrees.

@@ -98,7 +98,8 @@ fn room(light: Vec3) -> Scene {
         name: String::new(),
         surface: Surface::Diffuse { albedo: Vec3::splat(0.5) },
         emission: Vec3::ZERO,
-        double_sided: false, priority: 0,
+        double_sided: false,
+        priority: 0,
     };
     Scene {
         materials: vec![material],
