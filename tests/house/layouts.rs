@@ -42,19 +42,19 @@ fn twins() -> Vec<Twin> {
         BvhNode { grid, low, high }
         Primitive { v0, material, e1, id, e2, emitter }
         Normals { n0, n1, n2, flat_shaded }
-        Material { color, kind, emission, ior, double_sided, medium, pad0, pad1 }
-        Medium { ior }
+        Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }
+        Medium { tint, ior }
         Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
-        Path { origin, history, direction, bounces, beta, media_count, media }
+        Path { origin, history, direction, bounces, beta, left, media }
         Photon { position, wi, flux, normal }
-        VisiblePoint { position, next_map, weight, offset, ng, media_outer, ns, media_inner }
+        VisiblePoint { position, next_map, weight, offset, ng, media_low, ns, media_high }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays }
-        PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, pad0, pad1 }
+        PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, pad1 }
         Store { staged, first_photon, photons, kind }
-        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, max_bounces, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, pad0, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media }
         FinalStep { ray, rays, points, pad }
         FirstHit { normal, depth, albedo, alpha }
         DirectLight { light, points, pad0, pad1 }

@@ -60,22 +60,31 @@ pub(in crate::scene) fn repair(
     let groups = groups(triangles, &mesh_of, &is_glass);
     let mut found = Shells::new(triangles, &groups);
     let mesh = |shell: &Shell| mesh_of[shell.triangles[0] as usize];
-    for (_, shell) in found.shells.iter().filter(|(_, shell)| is_sheet(shell)) {
+    for shell in found.shells.iter().filter(|shell| is_sheet(shell)) {
         faults[mesh(shell)].open += 1;
         let solid = triangles[shell.triangles[0] as usize].material;
         let pane = pane_of(materials, solid);
         shell.triangles.iter().for_each(|i| triangles[*i as usize].material = pane);
     }
-    found.shells.retain(|(_, shell)| !is_sheet(shell));
+    found.shells.retain(|shell| !is_sheet(shell));
     for i in 0..found.shells.len() {
-        let (group, shell) = &found.shells[i];
+        let shell = &found.shells[i];
         let fault = &mut faults[mesh(shell)];
         fault.holes += usize::from(!shell.is_closed());
         fault.t_junctions += usize::from(shell.has_t_junctions);
-        if shell.volume < 0.0 && found.around(triangles, *group, shell).is_none() {
-            fault.turned += 1;
-            shell.triangles.iter().for_each(|i| turn(&mut triangles[*i as usize]));
-            found.shells[i].1.volume *= -1.0;
+        if shell.volume < 0.0 {
+            match found.around(triangles, shell) {
+                // A bubble is of the glass around it, whatever its own material.
+                Some(outer) => {
+                    let glass = triangles[found.shells[outer].triangles[0] as usize].material;
+                    shell.triangles.iter().for_each(|i| triangles[*i as usize].material = glass);
+                }
+                None => {
+                    fault.turned += 1;
+                    shell.triangles.iter().for_each(|i| turn(&mut triangles[*i as usize]));
+                    found.shells[i].volume *= -1.0;
+                }
+            }
         }
     }
     let warnings = meshes.iter().zip(&faults).filter_map(|(mesh, faults)| warning(&mesh.name, faults));

@@ -5,13 +5,14 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec3};
 
 use super::NONE;
-use crate::scene::Triangle;
+use crate::scene::{Bounds, Triangle};
 
 /// A connected part of a mesh: its triangles share vertices.
 #[derive(Clone, Debug)]
 pub(super) struct Shell {
     /// Indices of its triangles.
     pub triangles: Vec<u32>,
+    pub bounds: Bounds,
     /// Enclosed volume, m³; negative if the faces look inwards.
     pub volume: f64,
     /// Area of what is missing to close it over that of its triangles.
@@ -25,8 +26,7 @@ pub(super) struct Shell {
 /// The shells of several meshes.
 #[derive(Debug, Default)]
 pub(super) struct Shells {
-    /// Each with the group of its triangles, in which shells can be cavities of others.
-    pub shells: Vec<(usize, Shell)>,
+    pub shells: Vec<Shell>,
     triangles: usize,
 }
 
@@ -37,8 +37,8 @@ impl Shells {
     /// The shells of the triangles of each group.
     pub(super) fn new(triangles: &[Triangle], groups: &[Vec<u32>]) -> Self {
         let mut found = Self { shells: Vec::new(), triangles: triangles.len() };
-        for (g, group) in groups.iter().enumerate() {
-            found.shells.extend(connected(triangles, group).into_iter().map(|part| (g, measure(triangles, part))));
+        for group in groups {
+            found.shells.extend(connected(triangles, group).into_iter().map(|part| measure(triangles, part)));
         }
         found
     }
@@ -55,20 +55,23 @@ impl Shells {
     /// The solid of each triangle: a shell with faces outwards and the cavities in it.
     pub(super) fn solids(&self, triangles: &[Triangle]) -> Vec<u32> {
         let mut of = vec![NONE; self.triangles];
-        for (i, (group, shell)) in self.shells.iter().enumerate() {
-            let solid = if shell.volume < 0.0 { self.around(triangles, *group, shell).unwrap_or(i) } else { i };
+        for (i, shell) in self.shells.iter().enumerate() {
+            let solid = if shell.volume < 0.0 { self.around(triangles, shell).unwrap_or(i) } else { i };
             shell.triangles.iter().for_each(|triangle| of[*triangle as usize] = solid as u32);
         }
         of
     }
 
-    /// The smallest shell of the group with faces outwards that a shell lies in.
-    pub(super) fn around(&self, triangles: &[Triangle], group: usize, inner: &Shell) -> Option<usize> {
-        let corner = triangles[inner.triangles[0] as usize].positions[0].as_dvec3();
-        let outer = self.shells.iter().enumerate().filter(|(_, (g, shell))| {
-            *g == group && shell.volume > inner.volume.abs() && winding(triangles, shell, corner) > 0.5
+    /// The smallest shell with faces outwards that a shell lies in.
+    pub(super) fn around(&self, triangles: &[Triangle], inner: &Shell) -> Option<usize> {
+        let corner = triangles[inner.triangles[0] as usize].positions[0];
+        let outer = self.shells.iter().enumerate().filter(|(_, shell)| {
+            shell.volume > inner.volume.abs()
+                && shell.bounds.min.cmple(corner).all()
+                && shell.bounds.max.cmpge(corner).all()
+                && winding(triangles, shell, corner.as_dvec3()) > 0.5
         });
-        outer.min_by(|(_, (_, a)), (_, (_, b))| a.volume.total_cmp(&b.volume)).map(|(i, _)| i)
+        outer.min_by(|(_, a), (_, b)| a.volume.total_cmp(&b.volume)).map(|(i, _)| i)
     }
 }
 
@@ -108,12 +111,9 @@ fn connected(triangles: &[Triangle], group: &[u32]) -> Vec<Vec<u32>> {
                 parent.len() as u32 - 1
             })
         });
-        let root = find(&mut parent, corners[0]);
         for corner in &corners[1..] {
-            let other = find(&mut parent, *corner);
-            let lower = root.min(other).min(find(&mut parent, root));
-            let (a, b) = (find(&mut parent, root), other);
-            parent[a.max(b) as usize] = a.min(b).min(lower);
+            let (a, b) = (find(&mut parent, corners[0]), find(&mut parent, *corner));
+            parent[a.max(b) as usize] = a.min(b);
         }
         corner_ids.push(corners[0]);
     }
@@ -142,6 +142,7 @@ fn find(parent: &mut [u32], mut i: u32) -> u32 {
 fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
     let origin = triangles[part[0] as usize].positions[0].as_dvec3();
     let (mut volume, mut area) = (0.0, 0.0);
+    let bounds = part.iter().map(|i| Bounds::from(&triangles[*i as usize])).fold(Bounds::EMPTY, Bounds::union);
     // Directed edges without a partner in the other direction.
     let mut edges: HashMap<([u32; 3], [u32; 3]), (i32, DVec3, DVec3)> = HashMap::new();
     for &triangle in &part {
@@ -163,6 +164,7 @@ fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
     let missing: f64 = loops.iter().map(|(vector, _)| vector.length()).sum();
     Shell {
         triangles: part,
+        bounds,
         volume,
         openness: missing / area.max(f64::MIN_POSITIVE),
         hole_edges: loops.iter().filter(|(v, _)| v.length() > CLOSED * area).map(|(_, n)| *n).max().unwrap_or(0),

@@ -5,6 +5,7 @@ pub mod any_environment;
 pub mod any_scene;
 pub mod gltf;
 pub mod make_scenes;
+pub mod meshes;
 pub mod photons;
 pub mod rays;
 pub mod surfaces;
