@@ -1,8 +1,8 @@
-//! The one error type: what went wrong, where, and what to do next.
+//! Error type of the crate: the problem, its location, and advice.
 
 use std::path::PathBuf;
 
-/// Anything that can stop the work. Displayed as one line.
+/// Failure of an operation, displayed as one line.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -25,15 +25,15 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
-    /// No usable adapter, or none of the asked name.
+    /// No usable adapter, or none of the requested name.
     #[error("{0}")]
     Device(String),
-    /// Something is larger than the adapter allows.
+    /// A size exceeds a limit of the adapter.
     #[error("{what} needs {needed} {unit}, but {limit} of {adapter} allows {allowed}; {advice}")]
     Limit {
         /// What does not fit.
         what: String,
-        /// Its size.
+        /// Its size, in `unit`.
         needed: u64,
         /// Unit of `needed` and `allowed`.
         unit: &'static str,
@@ -41,12 +41,12 @@ pub enum Error {
         limit: &'static str,
         /// Name of the adapter.
         adapter: String,
-        /// The limit.
+        /// Value of the limit, in `unit`.
         allowed: u64,
-        /// What to do about it.
+        /// Advice to the user.
         advice: String,
     },
-    /// No memory of the device is left for something.
+    /// Device memory is exhausted.
     #[error(
         "no device memory is left for {what}{}; {adapter} has given {} MiB; ask for fewer `photons.global`, for a smaller scene, or \
         use another `device`",
@@ -60,10 +60,10 @@ pub enum Error {
         needed: Option<u64>,
         /// Name of the adapter.
         adapter: String,
-        /// Bytes of the buffers that were there.
+        /// Bytes of the buffers that were allocated before.
         used: u64,
     },
-    /// The device is gone in the middle of the work.
+    /// The device was lost during the work.
     #[error(
         "the device was lost: {adapter}: {why}; run it again, with fewer `photons.global` or a smaller `estimate.neighbors` if work took too long, or \
         with another `device`"
@@ -74,7 +74,7 @@ pub enum Error {
         /// The driver's message.
         why: String,
     },
-    /// The driver reported an error in the middle of the work.
+    /// The driver reported an error during the work.
     #[error("{0}")]
     Gpu(String),
     /// A setting outside its range.
@@ -88,7 +88,7 @@ pub enum Error {
         /// The range, or what it conflicts with.
         problem: String,
     },
-    /// What should be equal is not.
+    /// Two things that should be equal differ.
     #[error("{0}")]
     Differs(String),
     /// Part of the work failed; the rest was done.

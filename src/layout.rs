@@ -222,7 +222,8 @@ pub struct Path {
     /// `shaders/lib/transport/path.wesl`.
     pub history: u32,
     pub direction: [f32; 3],
-    /// Surfaces met so far, in the low 16 bits; diffuse ones in the high 16.
+    /// Surfaces met so far in the low 12 bits, diffuse ones in the next 12, surfaces passed that
+    /// have one medium on both sides in the high 8.
     pub bounces: u32,
     /// Flux in W of a photon (before the division by the number of paths), or weight of a camera
     /// path.

@@ -16,18 +16,18 @@
 //! }
 //! ```
 //!
-//! A [`Scene`] is what a file holds: triangles and exact spheres, materials, lights, cameras; and
-//! the [`scene::Environment`] around it. A [`Gpu`] is an open device, real or software;
-//! [`Gpu::open`] takes the name of an adapter. [`Settings`] say how many photons and samples, which
-//! [`settings::Mode`] of illumination, and the seed. Out comes a [`Frame`] of scene-linear
-//! radiance, depth, normal and albedo, which [`image`] writes as OpenEXR or PNG, and [`Stats`] of
-//! what happened.
+//! A [`Scene`] holds the contents of a file: triangles and exact spheres, materials, lights and
+//! cameras, and the [`scene::Environment`] around it. A [`Gpu`] is an open device, real or
+//! software; [`Gpu::open`] takes the name of an adapter. [`Settings`] give the numbers of photons
+//! and samples, the [`settings::Mode`] of illumination and the seed. The result is a [`Frame`] of
+//! scene-linear radiance, depth, normal and albedo, which [`image`] writes as OpenEXR or PNG, and
+//! the [`Stats`] of the render.
 //!
 //! Units are metres, watts and steradians; colours are linear Rec.709.
 //!
 //! # Stages
 //!
-//! [`render`] is a [`Session`] used once. Its stages, one by one:
+//! [`render`] runs the stages of a [`Session`] once:
 //!
 //! 1. [`Session::open`] builds the hierarchy of the scene and copies the scene to the device.
 //! 2. [`Session::photon_maps`] traces photons from the lights into two maps, a global one and one
@@ -35,32 +35,33 @@
 //! 3. [`Session::picture`] follows camera rays through mirrors and glass to the first diffuse
 //!    surface and estimates the light there from the nearest photons and from shadow rays.
 //!
-//! Any number of pictures can be made of the same maps: other cameras, sizes, kernels, numbers of
-//! neighbours. The example `many_cameras` does so. What a file cannot hold can be added to the
-//! [`Scene`] before the session is opened.
+//! Any number of pictures can be made from the same maps, with other cameras, sizes, kernels or
+//! numbers of neighbours; see the example `many_cameras`. Anything that a file cannot hold can be
+//! added to the [`Scene`] before the session is opened.
 //!
 //! # Progress and stopping
 //!
-//! A [`Progress`] is told the stage and how far it is, and is asked often whether the work should
-//! end. If it says so, the call returns [`Error::Stopped`], and the device can be used again.
-//! [`Silent`] says nothing and never stops. Reports come from the calling thread; a flag that
-//! another thread sets, read in [`Progress::stop_requested`], is enough to stop.
+//! A [`Progress`] receives the stage and the completed units, and is asked often whether the work
+//! should stop. After a stop request the call returns [`Error::Stopped`], and the device can be
+//! used again. [`Silent`] ignores reports and never requests a stop. Reports come from the calling
+//! thread. To stop the work from another thread, let that thread set a flag, and read the flag in
+//! [`Progress::stop_requested`].
 //!
 //! # Errors
 //!
 //! Every failure that a file, a setting, the device or the disk can cause is an [`Error`],
-//! displayed as one line. A wrong setting is [`Error::Setting`] with the setting's path in
-//! [`Settings`], such as `picture.spp`, and its range; the ranges are constants beside the
-//! settings, such as [`settings::EstimateSettings::NEIGHBORS`]. A panic is a bug. What was ignored
-//! or changed in a scene is in [`Scene::warnings`], what went wrong in a picture without spoiling
-//! it in [`Stats::warnings`].
+//! displayed as one line. A setting out of range gives [`Error::Setting`] with the setting's path
+//! in [`Settings`], such as `picture.spp`, and its range. The ranges are constants beside the
+//! settings, such as [`settings::EstimateSettings::NEIGHBORS`]. A panic is a bug.
+//! [`Scene::warnings`] lists features of a scene that were ignored or changed, [`Stats::warnings`]
+//! problems that did not prevent the render.
 //!
 //! # Reproducibility
 //!
-//! Equal scenes, settings, adapters and drivers give equal frames, bit for bit: the seed decides
-//! all randomness, and no sum depends on the order in which the device works. [`Scene::origin`]
-//! collects what a picture was made by; [`image::write_exr`] keeps it in the file. Other adapters
-//! or drivers round otherwise.
+//! Equal scenes, settings, adapters and drivers give equal frames, bit for bit: the seed determines
+//! all random numbers, and no sum depends on the order in which the device works. Other adapters or
+//! drivers round differently. [`Scene::origin`] collects the provenance of a picture;
+//! [`image::write_exr`] stores it in the file.
 //!
 //! # Features
 //!
@@ -69,7 +70,8 @@
 //! | `cli` (default) | the command `caustica`; implies `report` |
 //! | `report` | the modules `compare` and `study`: measurements with tables, charts and pages |
 //!
-//! With `default-features = false` neither is there, nor the dependencies that they alone need.
+//! With `default-features = false`, both features are off, and the dependencies that only they need
+//! are not built.
 
 #[doc(hidden)]
 pub mod bvh;

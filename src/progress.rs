@@ -9,13 +9,14 @@ pub enum Stage {
     Load,
     /// Building the hierarchy and copying the scene to the device.
     Bvh,
-    /// In units of photons stored, over all maps.
+    /// Tracing photons. Units are photons stored, over all maps.
     Photons,
     /// Sorting photons into the grid.
     Grid,
-    /// In units of tiles of camera samples: camera rays, direct light and gather.
+    /// Camera rays, direct light and gather. Units are tiles of camera samples.
     Camera,
-    /// In units of tiles as [`Stage::Camera`], each gathered twice.
+    /// The camera pass of a comparison, which gathers each tile twice. Units as in
+    /// [`Stage::Camera`].
     Compare,
 }
 

@@ -1,14 +1,14 @@
-//! What holds for any words given to the command: shared by the fuzz target `options` and the
-//! replay of its corpus.
+//! Check of arbitrary command lines, shared by the fuzz target `options` and the replay of its
+//! corpus.
 
 use caustica::settings::Settings;
 use clap::Parser as _;
 
 use super::args::{Args, Command};
 
-/// Understands the words, one a line, as those after `caustica`. Wrong ones are refused with exit
-/// code 2 and a text, which is returned; what right ones ask for is in range, or refused in one
-/// line.
+/// Parses the words, one a line, as the arguments of `caustica`. Panics unless invalid arguments
+/// are refused with exit code 2 and a text (help is a text with exit code 0), and settings out of
+/// range in one line. Returns the text of the refusal.
 pub fn check(bytes: &[u8]) -> Result<(), String> {
     let text = String::from_utf8_lossy(bytes);
     match Args::try_parse_from(["caustica"].into_iter().chain(text.lines())) {

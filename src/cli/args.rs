@@ -129,7 +129,7 @@ pub struct CompareArgs {
 }
 
 impl RenderArgs {
-    /// The library's settings that these arguments ask for.
+    /// Converts the arguments to the library's settings.
     pub fn settings(&self) -> Settings {
         self.options.settings().with(|s| {
             s.photons.final_gather = self.final_gather;

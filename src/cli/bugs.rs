@@ -1,5 +1,5 @@
-//! A bug ends the program like any other failure, with one line: nobody who renders should have to
-//! read a backtrace. `RUST_BACKTRACE=1` shows it to those who look for one.
+//! Panics. A panic is a bug, and ends the program like any other failure, with one line in place of
+//! a backtrace. `RUST_BACKTRACE=1` shows the backtrace as well.
 
 use std::{
     env,
@@ -7,10 +7,10 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-/// What the last panic said.
+/// Line that describes the last panic.
 static SAID: Mutex<String> = Mutex::new(String::new());
 
-/// What `work` returns; the line to print if it panics.
+/// Returns the result of `work`, or the line to print if it panics.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     let usual = env::var_os("RUST_BACKTRACE").map(|_| panic::take_hook());
     panic::set_hook(Box::new(move |info| {
@@ -38,7 +38,7 @@ mod tests {
         assert!(said.starts_with("internal error: what happened at src/cli/bugs.rs:"), "{said}");
         assert!(said.contains("please report") && !said.contains('\n'), "{said}");
         assert_eq!(super::caught(|| 1), Ok(1));
-        // Panics of other tests are theirs to tell.
+        // Restores the default hook for the panics of other tests.
         let _ = std::panic::take_hook();
     }
 }

@@ -12,7 +12,7 @@ use caustica::{
 
 use super::{args::CompareArgs, files::Files, progress::Display, render::RAW_NOTE, say::print};
 
-/// Compares, writes the files and says whether both sides agree.
+/// Compares, writes the files and fails if the two sides disagree.
 pub fn run(args: &CompareArgs) -> Result<()> {
     let started = Instant::now();
     let options = &args.options;
@@ -46,7 +46,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     comparison.verdict()
 }
 
-/// Makes the folder and finds out before the work that every file can be written there.
+/// Creates the folder and checks before the work that every file can be written there.
 fn prepare(args: &CompareArgs, scene: &Scene) -> Result<()> {
     let folder = &args.output;
     fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;

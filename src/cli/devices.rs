@@ -9,7 +9,7 @@ use caustica::{
 
 use super::say::print;
 
-/// Lists the adapters, the one that would be chosen first.
+/// Lists the adapters, beginning with the default one.
 pub fn devices() -> Result<()> {
     let all = adapters();
     if all.is_empty() {
@@ -42,7 +42,7 @@ fn describe((index, adapter): (usize, &AdapterReport)) -> String {
     format!("{index}: {name}\n{text}")
 }
 
-/// One size, or the smallest and the largest.
+/// Formats the minimum and maximum size, or the one size if both are equal.
 fn subgroup_sizes((least, most): (u32, u32)) -> String {
     if least == most { least.to_string() } else { format!("{least} to {most}") }
 }

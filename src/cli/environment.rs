@@ -1,4 +1,4 @@
-//! Options of the light from all around.
+//! Options of the environment light.
 
 use std::path::PathBuf;
 
@@ -47,7 +47,8 @@ pub enum DefaultLightArg {
 }
 
 impl EnvironmentOptions {
-    /// Gives the scenes the light that is asked for, and what is to be said of it.
+    /// Adds the environment of the options and its warnings to the scenes. Scenes without any light
+    /// get the default light, unless the options exclude it.
     pub fn light<'a>(&self, scenes: impl IntoIterator<Item = &'a mut Scene>) -> Result<()> {
         let file = self.env.as_deref().map(|path| Environment::load(path, self.env_strength, self.env_rotation));
         let uniform = self.background.map(|radiance| Environment::uniform(radiance.into()));

@@ -1,4 +1,4 @@
-//! What is written must not destroy what is read, nor what the same run has written.
+//! Protection of a run's inputs, and of its other outputs, from being overwritten.
 
 use std::{
     io,
@@ -7,19 +7,18 @@ use std::{
 
 use caustica::{Error, Result, image::check_output, scene::Scene};
 
-/// Files that a run uses, each under the one name that all ways to write its path have in common. A
-/// hard link is a file of its own: an output takes the place of its name and leaves the other one
-/// alone.
+/// Files that a run uses, each by its `identity`. A hard link is a file of its own: an output
+/// replaces the file of its name and leaves the other link unchanged.
 #[derive(Default)]
 pub struct Files {
-    /// With what they are.
+    /// Identity and description of each input.
     read: Vec<(PathBuf, &'static str)>,
-    /// With the paths as they were given.
+    /// Identity of each output, and its path as given.
     written: Vec<(PathBuf, PathBuf)>,
 }
 
 impl Files {
-    /// A file that is read, with what it is; no output may be there.
+    /// Registers an input and its description. Fails if it is an output as well.
     pub fn read(&mut self, path: &Path, what: &'static str) -> Result<()> {
         let identity = identity(path);
         if let Some((_, output)) = self.written.iter().find(|(other, _)| *other == identity) {
@@ -29,14 +28,14 @@ impl Files {
         Ok(())
     }
 
-    /// The files of a scene.
+    /// Registers the files of a scene as inputs.
     pub fn read_scene(&mut self, scene: &Scene) -> Result<()> {
         self.read(&scene.path, "the scene")?;
         scene.files.iter().try_for_each(|path| self.read(path, "a file of the scene"))
     }
 
-    /// Finds out before the work that an output can be written, and that it is no other file of the
-    /// run.
+    /// Registers an output. Checks, before the work, that it can be written and is no other file of
+    /// the run.
     pub fn write(&mut self, path: &Path) -> Result<()> {
         let identity = identity(path);
         let input = self.read.iter().find(|(other, _)| *other == identity).map(|(_, what)| *what);
@@ -55,7 +54,8 @@ fn refused(path: &Path, what: &str) -> Result<()> {
     Err(Error::Io { path: path.to_path_buf(), source })
 }
 
-/// The same for all ways to write the path of one file, whether it exists or not.
+/// Absolute path without links, equal for all ways to write the path of one file, whether the file
+/// exists or not.
 pub(super) fn identity(path: &Path) -> PathBuf {
     let of_new_file = || {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -1,7 +1,6 @@
-//! Names of settings in the library's messages, as flags of the command.
+//! Translation of setting names in the library's messages to flags of the command.
 
-/// A setting or another input of the library, by the name in its messages, and the flag that sets
-/// it.
+/// Name of a setting or another input in the library's messages, and the flag that sets it.
 type Row = (&'static str, &'static str);
 
 /// Inputs that an error or a warning of the library can name.
@@ -32,10 +31,10 @@ const FLAGS: [Row; 24] = [
     ("picture.spp", "--spp"),
 ];
 
-/// The environment has no flag of its own name: three flags give light from all around.
+/// The environment has no flag of its own name: each of these three sets it.
 const ENVIRONMENT: Row = ("scene.environment", "--env, --background or --default-light sky");
 
-/// A line with flags in the place of settings: "`picture.crop`" becomes "--crop", and the name that
+/// Replaces the settings in a line by flags: "`picture.crop`" becomes "--crop". The name that
 /// begins the message of a refused setting, as in "error: picture.spp 0: must be at least 1",
 /// becomes the flag without its dashes.
 pub fn with_flags(line: &str) -> String {

@@ -9,7 +9,7 @@ use caustica::{
 
 use super::say::print;
 
-/// Says what a scene holds and how it will be read.
+/// Prints the contents of a scene and how they are read.
 pub fn info(path: &Path, options: &LoadOptions) -> Result<()> {
     let mut scene = Scene::load_with(path, options)?;
     scene.add_default_light();

@@ -1,4 +1,4 @@
-//! Options of how a scene's file is read.
+//! Options of reading a scene file.
 
 use caustica::scene::LoadOptions;
 
@@ -20,7 +20,7 @@ pub struct LoadingOptions {
 }
 
 impl LoadingOptions {
-    /// The library's options that these arguments ask for.
+    /// Converts the arguments to the library's options.
     pub fn options(&self) -> LoadOptions {
         LoadOptions {
             scene: self.scene.clone(),

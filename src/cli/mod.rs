@@ -28,8 +28,8 @@ use clap::Parser;
 
 use args::{Args, Command};
 
-/// Does what the arguments say. Exit codes: 0 success, 1 failure of the work, 2 wrong usage, 128 +
-/// signal when stopped.
+/// Runs the command of the arguments. Exit codes: 0 success, 1 failure of the work, 2 wrong usage,
+/// 128 + signal number when stopped.
 pub fn run() -> ExitCode {
     let args = Args::parse();
     if let Command::Render(args) = &args.command {
@@ -42,7 +42,7 @@ pub fn run() -> ExitCode {
         Ok(Err(error)) => error.to_string(),
         Err(bug) => bug,
     };
-    // One line, whatever a driver's message holds.
+    // Messages of drivers may have several lines; the user gets one.
     say::say(&format!("error: {}", error.lines().collect::<Vec<_>>().join(" ")));
     ExitCode::FAILURE
 }

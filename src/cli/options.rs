@@ -1,4 +1,4 @@
-//! Options that all commands have that render.
+//! Options that are common to all commands that render.
 
 use caustica::{
     density::DensityKernel,
@@ -176,7 +176,7 @@ pub struct SharedOptions {
 }
 
 impl RenderOptions {
-    /// The library's settings that these arguments ask for.
+    /// Converts the arguments to the library's settings.
     pub fn settings(&self) -> Settings {
         let capacity = |own: Option<u32>, default| own.or(self.photons).unwrap_or(default);
         self.shared.settings().with(|s| {
@@ -189,7 +189,7 @@ impl RenderOptions {
 }
 
 impl SharedOptions {
-    /// The library's settings that these arguments ask for; mode, photons and neighbours are the
+    /// Converts the arguments to the library's settings. Mode, photons and neighbours stay at the
     /// defaults.
     pub fn settings(&self) -> Settings {
         let Settings { photons, estimate, picture, .. } = Settings::default();
@@ -228,7 +228,8 @@ impl SharedOptions {
     }
 }
 
-/// An enumeration of the command line, value for value one of the library.
+/// Defines an enumeration of the command line with the values of one of the library, and its
+/// conversion.
 macro_rules! value_enum {
     ($name:ident => $library:ident { $($(#[$meta:meta])* $value:ident),+ $(,)? }) => {
         #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -260,7 +261,7 @@ value_enum!(ModeArg => Mode {
     IndirectPhotons,
 });
 
-/// Modes by name or number; says so where the text is neither.
+/// Parser of modes by name or number. The message for other texts names both.
 #[derive(Clone, Copy, Debug)]
 pub struct ModeParser;
 

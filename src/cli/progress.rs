@@ -1,4 +1,4 @@
-//! How far a render is, on stderr: a bar on a terminal, plain lines elsewhere.
+//! Progress of a render on stderr: a bar on a terminal, plain lines elsewhere.
 
 use std::{
     fmt::Write,
@@ -11,22 +11,22 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 
 use super::{say::say, signals};
 
-/// Where the progress goes.
+/// Destination of the progress reports.
 #[derive(Debug)]
 enum Target {
     Nowhere,
-    /// The tenths that each stage has been told of.
+    /// Number of tenths last reported for each stage.
     Lines(Mutex<Vec<(Stage, u64)>>),
     /// The bar, and the stage that it shows.
     Bar(ProgressBar, Mutex<Option<Stage>>),
 }
 
-/// Listener that shows a render to the user and hands signals on to it.
+/// Listener that shows the progress of a render and passes stop signals to it.
 #[derive(Debug)]
 pub struct Display(Target);
 
 impl Display {
-    /// `quiet` shows nothing; `plain` writes lines even on a terminal.
+    /// Creates the display. `quiet` shows nothing; `plain` writes lines even on a terminal.
     pub fn new(quiet: bool, plain: bool) -> Self {
         Self(if quiet {
             Target::Nowhere
@@ -38,7 +38,7 @@ impl Display {
         })
     }
 
-    /// A line for the user; nothing when quiet.
+    /// Prints a line unless quiet.
     pub fn note(&self, line: &str) {
         match &self.0 {
             Target::Nowhere => {}
@@ -47,8 +47,8 @@ impl Display {
         }
     }
 
-    /// A study's state in a line; on a terminal a bar shows it all the time, elsewhere it is a line
-    /// when it is `new`.
+    /// Shows the state of a study in one line. On a terminal it stands beside the bar; elsewhere it
+    /// is printed only if it is `new`.
     pub fn study(&self, line: &str, done: f64, new: bool) {
         match &self.0 {
             Target::Nowhere => {}
@@ -65,7 +65,7 @@ impl Display {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         if let Target::Bar(bar, _) = &self.0 {
             bar.finish_and_clear();
@@ -86,7 +86,7 @@ impl Progress for Display {
                 let is_new = lock(shown).replace(stage) != Some(stage);
                 let unit = unit(stage, total);
                 if is_new || unit.is_none() {
-                    // What is drawn before the numbers are the stage's holds none.
+                    // The bar is drawn without numbers until it has those of the stage.
                     bar.set_style(words());
                     bar.set_message(name(stage));
                 }
@@ -111,7 +111,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The line to write now: the first of a stage, then one whenever a further tenth is done.
+/// Line to print now: one at the start of a stage, then one whenever a further tenth is done.
 fn next_line(told: &mut Vec<(Stage, u64)>, stage: Stage, done: u64, total: u64) -> Option<String> {
     let unit = unit(stage, total);
     let part = |units: u64| (u128::from(done.min(total)) * u128::from(units) / u128::from(total.max(1))) as u64;
@@ -140,8 +140,7 @@ fn name(stage: Stage) -> &'static str {
     }
 }
 
-/// What a stage of so many is counted in; `None`: it is not counted, as one or none would say
-/// nothing.
+/// Name of a stage's units; `None` if the stage is not counted, or has fewer than two units.
 fn unit(stage: Stage, total: u64) -> Option<&'static str> {
     let unit = if stage == Stage::Photons { "photons" } else { "tiles" };
     (total > 1 && is_counted(stage)).then_some(unit)
@@ -151,7 +150,7 @@ fn is_counted(stage: Stage) -> bool {
     matches!(stage, Stage::Photons | Stage::Camera | Stage::Compare)
 }
 
-/// Without numbers.
+/// Style without numbers.
 fn words() -> ProgressStyle {
     ProgressStyle::with_template("{msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
 }
@@ -160,7 +159,7 @@ fn style(unit: &str) -> ProgressStyle {
     let template = format!("{{msg:8}} {{bar:32}} {{human_pos}} of {{human_len}} {unit}{{left}}");
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
     style.with_key("left", |state: &ProgressState, text: &mut dyn Write| {
-        // It is zero too where nothing is known of it yet.
+        // Zero also means that there is no estimate yet.
         let left = state.eta();
         if left.as_secs() > 0 {
             let _ = write!(text, ", {:#} left", HumanDuration(left));

@@ -22,7 +22,7 @@ use super::{
     values::extension,
 };
 
-/// Wrong usage that no argument shows by itself: two outputs are one file.
+/// Refuses wrong usage that no single argument shows: two outputs that are one file.
 pub fn check(args: &RenderArgs) -> std::result::Result<(), clap::Error> {
     let mut known = HashSet::new();
     let twice = args.outputs.iter().chain(&args.stats).find(|path| !known.insert(identity(path)));
@@ -33,7 +33,7 @@ pub fn check(args: &RenderArgs) -> std::result::Result<(), clap::Error> {
     Err(usage_of.error(ErrorKind::ArgumentConflict, format!("{} is another output as well", path.display())))
 }
 
-/// Loads, renders and writes.
+/// Loads the scene, renders it and writes the outputs.
 pub fn render(args: &RenderArgs) -> Result<()> {
     let started = Instant::now();
     let options = &args.options;
@@ -87,7 +87,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats))
 }
 
-/// Why a kd-tree's picture differs from the default one.
+/// Note on why a kd-tree's picture differs from the default one.
 pub(super) const RAW_NOTE: &str = "the kd-tree is the report's: the estimate is raw, as with --raw-estimate";
 
 fn write_picture(path: &Path, frame: &Frame, origin: &Provenance, args: &RenderArgs) -> Result<()> {

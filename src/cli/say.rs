@@ -1,16 +1,15 @@
-//! Lines to the user. A reader that has gone away is no error: `caustica devices | head -1` ends
-//! well.
+//! Output to the user. A closed pipe is no error: `caustica devices | head -1` succeeds.
 
 use std::io::{self, Write};
 
 use super::flags::with_flags;
 
-/// One line on stderr; settings that the library names are flags in it.
+/// Prints a line on stderr. Names of the library's settings are replaced by flags.
 pub fn say(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", with_flags(line));
 }
 
-/// Text on stdout: what was asked for.
+/// Prints the result of a command on stdout.
 pub fn print(text: &str) {
     let mut out = io::stdout().lock();
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());

@@ -1,5 +1,5 @@
-//! Ctrl-C, SIGTERM and the end of a terminal: ask the work to stop, and leave in time even if it
-//! does not.
+//! Ctrl-C, SIGTERM and SIGHUP. They request the work to stop; the process ends in time even if the
+//! work does not.
 
 use std::{
     sync::{
@@ -14,22 +14,22 @@ use std::{
 use signal_hook::consts::{SIGHUP, SIGXFSZ};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
-/// How long the work may take to stop by itself. With the polling below the process is gone in
-/// under two seconds.
+/// Time in which the work may stop by itself. With the polling below, the process ends in under two
+/// seconds.
 const GRACE: Duration = Duration::from_millis(1500);
 const POLLING: Duration = Duration::from_millis(20);
 
-/// Number of the signal that came last; 0 while none has.
+/// Number of the last signal; 0 before the first.
 static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 
-/// Listens from here on.
+/// Starts to listen for signals.
 pub fn watch() {
     for signal in [SIGINT, SIGTERM].into_iter().chain(hangup()) {
         // Fails only for signals that no process may catch.
         let _ = signal_hook::flag::register_usize(signal, Arc::clone(&SIGNAL), signal as usize);
     }
-    // Where a file may not grow as large as it would, the write is to fail, and not the process to
-    // die in the middle of it.
+    // Without a handler, SIGXFSZ kills the process at a write beyond the file size limit; with one,
+    // the write fails.
     #[cfg(unix)]
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
     thread::spawn(|| {
@@ -39,13 +39,13 @@ pub fn watch() {
         // The main thread ends the process before this, unless it waits for the device or the disk.
         thread::sleep(GRACE);
         caustica::image::close_files();
-        // Without exit handlers: drivers hang in theirs while the device is busy.
+        // Skips exit handlers: those of drivers hang while the device is busy.
         signal_hook::low_level::exit(exit_code().into());
     });
 }
 
-/// The signal of a terminal that goes away, unless it is to be ignored as under `nohup`, which
-/// Linux alone tells.
+/// SIGHUP, the signal of a closed terminal, unless the process ignores it, as under `nohup`. Only
+/// Linux reports which signals are ignored; `None` elsewhere.
 #[cfg(unix)]
 fn hangup() -> Option<i32> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -59,13 +59,13 @@ fn hangup() -> Option<i32> {
     None
 }
 
-/// A signal has come.
+/// Whether a signal has arrived.
 pub fn stop_requested() -> bool {
     SIGNAL.load(Ordering::Relaxed) != 0
 }
 
-/// What a shell reports of a process that the signal ended: 130 for SIGINT, 143 for SIGTERM, 129
-/// for SIGHUP.
+/// Exit code of a process ended by the signal, as a shell reports it: 130 for SIGINT, 143 for
+/// SIGTERM, 129 for SIGHUP.
 pub fn exit_code() -> u8 {
     128 + SIGNAL.load(Ordering::Relaxed) as u8
 }

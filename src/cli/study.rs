@@ -26,14 +26,13 @@ use super::{
 
 /// Folder of the project's scenes.
 const SCENES: &str = "scenes";
-/// Pictures of the preset, unless asked for otherwise: all of it should take minutes on software
-/// Vulkan.
+/// Default size of the preset's pictures. The whole preset should take minutes on software Vulkan.
 const PRESET_SIZE: (u32, u32) = (256, 256);
 const PRESET_SPP: u32 = 1;
-/// Renders per combination of the preset's plane: noise needs two.
+/// Default number of renders per combination of the preset's plane: noise needs two.
 const PRESET_REPEATS: u32 = 2;
 
-/// Runs the study, writes its files and says what failed.
+/// Runs the study, writes its files and reports failures.
 pub fn run(args: &StudyArgs) -> Result<()> {
     let started = Instant::now();
     let options = &args.options;
@@ -98,7 +97,7 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
         }
         let folder = args.scene.clone().unwrap_or_else(|| PathBuf::from(SCENES));
         let size = Some(options.size.unwrap_or(PRESET_SIZE));
-        // The report's estimate, whatever became of it since.
+        // The raw estimate is that of the report.
         let spp = options.spp.unwrap_or(PRESET_SPP);
         let settings = settings.with(|s| {
             s.picture.size = size;
@@ -107,7 +106,7 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
         });
         return study::report(&folder, &settings, args.repeat.unwrap_or(PRESET_REPEATS), args.preset_scale, look);
     }
-    // clap has seen to it that all three are there.
+    // clap requires the scene, the photons and the neighbours without a preset.
     let scene = Scene::load_with(args.scene.as_deref().unwrap_or(Path::new("")), &options.loading.options())?;
     let modes: Vec<Mode> = args.modes.iter().map(|&mode| mode.into()).collect();
     let most = args.photons.iter().copied().max().unwrap_or(1);
@@ -126,7 +125,7 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
     Ok(study::grid(subject, &settings, &modes, &args.photons, &args.neighbors, repeats, look))
 }
 
-/// Makes the folder and finds out before the work that files can be written there.
+/// Creates the folder and checks before the work that files can be written there.
 fn prepare(args: &StudyArgs, plan: &Plan) -> Result<()> {
     let folder = &args.output;
     std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;

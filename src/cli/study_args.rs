@@ -82,7 +82,7 @@ pub enum PresetArg {
     Report,
 }
 
-/// Where the reference comes from.
+/// Source of the reference.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReferenceArg {
     Auto,

@@ -1,4 +1,4 @@
-//! How far a study is: each cell is told once, with the time left.
+//! Progress of a study: each cell is reported once, with the time left.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -6,11 +6,11 @@ use caustica::study::{State, Watch};
 
 use super::{progress::Display, signals};
 
-/// Shows a study to the user and hands signals on to it.
+/// Shows the progress of a study and passes stop signals to it.
 #[derive(Debug)]
 pub struct StudyDisplay<'a> {
     pub display: &'a Display,
-    /// Number of the cell that was told last.
+    /// Number of the cell that was reported last.
     pub told: Mutex<usize>,
 }
 
@@ -34,7 +34,7 @@ fn line(state: &State) -> String {
     format!("study: {:.0} %{left}; cell {} of {}{kept}: {}", 100.0 * state.done, state.number, state.total, state.cell)
 }
 
-/// About that long: `40 s`, `12 min`, `3 h 20 min`.
+/// Formats a rounded duration: `40 s`, `12 min`, `3 h 20 min`.
 fn duration(seconds: f64) -> String {
     let minutes = (seconds / 60.0).round() as u64;
     match seconds {

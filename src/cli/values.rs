@@ -1,4 +1,4 @@
-//! Values of options: text to number, with what is allowed in the message.
+//! Parsers of option values. Their error messages name the permitted values.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ pub fn count(text: &str) -> Result<u64, String> {
     if whole.is_empty() || !all_digits(whole) || !all_digits(fraction) || digits.ends_with('.') {
         return Err(wrong());
     }
-    // Exact in decimal: the fraction's digits take the place of the suffix's zeros.
+    // Exact in decimal: the fraction's digits replace zeros of the suffix.
     if fraction.len() > zeros {
         return Err(format!("not a whole number; {}", wrong()));
     }
@@ -36,7 +36,7 @@ pub fn whole(range: Range<u32>) -> impl Fn(&str) -> Result<u32, String> + Clone 
     }
 }
 
-/// A count that a photon map can be asked to hold.
+/// Capacity of a photon map, photons.
 pub fn photons(text: &str) -> Result<u32, String> {
     let most = PhotonSettings::CAPACITY.most();
     u32::try_from(count(text)?).map_err(|_| format!("too large; at most {most}"))
@@ -126,7 +126,7 @@ pub fn exposure(text: &str) -> Result<f32, String> {
     number(text).filter(|e| e.abs() <= 100.0).ok_or_else(|| "a number of stops, -100 to 100".to_string())
 }
 
-/// A number in the range; in the message `what` comes before the range.
+/// A number in the range. The message begins with `what`, followed by the range.
 fn in_range(text: &str, range: Range<f32>, what: &str) -> Result<f32, String> {
     let number = text.parse::<f32>().ok().filter(|number| range.contains(*number));
     number.ok_or_else(|| format!("{what}{range}"))
@@ -136,7 +136,7 @@ fn number(text: &str) -> Option<f32> {
     text.parse::<f32>().ok().filter(|x| x.is_finite())
 }
 
-/// A file that we know how to write.
+/// An output file, of a format that can be written.
 pub fn output(path: PathBuf) -> Result<PathBuf, String> {
     match extension(&path).as_str() {
         "exr" | "png" => Ok(path),

@@ -40,14 +40,14 @@ impl Default for Options {
 /// A finished comparison.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// What was counted and measured.
+    /// Counts and measurements.
     pub report: Report,
     /// Picture gathered with the grid.
     pub grid: Frame,
     /// Picture gathered with the kd-tree; all layers but the radiance are those of the grid's
     /// picture.
     pub kdtree: Frame,
-    /// What happened in the render.
+    /// Statistics of the render.
     pub stats: Stats,
     pub(super) tolerance: f64,
     /// Number of queries that differ in photons that are not tied.

@@ -1,9 +1,9 @@
-//! OpenEXR files: the frame as 32-bit floats, with all that is needed to make it again.
+//! OpenEXR files: the frame as 32-bit floats, with the provenance that is needed to reproduce it.
 //!
-//! One part with the channels `R G B A Z N.X N.Y N.Z albedo.R albedo.G albedo.B`: the plain names
-//! are the picture, a name before a dot is a layer. Every reader takes this form, whereas many read
-//! only the first of several parts. The format wants channels stored in alphabetical order; readers
-//! show R, G, B, A first whatever the order.
+//! A file has one part with the channels `R G B A Z N.X N.Y N.Z albedo.R albedo.G albedo.B`. Names
+//! without a dot belong to the picture itself; a name before a dot is a layer. Every reader accepts
+//! this form, whereas many read only the first of several parts. The format requires channels in
+//! alphabetical order; readers show R, G, B, A first whatever the order.
 
 use std::{
     collections::BTreeMap,
@@ -31,33 +31,34 @@ use crate::{
     stats::Stats,
 };
 
-/// Where a frame comes from; kept in the file's attributes.
+/// Provenance of a frame, stored in the file's attributes.
 #[derive(Clone, Copy, Debug)]
 pub struct Provenance<'a> {
     /// File name of the scene, without folders.
     pub scene: &'a str,
     /// Hash of the scene's bytes.
     pub scene_hash: &'a str,
-    /// The light from all around, if there is any.
+    /// Environment light, if there is any.
     pub environment: Option<EnvironmentProvenance<'a>>,
     /// Settings of the render.
     pub settings: &'a Settings,
-    /// Of these the device and the photon counts are kept: equal runs give equal files.
+    /// Statistics of the render. Only the device and the photon counts are stored, so that equal
+    /// runs give equal files.
     pub stats: &'a Stats,
 }
 
-/// The light from all around, as a file's attributes tell of it.
+/// Provenance of the environment light.
 #[derive(Clone, Copy, Debug)]
 pub struct EnvironmentProvenance<'a> {
-    /// File name without folders, or what stands for one.
+    /// File name without folders, or the name of an environment without a file.
     pub name: &'a str,
-    /// Hash of the file's bytes.
+    /// Hash of the file's bytes, or of the radiance of an environment without a file.
     pub hash: &'a str,
-    /// Of a uniform one: W/(m² sr) in each channel.
+    /// Radiance of a uniform environment, W/(m² sr) in each channel.
     pub radiance: Option<[f32; 3]>,
-    /// Factor on its radiance, at least 0.
+    /// Factor on the radiance, at least 0.
     pub strength: f32,
-    /// Radians.
+    /// Rotation about the vertical, radians.
     pub rotation: f32,
 }
 
@@ -68,7 +69,7 @@ const REC709: Chromaticities =
 /// Writes the frame with ZIP compression. Equal frames of equal provenance give equal bytes.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be written; an older file is kept then.
+/// [`Error::Io`] if the file cannot be written. An older file is then kept.
 pub fn write_exr(path: &Path, frame: &Frame, provenance: &Provenance) -> Result<()> {
     let bytes = encode(frame, provenance).map_err(|e| failure(path, e))?;
     write_file(path, &bytes)
@@ -88,7 +89,7 @@ fn encode(frame: &Frame, provenance: &Provenance) -> exr::error::Result<Vec<u8>>
     image.attributes.chromaticities = Some(REC709);
     image.layer_data.attributes = attributes(provenance);
     if let Some(DataWindow { whole, column, row }) = frame.window {
-        // The display window is the whole picture, the data window the part that is there.
+        // The display window is the whole picture, the data window the rendered part.
         image.attributes.display_window = IntegerBounds::from_dimensions((whole.0 as usize, whole.1 as usize));
         image.layer_data.attributes.layer_position = Vec2(column as i32, row as i32);
     }
@@ -99,8 +100,8 @@ fn encode(frame: &Frame, provenance: &Provenance) -> exr::error::Result<Vec<u8>>
     Ok(bytes)
 }
 
-/// What the file tells of its provenance. Counts and the seed are text, for the format's integers
-/// end at 2³¹.
+/// Attributes of the file with its provenance. Counts and the seed are stored as text, since the
+/// format's integers end at 2³¹.
 fn attributes(provenance: &Provenance) -> LayerAttributes {
     let (stats, settings) = (provenance.stats, provenance.settings);
     let version = env!("CARGO_PKG_VERSION");
@@ -139,12 +140,12 @@ fn attributes(provenance: &Provenance) -> LayerAttributes {
     }
 }
 
-/// The text in UTF-8, as OpenEXR keeps it.
+/// Text in UTF-8, the encoding of OpenEXR.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }
 
-/// Sorts the attributes of a single-part file by name, in place: the writer keeps them in a hash
+/// Sorts the attributes of a single-part file by name, in place. The writer keeps them in a hash
 /// map, whose order changes from run to run. An attribute is name, 0, type, 0, size, value; an
 /// empty name ends the header.
 fn sort_attributes(file: &mut [u8]) {
@@ -163,8 +164,8 @@ fn sort_attributes(file: &mut [u8]) {
     file[START..at].copy_from_slice(&attributes.concat());
 }
 
-/// Reads a frame: R, G, B of any sample type; A is 1 and the other channels are 0 where the file
-/// has none.
+/// Reads a frame with R, G, B of any sample type. A missing A is read as 1, other missing channels
+/// as 0.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, is not OpenEXR or lacks one of R, G, B.
@@ -189,7 +190,7 @@ pub fn read_exr(path: &Path) -> Result<Frame> {
     Ok(Frame::of_layers(size, window_of(&image), layers))
 }
 
-/// Where the data window lies in the display window, if it is a part of that.
+/// Data window of the image, if it is only a part of the display window.
 fn window_of(image: &Image<exr::image::Layer<AnyChannels<FlatSamples>>>) -> Option<DataWindow> {
     let (whole, layer) = (image.attributes.display_window, &image.layer_data);
     let from = layer.attributes.layer_position - whole.position;
@@ -200,7 +201,7 @@ fn window_of(image: &Image<exr::image::Layer<AnyChannels<FlatSamples>>>) -> Opti
     (layer.size != whole.size).then_some(DataWindow { whole: size, column, row })
 }
 
-/// Reads the texts that [`write_exr`] left, by name without the prefix `caustica:`.
+/// Reads the text attributes that [`write_exr`] wrote, by name without the prefix `caustica:`.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read or is not OpenEXR.
@@ -228,7 +229,7 @@ fn open(path: &Path) -> Result<Image<exr::image::Layer<AnyChannels<FlatSamples>>
         .all_channels()
         .first_valid_layer()
         .all_attributes()
-        // A job of exr's that panics on a thread of its own would end the process.
+        // Decodes on one thread: a panic in a worker thread of the exr crate would end the process.
         .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(|e| failure(path, e))

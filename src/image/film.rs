@@ -1,5 +1,5 @@
-//! The film: sums over camera samples, from which a frame is made, and what passes need to be
-//! merged.
+//! The film: sums over camera samples, from which a frame is made, and the second moments of merged
+//! passes.
 
 use std::array;
 
@@ -15,26 +15,26 @@ use crate::{
 
 /// Sums of every layer over the samples of one pass, or of several that were merged.
 ///
-/// A pass is one run over all samples of a picture with photons of its own. Passes are independent:
-/// their means have second moments, which tell the standard error of the merged picture.
+/// A pass is one run over all samples of a picture with photons of its own. Passes are independent,
+/// so the second moments of their means give the standard error of the merged picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     whole: (u32, u32),
     window: Crop,
     passes: u32,
-    /// Samples of each pixel in all passes.
+    /// Number of samples of each pixel in all passes.
     samples: u64,
-    /// Of the layers' numbers, pixel by pixel, in the order of [`LAYERS`].
+    /// Sums of the layers' numbers, pixel by pixel, in the order of [`LAYERS`].
     sums: [Vec<f32>; LAYERS.len()],
-    /// Sums over the passes of the squares of their means; `None` for one pass, whose means the
-    /// sums give.
+    /// Sums over the passes of the squares of their means; `None` for one pass, whose means follow
+    /// from the sums.
     squares: Option<[Vec<f64>; LAYERS.len()]>,
-    /// Samples that are in no sum, as it would not be finite with them.
+    /// Number of samples that were left out, since a sum would not be finite with them.
     non_finite: u64,
 }
 
 impl Film {
-    /// An empty film of one pass of `spp` samples a pixel, for a part of a picture.
+    /// Creates an empty film of one pass of `spp` samples a pixel, for a part of a picture.
     #[must_use]
     pub fn new(whole: (u32, u32), window: Crop, spp: u32) -> Self {
         let pixels = window.width as usize * window.height as usize;
@@ -43,26 +43,26 @@ impl Film {
         Self { whole, window, passes: 1, samples: spp.into(), sums, squares: None, non_finite: 0 }
     }
 
-    /// Passes in it.
+    /// Number of passes.
     #[must_use]
     pub fn passes(&self) -> u32 {
         self.passes
     }
 
-    /// Samples of each pixel in all passes.
+    /// Number of samples of each pixel in all passes.
     #[must_use]
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Samples that are in no sum, as it would not be finite with them.
+    /// Number of samples that were left out, since a sum would not be finite with them.
     #[must_use]
     pub fn non_finite(&self) -> u64 {
         self.non_finite
     }
 
-    /// Adds the device's sums over `samples` samples of the pixel at a column and row of the
-    /// window.
+    /// Adds the device's sums over `samples` samples of a pixel, given by its column and row in the
+    /// data window.
     pub(crate) fn add(&mut self, (column, row): (u32, u32), sums: &PixelSums, samples: u32) {
         let pixel = row as usize * self.window.width as usize + column as usize;
         self.non_finite += sums[0][3] as u64;
@@ -111,14 +111,14 @@ impl Film {
         Ok(())
     }
 
-    /// The means as a frame.
+    /// Returns the means as a frame.
     #[must_use]
     pub fn finish(&self) -> Frame {
         let size = (self.window.width, self.window.height);
         Frame::of_layers(size, DataWindow::of(self.whole, self.window), self.means())
     }
 
-    /// Standard error of a layer's means over the passes, number by number; `None` for one pass.
+    /// Standard error over the passes of each of a layer's means; `None` for one pass.
     ///
     /// # Panics
     /// If [`LAYERS`] has no layer of that name.
@@ -195,7 +195,7 @@ mod tests {
         assert_eq!((merged.passes(), merged.samples()), (2, 8));
         let [mean, ..] = merged.finish().radiance()[0];
         assert_eq!(mean, 4.0);
-        // Control: a third pass is no longer the same.
+        // Control: a third pass changes the mean.
         merged.merge(&second).expect("they are of one picture");
         assert_ne!(merged.finish().radiance()[0][0], mean);
     }
@@ -207,7 +207,7 @@ mod tests {
         for value in [2.0, 3.0, 6.0] {
             merged.merge(&film(&[value; 6], 4)).expect("they are of one picture");
         }
-        // Of 1, 2, 3, 6: mean 3, variance 14/3, over four passes.
+        // The values 1, 2, 3, 6 of four passes have the mean 3 and the variance 14/3.
         let error = merged.standard_error("radiance").expect("four passes")[0];
         assert!((error - (14.0_f32 / 3.0 / 4.0).sqrt()).abs() < 1e-6, "{error}");
         let mut equal = film(&[1.0; 6], 4);

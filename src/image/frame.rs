@@ -1,21 +1,22 @@
-//! A finished picture: layers of pixels, and where they lie in the whole.
+//! A finished picture: layers of pixels, and their data window.
 
 use super::layers::{LAYERS, layer_index};
 use crate::settings::Crop;
 
-/// Where a part of a picture lies in the whole (OpenEXR's data window in its display window).
+/// Position of a part of a picture in the whole picture (OpenEXR's data window in its display
+/// window).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DataWindow {
-    /// Width and height of the whole, pixels.
+    /// Width and height of the whole picture, pixels.
     pub whole: (u32, u32),
-    /// Pixel of the part's upper left corner.
+    /// Column of the part's upper left pixel, from 0 at the left.
     pub column: u32,
     /// Row of the same pixel, from 0 at the top.
     pub row: u32,
 }
 
 impl DataWindow {
-    /// `None` if the part is all.
+    /// Data window of a part; `None` if the part is the whole picture.
     #[must_use]
     pub fn of(whole: (u32, u32), part: Crop) -> Option<Self> {
         ((part.width, part.height) != whole).then_some(Self { whole, column: part.column, row: part.row })
@@ -29,14 +30,14 @@ pub struct Frame {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Where the frame lies, if it is a part of a larger picture.
+    /// Data window, if the frame is a part of a larger picture.
     pub window: Option<DataWindow>,
     /// The numbers of each layer of [`LAYERS`], pixel by pixel.
     layers: [Vec<f32>; LAYERS.len()],
 }
 
 impl Frame {
-    /// A frame of that radiance, W/(m² sr) per channel; all other layers are 0.
+    /// Creates a frame with the given radiance, W/(m² sr) per channel; all other layers are 0.
     ///
     /// # Panics
     /// If there are not `width · height` pixels.
@@ -49,7 +50,7 @@ impl Frame {
         frame
     }
 
-    /// A frame of these layers, in the order of [`LAYERS`].
+    /// Creates a frame from its layers, in the order of [`LAYERS`].
     pub(crate) fn of_layers(
         (width, height): (u32, u32),
         window: Option<DataWindow>,
@@ -64,7 +65,7 @@ impl Frame {
         self.width as usize * self.height as usize
     }
 
-    /// The numbers of the layer of that name, pixel by pixel.
+    /// Numbers of the layer of that name, pixel by pixel.
     ///
     /// # Panics
     /// If [`LAYERS`] has no such layer.
@@ -73,7 +74,7 @@ impl Frame {
         &self.layers[layer_index(name)]
     }
 
-    /// As [`Self::layer`], to be changed.
+    /// Mutable numbers of a layer, as [`Self::layer`].
     ///
     /// # Panics
     /// As [`Self::layer`].
@@ -87,7 +88,7 @@ impl Frame {
         bytemuck::cast_slice(self.layer("radiance"))
     }
 
-    /// As [`Self::radiance`], to be changed.
+    /// Mutable radiance, as [`Self::radiance`].
     pub fn radiance_mut(&mut self) -> &mut [[f32; 3]] {
         bytemuck::cast_slice_mut(self.layer_mut("radiance"))
     }

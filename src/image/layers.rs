@@ -1,10 +1,10 @@
-//! The table of output layers, from the device's sums to the channels of a file.
+//! Table of output layers, from the device's sums to the channels of a file.
 //!
 //! To add a layer: add a row to [`LAYERS`], and the line in `shaders/trace_camera.wesl` that writes
 //! its numbers into the sample's rows (`FirstHit`; with more than eight numbers in all,
 //! [`crate::layout::LAYER_ROWS`] grows). Film, frame and file follow from the table.
 
-/// How the sums over a pixel's samples become its value.
+/// Rule by which the sums over a pixel's samples become its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
     /// Mean over all samples.
@@ -20,11 +20,11 @@ pub struct Layer {
     pub name: &'static str,
     /// Names of its channels in an OpenEXR file.
     pub channels: &'static [&'static str],
-    /// Where its sums begin in [`crate::layout::PixelSums`]: row, and number in the row.
+    /// Start of its sums in [`crate::layout::PixelSums`]: row, and number in the row.
     pub source: (usize, usize),
-    /// How the sums become a mean.
+    /// Rule by which the sums become a mean.
     pub rule: Rule,
-    /// Value where a file lacks the channel; `None`: such a file is refused.
+    /// Value of channels that a file lacks; `None`: such a file is refused.
     pub missing: Option<f32>,
 }
 
@@ -43,10 +43,10 @@ pub const LAYERS: [Layer; 5] = [
     },
 ];
 
-/// Row of [`LAYERS`] of that name.
+/// Index in [`LAYERS`] of the layer of that name.
 ///
 /// # Panics
-/// If there is none.
+/// If there is no such layer.
 pub(crate) fn layer_index(name: &str) -> usize {
     LAYERS.iter().position(|layer| layer.name == name).unwrap_or_else(|| panic!("no layer {name}"))
 }

@@ -1,4 +1,4 @@
-//! Pictures: the film's frame, EXR and PNG files, tone mapping, difference measures.
+//! Pictures: film and frame, EXR and PNG files, tone mapping, error metrics.
 
 #[cfg(feature = "report")]
 mod canvas;

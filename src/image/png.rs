@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 /// tone mapped. Pixels without any hit are black.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be written; an older file is kept then.
+/// [`Error::Io`] if the file cannot be written. An older file is then kept.
 pub fn write_png(path: &Path, frame: &Frame, exposure: f32, curve: Tonemap) -> Result<()> {
     let bytes = encode_png(frame, exposure, curve).map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
     write_file(path, &bytes)

@@ -1,5 +1,4 @@
-//! Who gathers photons for a picture: the grid on the device, or the kd-tree on the CPU in its
-//! place.
+//! Gathering of photons for a picture: by the grid on the device, or by a kd-tree on the CPU.
 
 use super::{
     maps::PhotonMaps,
@@ -19,12 +18,12 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Sees what the estimates of a map found at the visible points of a tile.
+/// Receives the results of a map's estimates at the visible points of a tile.
 pub(crate) trait Observer {
     fn observe(&mut self, kind: MapKind, gathered: &[Gathered]);
 }
 
-/// A search over the maps, ready to gather.
+/// Gathers photon maps with the search of the settings.
 pub(crate) struct MapGatherer<'a> {
     maps: &'a PhotonMaps,
     search: Searches<'a>,
@@ -35,11 +34,11 @@ pub(crate) struct MapGatherer<'a> {
 
 enum Searches<'a> {
     Grid(Box<Gather<'a>>),
-    /// A tree of each map.
+    /// One tree per map.
     KdTree(Vec<KdMap>),
 }
 
-/// The gather of the estimate that the settings ask for.
+/// Creates the gather of the estimate that the settings ask for.
 pub(super) fn gather_for<'a>(gpu: &Gpu, scene: &'a SceneBuffers, estimate: &EstimateSettings) -> Gather<'a> {
     if estimate.raw {
         return Gather::new(gpu, GatherOptions::default());
@@ -65,8 +64,8 @@ impl<'a> MapGatherer<'a> {
         Ok(Self { maps, search, sharing: EstimateSharing::new(gpu, estimate.share_reach), estimate, observer })
     }
 
-    /// Adds the light of one map at the tile's points; `number`: which of the maps gathered, from
-    /// 1.
+    /// Adds the light of one map at the tile's visible points. `index` is the index in the photon
+    /// maps, `number` the map number.
     fn gather_map(
         &mut self,
         pass: &CameraPass,
@@ -77,7 +76,8 @@ impl<'a> MapGatherer<'a> {
     ) -> Result<()> {
         let gathered = &pass.tracer.gathered;
         if self.observer.is_some() {
-            // Slots without a point would keep what an older tile left there.
+            // The gather leaves slots without a point unchanged; they may hold results of an
+            // earlier tile.
             let mut encoder = pass.gpu.encoder();
             encoder.clear_buffer(gathered, 0, None);
             pass.gpu.submit(encoder);
@@ -93,7 +93,8 @@ impl<'a> MapGatherer<'a> {
         Ok(())
     }
 
-    /// Adds the light that rays of final gathering see in the maps, where they end.
+    /// Traces the rays of final gathering, and adds to each visible point the estimates of all maps
+    /// where its rays end.
     fn gather_finally(&mut self, pass: &CameraPass, tile: &Tile, progress: &dyn Progress) -> Result<StepCount> {
         let shared = pass.tracer.shared_points(tile);
         let mut done = StepCount::default();
@@ -112,8 +113,8 @@ impl<'a> MapGatherer<'a> {
 }
 
 impl Gatherer for MapGatherer<'_> {
-    /// The light of all maps; with final gathering of the caustic map alone, and of all maps where
-    /// the rays end.
+    /// Adds the light of all maps. With final gathering, the visible points gather the caustic map
+    /// only, and the ends of the rays gather all maps.
     fn gather(&mut self, pass: &CameraPass, tile: &Tile, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
         let final_gathering = pass.final_rays() > 0;
         let gathered_here = |kind: MapKind| !final_gathering || kind == MapKind::Caustic;
@@ -132,7 +133,7 @@ impl Gatherer for MapGatherer<'_> {
 }
 
 impl Searches<'_> {
-    /// Makes the estimates of one map that are asked for.
+    /// Answers a request for estimates of one map.
     fn answer(
         &mut self,
         pass: &CameraPass,
@@ -153,7 +154,7 @@ impl Searches<'_> {
     }
 }
 
-/// What [`Gather::run_waiting`] does, by a tree.
+/// Counterpart of [`Gather::run_waiting`] for a kd-tree.
 fn kd_estimates(
     gpu: &Gpu,
     tree: &KdMap,
@@ -177,7 +178,7 @@ fn kd_estimates(
     Ok(())
 }
 
-/// The map's photons, read back, in a kd-tree.
+/// Reads a map's photons back and builds a kd-tree of them.
 fn kd_map(gpu: &Gpu, map: &PhotonMap) -> Result<KdMap> {
     let (places, fluxes) = map.read(gpu)?;
     Ok(KdMap::new(places, fluxes, map.emitted()))

@@ -1,5 +1,5 @@
-//! First pass: photons leave the lights and are stored in maps, which remember what they were
-//! traced with.
+//! First pass: traces photons from the lights and stores them in maps, with the settings of the
+//! tracing.
 
 use super::tally;
 use crate::{
@@ -13,12 +13,12 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// The photons of a first pass on the device: of each kind of map that holds a photon.
+/// Photon maps of a first pass, on the device: one of each kind that holds a photon.
 #[derive(Debug)]
 pub struct PhotonMaps {
     maps: Vec<PhotonMap>,
     kinds: Vec<MapKind>,
-    /// What they were traced with.
+    /// Settings of the tracing.
     pub(super) settings: PhotonSettings,
     pub(super) stats: Stats,
 }
@@ -35,7 +35,7 @@ impl PhotonMaps {
         self.kinds.iter().copied().zip(&self.maps)
     }
 
-    /// The map of one kind alone, for pictures of its part of the light.
+    /// Keeps the map of one kind only, for pictures of its part of the light.
     #[doc(hidden)]
     #[must_use]
     pub fn only(mut self, kind: MapKind) -> Self {
@@ -44,14 +44,14 @@ impl PhotonMaps {
         self
     }
 
-    /// What they were traced with; pictures made of them use the same mode, bounces, sampler, seed
-    /// and rays of final gathering.
+    /// Settings of the tracing. Pictures made from the maps use the same mode, bounces, sampler,
+    /// seed and rays of final gathering.
     #[must_use]
     pub fn settings(&self) -> &PhotonSettings {
         &self.settings
     }
 
-    /// What happened up to here: the session's stages and the first pass.
+    /// Statistics of the session's stages and of the first pass.
     #[must_use]
     pub fn stats(&self) -> &Stats {
         &self.stats

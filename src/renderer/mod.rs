@@ -1,8 +1,7 @@
-//! Two-pass photon mapping (Jensen 1996, "Global Illumination Using Photon Maps"), in one screen:
-//! [`render`].
+//! Two-pass photon mapping (Jensen 1996, "Global Illumination Using Photon Maps"). The body of
+//! [`render`] shows the whole algorithm.
 //!
-//! [`Session`] holds its stages one by one, for those who make several pictures of the same
-//! photons.
+//! [`Session`] offers the single stages, for several pictures of the same photons.
 
 mod gatherer;
 mod maps;

@@ -1,4 +1,4 @@
-//! The algorithm in one screen: a session used once.
+//! The whole algorithm: the stages of a session, run once.
 
 use std::time::Instant;
 
@@ -8,11 +8,11 @@ use super::{
 };
 use crate::{error::Result, gpu::Gpu, progress::Progress, scene::Scene, settings::Settings};
 
-/// Renders the scene. The seconds of `load` are the caller's to add.
+/// Renders the scene. The caller adds the seconds of `load` to the statistics.
 ///
 /// # Errors
-/// A setting out of its range, a scene without light or without anything to draw, a limit of the
-/// adapter, a fault of the driver, or [`crate::Error::Stopped`].
+/// A setting out of its range, a scene without light or without geometry, a limit of the adapter, a
+/// fault of the driver, or [`crate::Error::Stopped`].
 pub fn render(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
     let start = Instant::now();
     check(scene, settings)?;
@@ -24,7 +24,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Prog
     Ok(render)
 }
 
-/// Finds what is wrong with the settings before the work begins.
+/// Checks the settings, the scene and the picture's size before the work begins.
 pub(crate) fn check(scene: &Scene, settings: &Settings) -> Result<()> {
     settings.check()?;
     scene.check_renderable()?;

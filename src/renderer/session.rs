@@ -1,4 +1,4 @@
-//! A scene on the device, and the stages of a render one by one.
+//! A scene on the device, and the single stages of a render.
 
 use super::{
     gatherer::{MapGatherer, Observer, gather_for},
@@ -24,7 +24,7 @@ use crate::{
 pub struct Render {
     /// The picture.
     pub frame: Frame,
-    /// What happened.
+    /// Statistics of the render.
     pub stats: Stats,
 }
 
@@ -35,14 +35,14 @@ pub struct Session<'a> {
     gpu: &'a Gpu,
     scene: &'a Scene,
     buffers: SceneBuffers,
-    /// What the scene's cameras are inside of.
+    /// Media that contain each of the scene's cameras.
     camera_media: Vec<Media>,
     stats: Stats,
 }
 
 impl<'a> Session<'a> {
-    /// Puts the scene on the device, its lights by these settings. The peak of device memory counts
-    /// from here.
+    /// Builds the hierarchy and copies the scene to the device, with lights as the settings say.
+    /// The peak of device memory is counted from here.
     ///
     /// # Errors
     /// As [`super::render`].
@@ -64,9 +64,9 @@ impl<'a> Session<'a> {
         Ok(Self { gpu, scene, buffers, camera_media, stats })
     }
 
-    /// Has the kernels compiled that a picture by these settings needs, in their order, while the
-    /// first of them run. Those of final gathering, and any that were not asked for here, are
-    /// compiled when they are needed.
+    /// Starts to compile the kernels that a picture with these settings needs, in the order of
+    /// their use, so that the first ones run while others compile. Kernels of final gathering, and
+    /// all kernels that were not requested here, are compiled when they are needed.
     pub fn prefetch(&self, settings: &Settings) {
         let (gpu, scene) = (self.gpu, &self.buffers);
         let Settings { photons, estimate, picture, .. } = settings;
@@ -81,7 +81,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// First pass: photons leave the lights and are stored in a global and a caustic map.
+    /// First pass: traces photons from the lights into a global and a caustic map.
     ///
     /// # Errors
     /// As [`super::render`].
@@ -91,8 +91,8 @@ impl<'a> Session<'a> {
     }
 
     /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode,
-    /// bounces, sampler, seed and rays of final gathering are those that the maps were traced with.
-    /// The statistics are those of the maps and of this picture; `total` is their sum.
+    /// bounces, sampler, seed and rays of final gathering are those of the maps. The statistics
+    /// cover the maps and this picture; `total` is the sum of both.
     ///
     /// # Errors
     /// As [`super::render`].
@@ -107,7 +107,7 @@ impl<'a> Session<'a> {
         Ok(Render { frame: film.finish(), stats })
     }
 
-    /// As [`Self::picture`], as a film that can be merged with those of other passes.
+    /// Renders as [`Self::picture`], to a film that can be merged with those of other passes.
     ///
     /// # Errors
     /// As [`super::render`].
@@ -121,7 +121,8 @@ impl<'a> Session<'a> {
         self.observed_film(maps, estimate, picture, None, progress)
     }
 
-    /// As [`Self::film`]; an observer sees what the estimates of each map and tile found.
+    /// Renders as [`Self::film`]. The observer receives the results of the estimates of each map
+    /// and tile.
     pub(crate) fn observed_film<'b>(
         &'b self,
         maps: &'b PhotonMaps,

@@ -7,15 +7,16 @@ use crate::{
     settings::{Crop, PictureSettings},
 };
 
-/// Height of a picture whose size was not asked for.
+/// Height of a picture whose settings give no size, pixels.
 const DEFAULT_HEIGHT: u32 = 512;
-/// Pixels of the largest picture.
+/// Maximum number of pixels of a picture.
 const MAX_PIXELS: u64 = 1 << 28;
-/// Host memory that a pixel takes: the sums of all layers, their means, and the file of these
-/// before it is written, bytes.
+/// Host memory per pixel, bytes: the sums of all layers, their means, and the encoded file before
+/// it is written.
 const BYTES_PER_PIXEL: u64 = 160;
 
-/// The asked size of the whole picture, or the default height at the camera's aspect.
+/// Size of the whole picture: that of the settings, or the default height at the camera's aspect
+/// ratio. Checks the number of pixels, the crop and the free memory.
 pub(crate) fn picture_size(camera: &Camera, picture: &PictureSettings) -> Result<(u32, u32)> {
     let (width, height) = picture.size.unwrap_or_else(|| {
         let width = (DEFAULT_HEIGHT as f32 * camera.aspect.unwrap_or(1.0)).round();

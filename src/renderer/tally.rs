@@ -1,4 +1,4 @@
-//! What is counted along the way, and what is said of it.
+//! Counts of a render, and the warnings that follow from them.
 
 use crate::{
     emitters::LightGroup,
@@ -29,7 +29,7 @@ pub(super) fn count_faults(stats: &mut Stats, media_overflows: u64, unfinished: 
     stats.unfinished_rays += unfinished;
 }
 
-/// Says what was counted along the way and takes light from the picture.
+/// Adds a warning for each counted fault that changes the light of the picture.
 fn warn_of_faults(stats: &mut Stats) {
     if stats.unfinished_rays > 0 {
         stats
@@ -67,7 +67,8 @@ pub(super) fn add_step(stats: &mut Stats, count: StepCount) {
     count_faults(stats, count.media_overflows, count.unfinished);
 }
 
-/// Completes the statistics of a finished picture: warnings of what was counted, peak and total.
+/// Completes the statistics of a finished picture: warnings of faults, peak device memory, total
+/// seconds.
 pub(crate) fn finish_stats(gpu: &Gpu, stats: &mut Stats) {
     warn_of_faults(stats);
     stats.peak_device_bytes = gpu.memory.peak();

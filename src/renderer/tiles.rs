@@ -14,27 +14,27 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Who adds the light of photons to the visible points of a tile.
+/// Source of the photons' light at the visible points of a tile.
 pub(crate) trait Gatherer {
     /// Adds the light to the radiance of the tile's points.
     fn gather(&mut self, pass: &CameraPass, tile: &Tile, stats: &mut Stats, progress: &dyn Progress) -> Result<()>;
 
-    /// Pictures that it makes of the same visible points.
+    /// Number of pictures that it makes of the same visible points.
     fn pictures(&self) -> usize {
         1
     }
 
-    /// Makes the tile's radiance that of a picture, of several.
+    /// Sets the tile's radiance to that of one picture, for gatherers of several.
     fn show(&mut self, _picture: usize, _pass: &CameraPass) {}
 }
 
-/// What a picture is made by on the device: camera paths, direct light, rays of final gathering.
+/// Device part of a camera pass: camera paths, direct light, rays of final gathering.
 pub(crate) struct CameraPass<'a> {
     pub gpu: &'a Gpu,
     scene: &'a SceneBuffers,
     /// Holds the visible points and the radiance of the tile that was traced last.
     pub tracer: CameraTracer,
-    /// If the photons were traced for it.
+    /// `None` if the photons were not traced for final gathering.
     final_gather: Option<FinalGather>,
     /// The radiance estimate that the settings ask for.
     pub estimate: GatherSettings,
@@ -46,7 +46,7 @@ pub(crate) struct CameraPass<'a> {
 }
 
 impl<'a> CameraPass<'a> {
-    /// Rays start inside of `media`, those around the middle of the camera.
+    /// Creates the pass. Rays start inside of `media`, the media around the centre of the camera.
     pub fn new(
         gpu: &'a Gpu,
         scene: &'a SceneBuffers,
@@ -74,7 +74,7 @@ impl<'a> CameraPass<'a> {
     }
 
     /// Renders tile by tile: camera rays to visible points, direct light, the light of photons,
-    /// sums over the samples of each pixel. One film for each of the gatherer's pictures.
+    /// sums over the samples of each pixel. Returns one film for each of the gatherer's pictures.
     pub fn render(
         &self,
         gatherer: &mut dyn Gatherer,
@@ -101,8 +101,8 @@ impl<'a> CameraPass<'a> {
         Ok(films)
     }
 
-    /// Camera rays to the tile's visible points, and direct light there if the mode takes it from
-    /// shadow rays.
+    /// Traces camera rays to the tile's visible points, and adds direct light there if the mode
+    /// takes it from shadow rays.
     fn trace(&self, tile: &Tile, stats: &mut Stats) -> Result<()> {
         let (gpu, scene) = (self.gpu, self.scene);
         let count = timed(&mut stats.seconds.camera, || self.tracer.trace(gpu, scene, tile))?;
@@ -138,19 +138,19 @@ impl<'a> CameraPass<'a> {
         Ok((&gather.seen, gather.trace(self.gpu, self.scene, &self.tracer, tile, ray)?))
     }
 
-    /// The tile's visible points, some slots without a point.
+    /// Reads the tile's visible points; some slots have no point.
     #[cfg(feature = "report")]
     pub fn points(&self, tile: &Tile) -> Result<Vec<crate::layout::VisiblePoint>> {
         self.gpu.read(&self.tracer.points, 0, self.tracer.point_count(tile).into())
     }
 
-    /// Radiance from each of them so far.
+    /// Reads the radiance of the visible points so far.
     #[cfg(feature = "report")]
     pub fn radiance(&self, tile: &Tile) -> Result<Vec<[f32; 4]>> {
         self.gpu.read(&self.tracer.radiance, 0, self.tracer.point_count(tile).into())
     }
 
-    /// Replaces it.
+    /// Replaces the radiance of the visible points.
     #[cfg(feature = "report")]
     pub fn set_radiance(&self, radiance: &[[f32; 4]]) {
         self.gpu.write(&self.tracer.radiance, 0, radiance);

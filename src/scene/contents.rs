@@ -1,4 +1,4 @@
-//! The scene: its contents, and what can be asked of them.
+//! The scene: its contents, and queries of them.
 
 use std::path::PathBuf;
 
@@ -68,7 +68,7 @@ impl Scene {
         (center, corners.chain(balls).fold(0.0, f32::max))
     }
 
-    /// Whether a surface has a delta BSDF, so that there can be caustics.
+    /// Whether a surface has a specular BSDF, so that there can be caustics.
     #[must_use]
     pub fn has_delta(&self) -> bool {
         self.uses_material(|material| material.surface.is_delta())

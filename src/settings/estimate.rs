@@ -8,44 +8,44 @@ use crate::{
     error::Result,
 };
 
-/// Which photons an estimate sums, and how they are found. Grid and kd-tree give the same picture
-/// but for rounding.
+/// Photons that an estimate sums, and the search that finds them. The pictures of grid and kd-tree
+/// differ only by rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Search {
-    /// The nearest, by the grid on the device.
+    /// The nearest photons, by the grid on the device.
     #[default]
     Grid,
-    /// The nearest, by the kd-tree of [`crate::reference`] on the CPU; makes the raw estimate
-    /// always.
+    /// The nearest photons, by the kd-tree of [`crate::reference`] on the CPU. Always makes the raw
+    /// estimate.
     KdTree,
-    /// All within [`EstimateSettings::radius`], by the grid.
+    /// All photons within [`EstimateSettings::radius`], by the grid.
     Radius,
 }
 
-/// What light is estimated by at a point.
+/// Settings of the radiance estimate at a point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EstimateSettings {
-    /// Photons in the radiance estimate, in [`Self::NEIGHBORS`].
+    /// Number of photons in the estimate, in [`Self::NEIGHBORS`].
     pub neighbors: u32,
     /// Shape of the kernel that weighs the photons.
     pub kernel: DensityKernel,
     /// Constant C of the cone filter, in [`Self::CONE_CONSTANT`].
     pub cone_constant: f32,
-    /// Bound of the search radius, metres, in [`Self::RADIUS`]; `None`: the nearest photons,
-    /// however far.
+    /// Maximum radius of the search, metres, in [`Self::RADIUS`]; `None`: no limit.
     pub max_radius: Option<f32>,
-    /// How photons are found.
+    /// Search that finds the photons.
     pub search: Search,
     /// Radius of the estimate with [`Search::Radius`], metres, in [`Self::RADIUS`]; `None` with the
-    /// others.
+    /// other searches.
     pub radius: Option<f32>,
-    /// Photons of neighbouring surfaces count, and the disc is taken to be there as a whole: the
-    /// estimate of the report.
+    /// Makes the raw estimate, that of the report: photons of neighbouring surfaces count, and the
+    /// disc is taken as whole.
     pub raw: bool,
-    /// Distance within which visible points on one surface share an estimate, as a fraction of its
-    /// radius, in [`Self::SHARE_REACH`]; 0: every camera sample has its own.
+    /// Distance within which visible points on one surface share an estimate, as a fraction of the
+    /// estimate's radius, in [`Self::SHARE_REACH`]; 0: every camera sample has an estimate of its
+    /// own.
     pub share_reach: f32,
 }
 
@@ -69,8 +69,8 @@ impl EstimateSettings {
     pub const NEIGHBORS: Range<u32> = Range::closed(1, 1000);
     /// Range of [`Self::cone_constant`].
     pub const CONE_CONSTANT: Range<f32> = Range::at_least(1.0);
-    /// Range of [`Self::radius`] and [`Self::max_radius`], metres: the square of the largest is far
-    /// from the largest float.
+    /// Range of [`Self::radius`] and [`Self::max_radius`], metres. The square of the maximum, 1e36,
+    /// is well below the largest f32.
     pub const RADIUS: Range<f32> = Range::above(0.0, 1e18);
     /// Range of [`Self::share_reach`].
     pub const SHARE_REACH: Range<f32> = Range::closed(0.0, 2.0);

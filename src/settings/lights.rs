@@ -1,22 +1,23 @@
-//! Settings of the lights: how the file's are read, and how photons are dealt to them.
+//! Settings of the lights: the unit of the file's intensities, and the distribution of photons over
+//! lights.
 
 use serde::{Deserialize, Serialize};
 
 use super::range::{Range, fail};
 use crate::error::Result;
 
-/// How photon paths are dealt to lights.
+/// Distribution of photon paths over lights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LightSampling {
-    /// In proportion to power: all photons start with like flux.
+    /// In proportion to power: all photons start with similar flux.
     #[default]
     Power,
-    /// In turn, whatever the power. What shines by one material is one light.
+    /// In turn, whatever the power. All surfaces of one emissive material are one light.
     Uniform,
 }
 
-/// How the file's light intensities are read.
+/// Unit in which the file's light intensities are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LightUnit {
@@ -27,16 +28,17 @@ pub enum LightUnit {
     Photometric,
 }
 
-/// What the light table is made by.
+/// Settings of the light table.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct LightSettings {
-    /// How photon paths are dealt to lights.
+    /// Distribution of photon paths over lights.
     pub sampling: LightSampling,
-    /// Names of lights, and the factor on the photons of each, in [`Self::PHOTON_WEIGHT`]. An
-    /// emissive material or the environment is a light of its name.
+    /// Names of lights, and the factor on the number of photons of each, in
+    /// [`Self::PHOTON_WEIGHT`]. An emissive material or the environment counts as a light of its
+    /// name.
     pub photon_weights: Vec<(String, f64)>,
-    /// How light intensities of the file are read.
+    /// Unit in which the file's light intensities are read.
     pub unit: LightUnit,
 }
 

@@ -1,4 +1,4 @@
-//! What a caller may choose, by stage. Every value has a unit, a range and a default.
+//! Settings of a render, by stage. Every value has a unit, a range and a default.
 
 mod estimate;
 mod lights;

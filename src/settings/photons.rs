@@ -6,23 +6,25 @@ use serde::{Deserialize, Serialize};
 use super::range::{Range, fail};
 use crate::error::Result;
 
-/// Longest path, surfaces: so far the key of a staged photon counts along its path.
+/// Maximum length of a path, surfaces: the key of a staged photon has no bits for more positions
+/// along a path.
 pub const MAX_BOUNCES: u32 = crate::layout::PLACE_MASK;
 
-/// Which light reaches the picture, and by which way (the report's five modes).
+/// Light that reaches the picture, and the method that computes it (the report's five modes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// 0: direct light by shadow rays, all else by photons.
+    /// 0: direct light by shadow rays, all other light by photons.
     #[default]
     Hybrid,
     /// 1: all light by photons.
     Photons,
     /// 2: direct light by shadow rays only.
     DirectRays,
-    /// 3: light straight from the lights or through specular surfaces only, by photons.
+    /// 3: light directly from the lights or over specular surfaces only, by photons.
     DirectPhotons,
-    /// 4: what mode 0 takes from photons. The only one that does not show what shines.
+    /// 4: the part of mode 0 that photons compute. The only mode whose picture does not show
+    /// emitters.
     IndirectPhotons,
 }
 
@@ -37,86 +39,87 @@ impl Mode {
         ["hybrid", "photons", "direct-rays", "direct-photons", "indirect-photons"][self as usize]
     }
 
-    /// Direct light comes from shadow rays.
+    /// Whether direct light comes from shadow rays.
     #[must_use]
     pub fn direct_by_rays(self) -> bool {
         matches!(self, Mode::Hybrid | Mode::DirectRays)
     }
 
-    /// The picture shows what shines, straight, in mirrors and through glass.
+    /// Whether the picture shows emitters: directly, in mirrors and through glass.
     #[must_use]
     pub fn sees_lights(self) -> bool {
         self != Mode::IndirectPhotons
     }
 
-    /// Photons are traced at all.
+    /// Whether photons are traced at all.
     #[must_use]
     pub fn traces_photons(self) -> bool {
         self != Mode::DirectRays
     }
 
-    /// The global map stores photons that come straight from a light (LD).
+    /// Whether the global map stores photons that come directly from a light (LD).
     #[must_use]
     pub fn stores_direct(self) -> bool {
         matches!(self, Mode::Photons | Mode::DirectPhotons)
     }
 
-    /// Photons go on after their first diffuse surface.
+    /// Whether photons go on after their first diffuse surface.
     #[must_use]
     pub fn follows_diffuse(self) -> bool {
         !matches!(self, Mode::DirectRays | Mode::DirectPhotons)
     }
 }
 
-/// Where photon paths are sent.
+/// Aim of photon paths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Emission {
-    /// Towards the scene, for the global map; and apart from that towards mirrors and glass, for
-    /// the caustic map.
+    /// Paths for the global map are aimed at the scene. Other paths, for the caustic map, are aimed
+    /// at mirrors and glass.
     #[default]
     Aimed,
-    /// Wherever the lights shine, for both maps at once.
+    /// Paths go wherever the lights shine. They serve both maps at once.
     Unaimed,
 }
 
-/// Where the numbers for sampling come from: those of photons, camera samples and direct light.
+/// Source of the numbers that sample photons, camera rays and direct light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampler {
-    /// Owen-scrambled Sobol sequences: spread evenly, every prefix of them.
+    /// Owen-scrambled Sobol sequences: every prefix is spread evenly.
     #[default]
     Sobol,
-    /// Independent numbers.
+    /// Independent random numbers.
     Random,
 }
 
-/// What photon maps are traced by. Pictures made of the maps use the same mode, bound, sampler and
-/// seed.
+/// Settings of the photon maps. Pictures made from the maps use the same mode, limit of bounces,
+/// sampler and seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PhotonSettings {
-    /// Which light reaches the picture.
+    /// Light that reaches the picture.
     pub mode: Mode,
     /// Photons that the global map can hold, in [`Self::CAPACITY`].
     pub global: u32,
     /// Photons that the caustic map can hold, in [`Self::CAPACITY`].
     pub caustic: u32,
-    /// Photon paths emitted at most, in [`Self::MAX_PATHS`], for each map by itself unless emission
-    /// is unaimed; `None`: 100 times the larger capacity.
+    /// Maximum number of emitted photon paths, in [`Self::MAX_PATHS`], for each map by itself
+    /// unless emission is unaimed; `None`: 100 times the larger capacity.
     pub max_paths: Option<u64>,
-    /// Where photon paths are sent.
+    /// Aim of photon paths.
     pub emission: Emission,
     /// Maximum number of diffuse surfaces on a photon path, in [`Self::MAX_BOUNCES`]; 0: roulette
     /// alone ends paths. Chains of mirrors and glass go on beyond it.
     pub max_bounces: u32,
-    /// Numbers for sampling.
+    /// Source of the numbers for sampling.
     pub sampler: Sampler,
-    /// Decides all randomness.
+    /// Seed of all random numbers.
     pub seed: u32,
-    /// Rays of final gathering per visible point, in [`Self::FINAL_GATHER`]: light that comes over
-    /// another surface is what they see of the global map there, not what that map holds at the
-    /// point itself; 0: without. In the modes hybrid and indirect-photons.
+    /// Rays of final gathering per visible point, in [`Self::FINAL_GATHER`]; 0: no final gathering.
+    /// Light that comes over another surface is then estimated from the maps where the rays end,
+    /// not from the global map at the visible point itself. Only in the modes hybrid and
+    /// indirect-photons.
     pub final_gather: u32,
 }
 
@@ -146,14 +149,14 @@ impl PhotonSettings {
     /// Range of [`Self::final_gather`], rays.
     pub const FINAL_GATHER: Range<u32> = Range::closed(0, 65_536);
 
-    /// The global map stores photons that come straight from a light (LD): as the mode says, and
-    /// for rays of final gathering.
+    /// Whether the global map stores photons that come directly from a light (LD): if the mode says
+    /// so, or for rays of final gathering.
     #[must_use]
     pub fn stores_direct(&self) -> bool {
         self.mode.stores_direct() || self.final_gather > 0
     }
 
-    /// Surfaces that a path meets at most, 1 to [`MAX_BOUNCES`].
+    /// Maximum number of surfaces that a path meets, 1 to [`MAX_BOUNCES`].
     #[must_use]
     pub fn bounce_limit(&self) -> u32 {
         if self.max_bounces == 0 { MAX_BOUNCES } else { self.max_bounces }

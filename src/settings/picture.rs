@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::range::{Range, fail};
 use crate::{error::Result, pixel_filter::PixelFilter};
 
-/// Part of a picture, in pixels of the whole from its upper left corner; at least one pixel each
-/// way.
+/// Rectangular part of a picture, in pixels of the whole picture from its upper left corner. It has
+/// at least one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Crop {
     /// Column of the upper left pixel, from 0.
@@ -28,26 +28,27 @@ impl Crop {
     }
 }
 
-/// What one picture is made by.
+/// Settings of one picture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PictureSettings {
-    /// Width and height in pixels, each in [`Self::SIDE`]; `None`: 512 high, as wide as the
-    /// camera's aspect says.
+    /// Width and height in pixels, each in [`Self::SIDE`]; `None`: 512 high, with the camera's
+    /// aspect ratio.
     pub size: Option<(u32, u32)>,
     /// The part of the picture that is rendered; `None`: all.
     pub crop: Option<Crop>,
     /// Name or index of the camera in the file; `None`: the first.
     pub camera: Option<String>,
-    /// Camera samples per pixel, in [`Self::SPP`]. With light samples and final gathering the bound
-    /// is lower: see [`super::Settings::check`].
+    /// Camera samples per pixel, in [`Self::SPP`]. Many light samples or rays of final gathering
+    /// lower the maximum: see [`super::Settings::check`].
     pub spp: u32,
-    /// How the light around a pixel's centre is weighed.
+    /// Filter that weighs the light around a pixel's centre.
     pub pixel_filter: PixelFilter,
-    /// Diameter of the lens, metres, in [`Self::APERTURE`]; 0: a pinhole, all is sharp.
+    /// Diameter of the lens, metres, in [`Self::APERTURE`]; 0: a pinhole camera, everything is in
+    /// focus.
     pub aperture: f32,
-    /// Distance of the sharp plane along the camera's axis, metres, in [`Self::FOCUS`]; with an
-    /// aperture only.
+    /// Distance of the plane of focus along the camera's axis, metres, in [`Self::FOCUS`]. Has an
+    /// effect only with an aperture, which requires it.
     pub focus: Option<f32>,
     /// Samples of the direct light of emissive surfaces and the environment per visible point, in
     /// [`Self::LIGHT_SAMPLES`].
@@ -81,13 +82,14 @@ impl PictureSettings {
     /// Range of [`Self::light_samples`].
     pub const LIGHT_SAMPLES: Range<u32> = Range::closed(1, 4096);
 
-    /// The part of a picture of that size that is rendered.
+    /// Part that is rendered of a picture of the given size.
     #[must_use]
     pub fn window(&self, (width, height): (u32, u32)) -> Crop {
         self.crop.unwrap_or(Crop { column: 0, row: 0, width, height })
     }
 
-    /// The table of the pixel filter; a single sample by the box filter is the pixel's centre.
+    /// Inverse CDF of the pixel filter, see [`PixelFilter::offsets`]. A single sample with the box
+    /// filter lies at the pixel's centre.
     #[must_use]
     pub fn pixel_filter_offsets(&self) -> Vec<f32> {
         if self.spp == 1 && self.pixel_filter == PixelFilter::Box { vec![0.0; 2] } else { self.pixel_filter.offsets() }

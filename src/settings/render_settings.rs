@@ -1,4 +1,4 @@
-//! The settings of one render: all parts, and what they must be together.
+//! Settings of one render: all parts, and the checks of one part against another.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The settings after a change.
+    /// Returns the settings after a change.
     ///
     /// ```
     /// use caustica::settings::Settings;
@@ -49,8 +49,9 @@ impl Settings {
     }
 }
 
-/// Checks that numbers for sampling, which are counted in 32 bits over all samples of a pixel with
-/// four paths of each, suffice for a picture.
+/// Checks that 32-bit indices of the numbers for sampling suffice for a picture. They count over
+/// all samples of a pixel and, within a sample, over its four paths, light samples or rays of final
+/// gathering.
 pub(crate) fn check_samples(photons: &PhotonSettings, picture: &PictureSettings) -> Result<()> {
     let each = picture.light_samples.max(photons.final_gather).max(4);
     let most = (1_u64 << 32) / u64::from(each);

@@ -37,7 +37,7 @@ const COLUMNS: [Column; 14] = [
     ("corners", |r| Value::number(r.corner_ratio)),
 ];
 
-/// A value as it is shown, and as it is sorted by.
+/// A value's text in the table, and its sort key.
 struct Value {
     shown: String,
     sorted: String,
@@ -123,7 +123,7 @@ fn show_claim(claim: &Claim) -> String {
     )
 }
 
-/// A plot in the page's own colours.
+/// A plot whose ink is the page's text colour.
 fn inline(svg: &str) -> String {
     svg.replace(INK, "currentColor")
 }

@@ -97,7 +97,7 @@ impl Figures<'_> {
         self.figure(&title, names(&modes), vec![("scene 1".to_string(), cells)], &[Question::DeltaShadows]);
     }
 
-    /// The whole plane, and the report's two lines through it.
+    /// Adds the whole plane of n and k, and the report's two lines through it.
     fn plane(&mut self) {
         let photons = PHOTONS.map(self.scaled);
         let along_n = self.add_plane(&photons, &[10], "More photons at k = 10 (scene 1)".to_string());
@@ -114,7 +114,7 @@ impl Figures<'_> {
         whole.questions = vec![Question::Proportion];
     }
 
-    /// Of scene 1.
+    /// Adds a figure of scene 1 with n in rows and k in columns.
     fn add_plane(&mut self, photons: &[u32], neighbors: &[u32], title: String) -> &mut Figure {
         let base = self.settings.clone().with(|s| s.photons.mode = Mode::Hybrid);
         add_plane(&mut self.plan, MIRROR_AND_GLASS, &base, photons, neighbors, self.repeats, title);
@@ -159,7 +159,7 @@ fn names(modes: &[Mode]) -> Vec<String> {
     modes.iter().map(|mode| mode.name().to_string()).collect()
 }
 
-/// A column of pictures takes much room; a row does not.
+/// Swaps rows and columns, since a row of pictures takes less space than a column.
 fn transpose(figure: &mut Figure) {
     let columns = figure.rows.iter().map(|(label, _)| label.clone()).collect();
     let row = |c: usize| {

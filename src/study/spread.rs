@@ -16,7 +16,7 @@ pub(super) struct Bias {
     pub limit: f64,
 }
 
-/// Root of the mean over pixels and channels of the unbiased variance between renders; `None` of
+/// Root of the mean over pixels and channels of the unbiased variance between renders; `None` for
 /// fewer than two.
 pub(super) fn noise(frames: &[&Frame]) -> Option<f64> {
     let count = frames.len() as f64;
