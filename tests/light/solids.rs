@@ -175,15 +175,15 @@ fn photons_through_a_plate_on_water_follow_the_closed_form() {
     let floor_under = |water: f32, plate: f32, degrees: f64| {
         let floor = Mesh {
             positions: vec![
-                vec3(-40.0, -1.0, 40.0),
-                vec3(40.0, -1.0, 40.0),
-                vec3(40.0, -1.0, -40.0),
-                vec3(-40.0, -1.0, -40.0),
+                vec3(-4.0, -1.0, 4.0),
+                vec3(4.0, -1.0, 4.0),
+                vec3(4.0, -1.0, -4.0),
+                vec3(-4.0, -1.0, -4.0),
             ],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
         };
-        let (low, high) = (vec3(-30.0, -1.0, -30.0), vec3(30.0, 0.0, 30.0));
-        let cover = Mesh::lathe(Vec3::ZERO, &[(0.0, 0.0), (40.0, 0.0), (40.0, 0.2), (0.0, 0.2)], 7);
+        let (low, high) = (vec3(-3.0, -1.0, -3.0), vec3(3.0, 0.0, 3.0));
+        let cover = Mesh::lathe(Vec3::ZERO, &[(0.0, 0.0), (4.0, 0.0), (4.0, 0.2), (0.0, 0.2)], 7);
         let materials = [lambert([0.5; 3]), glass_of(water), glass_of(plate)];
         let mut scene = scene_of(&[(floor, 0), (Mesh::block(low, high), 1), (cover, 2)], &materials);
         let angle = degrees.to_radians() as f32;
@@ -193,7 +193,7 @@ fn photons_through_a_plate_on_water_follow_the_closed_form() {
             ..point_light(Vec3::ZERO, std::f32::consts::PI)
         }];
         scene.cameras = vec![camera(vec3(0.0, -0.5, 0.001), vec3(0.0, -1.0, 0.0), 60.0)];
-        let settings = settings(Mode::DirectPhotons, 60_000, 16);
+        let settings = settings(Mode::DirectPhotons, 300_000, 16).with(|s| s.estimate.neighbors = 200);
         // A camera in the water sees the radiance of the floor itself.
         mean(&render_scene(&scene, &settings))
     };

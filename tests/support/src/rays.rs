@@ -2,7 +2,7 @@
 
 use caustica::{
     bvh::Bvh,
-    layout::{CameraTile, Counters, FirstHit, Path, VisiblePoint},
+    layout::{CameraTile, Counters, FirstHit, NOTHING_LEFT, Path, VisiblePoint},
     scene::Scene,
     settings::LightSettings,
     upload::SceneBuffers,
@@ -21,6 +21,7 @@ pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) ->
     let path = |&(origin, direction): &(Vec3, Vec3)| Path {
         origin: origin.to_array(),
         direction: direction.normalize().to_array(),
+        left: NOTHING_LEFT,
         ..Path::default()
     };
     let paths = gpu.storage_with("paths", &rays.iter().map(path).collect::<Vec<_>>()).expect("fits");
