@@ -8,7 +8,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 
 use super::node::MAX_LEAF;
-use super::{convert, widen};
+use super::{convert, split, widen};
 use crate::layout::{BVH_STACK, BvhNode, Normals, Primitive, SPHERE_BIT, octahedral};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
@@ -28,7 +28,8 @@ pub struct Bvh {
 
 impl Bvh {
     /// Builds the tree over all triangles and spheres: PLOC with reinsertion (Meister and Bittner
-    /// 2018, 2021). Equal scenes give equal trees on any number of threads.
+    /// 2018, 2021). Large primitives among many that cross are listed several times, in smaller
+    /// boxes. Equal scenes give equal trees on any number of threads.
     ///
     /// # Panics
     /// If there are 2^28 triangles and spheres or more. The loader refuses such files earlier.
@@ -41,13 +42,13 @@ impl Bvh {
             primitive.id = id as u32;
         }
         primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
-        let bounds: Vec<Bounds> = primitives.iter().map(bounds).collect();
+        let (bounds, of_bounds) = split::pieces(&primitives);
         let binary = convert::convert(&build_binary(&bounds), &bounds);
         let (nodes, order) = widen::widen(&binary);
         let normals = |primitive: &Primitive| {
             scene.triangles.get(primitive.id as usize).map_or(Normals::default(), corner_normals)
         };
-        let primitives: Vec<Primitive> = order.iter().map(|i| primitives[*i as usize]).collect();
+        let primitives: Vec<Primitive> = order.iter().map(|i| primitives[of_bounds[*i as usize] as usize]).collect();
         Self { normals: primitives.iter().map(normals).collect(), nodes, primitives }
     }
 

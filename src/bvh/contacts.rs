@@ -45,21 +45,20 @@ pub fn contacts(scene: &Scene, bvh: &Bvh) -> Vec<bool> {
 /// Primitives that lie in the surface of primitive `i`.
 fn touching(bvh: &Bvh, i: u32) -> Vec<u32> {
     let primitive = &bvh.primitives[i as usize];
-    let tolerance = reach(primitive) * TOLERANCE;
     let own = bounds(primitive);
-    let slack = Vec3::splat((2.0 * tolerance) as f32);
-    let own = Bounds { min: own.min - slack, max: own.max + slack };
+    let largest = |bounds: &Bounds| f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
     let (mut found, mut waiting) = (Vec::new(), vec![0]);
     while let Some(node) = waiting.pop() {
         for child in bvh.nodes[node as usize].children() {
-            if !(own.min.cmple(child.bounds.max).all() && child.bounds.min.cmple(own.max).all()) {
+            let slack = Vec3::splat((2.0 * TOLERANCE * largest(&own).max(largest(&child.bounds))) as f32);
+            if !((own.min - slack).cmple(child.bounds.max).all() && (child.bounds.min - slack).cmple(own.max).all()) {
                 continue;
             }
             if child.count == 0 {
                 waiting.push(child.first);
             }
             let inside = child.first..child.first + child.count;
-            found.extend(inside.filter(|j| *j != i && coincide(primitive, &bvh.primitives[*j as usize], tolerance)));
+            found.extend(inside.filter(|j| *j != i && coincide(primitive, &bvh.primitives[*j as usize])));
         }
     }
     found
@@ -73,10 +72,11 @@ fn reach(primitive: &Primitive) -> f64 {
 }
 
 /// Whether two primitives lie in each other, over more than an edge.
-fn coincide(a: &Primitive, b: &Primitive, tolerance: f64) -> bool {
-    if b.id == FILLER || (a.material ^ b.material) & SPHERE_BIT != 0 {
+fn coincide(a: &Primitive, b: &Primitive) -> bool {
+    if b.id == FILLER || b.id == a.id || (a.material ^ b.material) & SPHERE_BIT != 0 {
         return false;
     }
+    let tolerance = reach(a).max(reach(b)) * TOLERANCE;
     let [a0, b0] = [a, b].map(|p| Vec3::from_array(p.v0).as_dvec3());
     if a.material & SPHERE_BIT != 0 {
         let radii = [a, b].map(|p| f64::from(p.e1[0]));

@@ -8,6 +8,8 @@
 //! for both triangles of an edge. A path through edges or corners of a closed mesh therefore enters
 //! it as often as it leaves it.
 
+use std::collections::HashSet;
+
 use glam::{DVec2, DVec3};
 
 use super::{Bvh, BvhChild, FILLER};
@@ -79,7 +81,7 @@ impl<'a> MediaProbe<'a> {
 
     /// Intersections of the line through `point` along an axis with solids that have a medium.
     fn crossings(&self, point: DVec3, axis: usize) -> Vec<Crossing> {
-        let mut found = Vec::new();
+        let (mut found, mut known) = (Vec::new(), HashSet::new());
         let mut waiting = vec![0];
         while let Some(node) = waiting.pop() {
             for child in self.bvh.nodes[node as usize].children() {
@@ -90,7 +92,11 @@ impl<'a> MediaProbe<'a> {
                     waiting.push(child.first);
                 }
                 for primitive in child.first..child.first + child.count {
-                    self.cross(&self.bvh.primitives[primitive as usize], point, axis, &mut found);
+                    let primitive = &self.bvh.primitives[primitive as usize];
+                    // Large primitives may be listed several times.
+                    if known.insert(primitive.id) {
+                        self.cross(primitive, point, axis, &mut found);
+                    }
                 }
             }
         }

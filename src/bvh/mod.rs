@@ -11,6 +11,7 @@ mod contacts;
 mod convert;
 mod media;
 mod node;
+mod split;
 #[cfg(test)]
 mod tests;
 mod widen;

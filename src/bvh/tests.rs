@@ -174,6 +174,32 @@ fn looseness(node: &BvhNode, given: Bounds) -> Option<f32> {
     holds.then_some((beyond - ulp).max(0.0) / unit.max(f32::MIN_POSITIVE))
 }
 
+/// Long thin triangles through the origin.
+fn needles(count: usize) -> Scene {
+    let mut random = Random(11);
+    let mut scene = Scene::default();
+    for _ in 0..count {
+        let along = random.point().normalize();
+        let aside = along.cross(random.point()).normalize() * 0.001;
+        scene.triangles.push(triangle([along, aside - along, -aside - along]));
+    }
+    scene
+}
+
+#[test]
+fn crossing_needles_are_split_and_all_found() {
+    let scene = needles(1500);
+    let bvh = Bvh::build(&scene);
+    assert!(bvh.primitives.len() > 10 * scene.triangles.len(), "{} pieces", bvh.primitives.len());
+    let mut ids: Vec<u32> = bvh.primitives.iter().map(|p| p.id).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), scene.triangles.len());
+    assert_eq!(mismatches(&bvh, 300), 0);
+    let few = Bvh::build(&needles(100));
+    assert_eq!(few.primitives.len(), 100, "control: where little crosses nothing is split");
+}
+
 #[test]
 fn quantized_boxes_are_tight_and_conservative() {
     let along_x = |low: f32, high: f32| Bounds { min: Vec3::new(low, 0.0, 0.0), max: Vec3::new(high, 1.0, 1.0) };

@@ -174,12 +174,7 @@ fn photons_through_a_plate_on_water_follow_the_closed_form() {
     // A floor under water, with a plate of glass that lies on the water; sunlight at an angle.
     let floor_under = |water: f32, plate: f32, degrees: f64| {
         let floor = Mesh {
-            positions: vec![
-                vec3(-4.0, -1.0, 4.0),
-                vec3(4.0, -1.0, 4.0),
-                vec3(4.0, -1.0, -4.0),
-                vec3(-4.0, -1.0, -4.0),
-            ],
+            positions: vec![vec3(-4.0, -1.0, 4.0), vec3(4.0, -1.0, 4.0), vec3(4.0, -1.0, -4.0), vec3(-4.0, -1.0, -4.0)],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
         };
         let (low, high) = (vec3(-3.0, -1.0, -3.0), vec3(3.0, 0.0, 3.0));

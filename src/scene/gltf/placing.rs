@@ -1,6 +1,6 @@
 //! Meshes transformed to the world by their nodes, in f64 until the scene's centre is subtracted.
 
-use std::{collections::HashSet, ops::Range};
+use std::{collections::HashMap, ops::Range};
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 
@@ -68,8 +68,7 @@ pub(super) fn measure(instances: &[MeshInstance<'_>], bounds: &mut WorldBounds) 
 pub(super) type PlacedMesh = (Range<usize>, usize);
 
 /// All shown triangles relative to `center`, and which copies of meshes they are of. `material`
-/// maps the file's materials to the scene's. A mesh that nodes show twice in exactly one place is
-/// there once.
+/// maps the file's materials to the scene's.
 pub(super) fn place(
     instances: &[MeshInstance<'_>],
     center: DVec3,
@@ -85,17 +84,10 @@ pub(super) fn place(
         .map(|instance| instance.copies() * total(instance.primitives, |primitive| primitive.corners.len()))
         .sum();
     let mut triangles = Vec::with_capacity(kept);
-    let (mut meshes, mut known, mut repeated, mut left_out) = (Vec::new(), HashSet::new(), 0, 0);
+    let mut meshes = Vec::new();
     for instance in instances {
-        let is_rigid = instance.primitives.iter().all(|primitive| primitive.influences.is_empty());
         for i in 0..instance.copies() {
             let to_scene = DMat4::from_translation(-center) * instance.world(i)?;
-            let place = (instance.primitives.as_ptr(), to_scene.to_cols_array().map(f64::to_bits));
-            if is_rigid && !known.insert(place) {
-                repeated += 1;
-                left_out += total(instance.primitives, |primitive| primitive.claimed);
-                continue;
-            }
             let first = triangles.len();
             for primitive in instance.primitives {
                 let material = material(primitive.material);
@@ -108,14 +100,45 @@ pub(super) fn place(
             meshes.push((first..triangles.len(), instance.node));
         }
     }
-    if repeated > 0 {
-        notes.add(format!("{repeated} copies of meshes lie exactly where others do and are not drawn"));
-    }
-    let dropped = claimed - left_out - triangles.len();
+    let dropped = claimed - triangles.len();
     if dropped > 0 {
         notes.add(format!("{dropped} of {claimed} triangles have no area and are not drawn"));
     }
-    Ok((triangles, meshes))
+    Ok(without_copies(triangles, meshes, notes))
+}
+
+/// Leaves out meshes whose triangles all are those of an earlier one: the same lamp twice shines
+/// once, and no ray has to visit thousands of copies in one place.
+fn without_copies(
+    triangles: Vec<Triangle>,
+    meshes: Vec<PlacedMesh>,
+    notes: &mut Notes,
+) -> (Vec<Triangle>, Vec<PlacedMesh>) {
+    let corners = |triangle: &Triangle| triangle.positions.map(|p| p.to_array().map(f32::to_bits));
+    let mut known: HashMap<_, Vec<Range<usize>>> = HashMap::new();
+    let mut is_copy = |range: &Range<usize>| {
+        let own = &triangles[range.clone()];
+        let Some((first, last)) = own.first().zip(own.last()) else { return false };
+        let alike = known.entry((own.len(), corners(first), corners(last))).or_default();
+        let found = alike.iter().any(|other| triangles[other.clone()] == *own);
+        if !found {
+            alike.push(range.clone());
+        }
+        found
+    };
+    let copies: Vec<bool> = meshes.iter().map(|(range, _)| is_copy(range)).collect();
+    let count = copies.iter().filter(|copy| **copy).count();
+    if count == 0 {
+        return (triangles, meshes);
+    }
+    notes.add(format!("{count} copies of meshes lie exactly where others do and are not drawn"));
+    let (mut kept, mut ranges) = (Vec::new(), Vec::new());
+    for ((range, node), _) in meshes.into_iter().zip(copies).filter(|(_, copy)| !*copy) {
+        let first = kept.len();
+        kept.extend_from_slice(&triangles[range]);
+        ranges.push((first..kept.len(), node));
+    }
+    (kept, ranges)
 }
 
 fn total(primitives: &[MeshPrimitive], of: impl Fn(&MeshPrimitive) -> usize) -> usize {

@@ -1,0 +1,116 @@
+//! Splitting of large primitives whose boxes overlap, before the tree is built: long thin triangles
+//! that cross each other would let every ray visit most of them.
+//!
+//! The boxes, not the triangles, are split: a primitive is listed once for each of its boxes
+//! (Ernst and Greiner 2007, "Early Split Clipping for Bounding Volume Hierarchies").
+
+use std::collections::BinaryHeap;
+
+use glam::Vec3;
+use obvhs::splits::split_triangle;
+
+use super::build::bounds;
+use crate::{
+    layout::{Primitive, SPHERE_BIT},
+    scene::Bounds,
+};
+
+/// Boxes that a ray through the scene meets on average, at which splitting begins: the sum of the
+/// areas of all boxes over that of the box around them.
+const CROWDED: f32 = 500.0;
+/// Largest number of boxes of a primitive on average, and of all that splitting adds.
+const PIECES: usize = 32;
+const MAX_ADDED: usize = 2_000_000;
+
+/// A box of a primitive, ordered by area.
+struct Piece {
+    area: f32,
+    bounds: Bounds,
+    primitive: u32,
+}
+
+impl PartialEq for Piece {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Piece {}
+
+impl PartialOrd for Piece {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Piece {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.area.total_cmp(&other.area).then(other.primitive.cmp(&self.primitive))
+    }
+}
+
+/// The boxes of all primitives, each with the index of its primitive.
+pub(super) fn pieces(primitives: &[Primitive]) -> (Vec<Bounds>, Vec<u32>) {
+    let whole: Vec<Bounds> = primitives.iter().map(bounds).collect();
+    let all = whole.iter().copied().fold(Bounds::EMPTY, Bounds::union);
+    let crowd = whole.iter().map(half_area).sum::<f32>() / half_area(&all);
+    let mut indices: Vec<u32> = (0..primitives.len() as u32).collect();
+    if !crowd.is_finite() || crowd < CROWDED {
+        return (whole, indices);
+    }
+    let piece = |(bounds, primitive): (&Bounds, &u32)| Piece {
+        area: half_area(bounds),
+        bounds: *bounds,
+        primitive: *primitive,
+    };
+    let mut heap: BinaryHeap<Piece> = whole.iter().zip(&indices).map(piece).collect();
+    let most = whole.len() + (whole.len() * (PIECES - 1)).min(MAX_ADDED);
+    let mut done = Vec::new();
+    while heap.len() + done.len() < most {
+        let Some(largest) = heap.pop() else { break };
+        match halves(&largest, &primitives[largest.primitive as usize]) {
+            Some(halves) => heap.extend(halves),
+            None => done.push(largest),
+        }
+    }
+    done.extend(heap.into_vec());
+    // In the order of the primitives, so that the tree does not depend on that of the heap.
+    done.sort_by(|a, b| {
+        let corner = |piece: &Piece| piece.bounds.min.to_array().map(f32::to_bits);
+        a.primitive.cmp(&b.primitive).then_with(|| corner(a).cmp(&corner(b)))
+    });
+    indices.clear();
+    indices.extend(done.iter().map(|piece| piece.primitive));
+    (done.iter().map(|piece| piece.bounds).collect(), indices)
+}
+
+fn half_area(bounds: &Bounds) -> f32 {
+    let size = bounds.max - bounds.min;
+    size.x * size.y + size.y * size.z + size.z * size.x
+}
+
+/// The boxes of the parts of a triangle on both sides of the middle of its box; `None` where that
+/// gains nothing.
+fn halves(piece: &Piece, primitive: &Primitive) -> Option<[Piece; 2]> {
+    if primitive.material & SPHERE_BIT != 0 {
+        return None;
+    }
+    let size = piece.bounds.max - piece.bounds.min;
+    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+    let middle = 0.5 * (piece.bounds.min[axis] + piece.bounds.max[axis]);
+    let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(Vec3::from_array);
+    let corners = [v0, v0 + e1, v0 + e2, v0].map(Into::into);
+    let (low, high) = split_triangle(axis as u32, middle, corners);
+    let mut sides = [low, high].map(|side| {
+        let (min, max): (Vec3, Vec3) = (side.min.into(), side.max.into());
+        // Covers the rounding of the cut.
+        let slack = 4.0 * f32::EPSILON * min.abs().max(max.abs());
+        Bounds { min: (min - slack).max(piece.bounds.min), max: (max + slack).min(piece.bounds.max) }
+    });
+    sides[0].max[axis] = sides[0].max[axis].min(middle);
+    sides[1].min[axis] = sides[1].min[axis].max(middle);
+    let areas = sides.map(|side| half_area(&side));
+    let valid = sides.iter().all(|side| side.min.cmple(side.max).all());
+    let made = |i: usize| Piece { area: areas[i], bounds: sides[i], primitive: piece.primitive };
+    (valid && areas[0] + areas[1] < 0.9 * piece.area).then(|| [made(0), made(1)])
+}
