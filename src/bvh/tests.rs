@@ -188,7 +188,7 @@ fn needles(count: usize) -> Scene {
 
 #[test]
 fn crossing_needles_are_split_and_all_found() {
-    let scene = needles(1500);
+    let scene = needles(6000);
     let bvh = Bvh::build(&scene);
     assert!(bvh.primitives.len() > 10 * scene.triangles.len(), "{} pieces", bvh.primitives.len());
     let mut ids: Vec<u32> = bvh.primitives.iter().map(|p| p.id).collect();
