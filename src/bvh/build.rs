@@ -42,7 +42,7 @@ impl Bvh {
             primitive.id = id as u32;
         }
         primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
-        let (bounds, of_bounds) = split::pieces(&primitives);
+        let (bounds, of_bounds) = split::pieces(&primitives, primitives.iter().map(bounds).collect());
         let binary = convert::convert(&build_binary(&bounds), &bounds);
         let (nodes, order) = widen::widen(&binary);
         let normals = |primitive: &Primitive| {

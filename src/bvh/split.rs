@@ -9,7 +9,6 @@ use std::collections::BinaryHeap;
 use glam::Vec3;
 use obvhs::splits::split_triangle;
 
-use super::build::bounds;
 use crate::{
     layout::{Primitive, SPHERE_BIT},
     scene::Bounds,
@@ -49,9 +48,8 @@ impl Ord for Piece {
     }
 }
 
-/// The boxes of all primitives, each with the index of its primitive.
-pub(super) fn pieces(primitives: &[Primitive]) -> (Vec<Bounds>, Vec<u32>) {
-    let whole: Vec<Bounds> = primitives.iter().map(bounds).collect();
+/// The boxes of all primitives, whose whole boxes are given, each with the index of its primitive.
+pub(super) fn pieces(primitives: &[Primitive], whole: Vec<Bounds>) -> (Vec<Bounds>, Vec<u32>) {
     let all = whole.iter().copied().fold(Bounds::EMPTY, Bounds::union);
     let crowd = whole.iter().map(half_area).sum::<f32>() / half_area(&all);
     let mut indices: Vec<u32> = (0..primitives.len() as u32).collect();

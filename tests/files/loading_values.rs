@@ -11,7 +11,9 @@ fn read_as(material: Value) -> (Surface, Vec<String>) {
     let mut gltf = triangle();
     gltf["materials"][0] = material;
     let scene = loaded(&gltf);
-    (scene.materials[0].surface, scene.warnings)
+    // A triangle of glass is no solid, which another test looks at.
+    let warnings = scene.warnings.into_iter().filter(|line| !line.contains("its glass")).collect();
+    (scene.materials[0].surface, warnings)
 }
 
 #[test]

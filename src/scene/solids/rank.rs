@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 
-use super::{NO_SLOT, NONE, Solid};
+use super::solid::{NO_SLOT, NONE, Solid};
 use crate::scene::Bounds;
 
 /// Orientations in which boxes are measured, the axes' own first.
@@ -120,7 +120,7 @@ mod tests {
     fn solid(material: u32, center: f32, half: f32) -> Solid {
         let (center, half) = (Vec3::splat(center), Vec3::splat(half));
         let bounds = Bounds { min: center - half, max: center + half };
-        Solid { material, priority: 0, volume: f64::from(8.0 * half.x.powi(3)), bounds }
+        Solid { material, priority: 0, volume: f64::from(8.0 * half.x.powi(3)), bounds, is_cover: false }
     }
 
     #[test]

@@ -6,19 +6,26 @@ use std::{
 };
 
 use super::{
-    NONE, glass,
     shells::{Shell, Shells},
+    solid::{NONE, glass},
 };
-use crate::scene::{Material, Surface, Triangle};
+use glam::Vec3;
+
+use crate::scene::{Bounds, Material, Surface, Triangle};
 
 /// Part of the surface below which a hole of few edges counts as a missing triangle.
 const SMALL_HOLE: f64 = 0.05;
 /// Edges of the largest hole that counts as missing triangles.
 const HOLE_EDGES: usize = 6;
 
+/// Largest gap between the rim of a sheet and what it ends at, over the size of the sheet; and
+/// points of the rim that are looked at.
+const RIM_GAP: f32 = 0.01;
+const RIM_PROBES: usize = 64;
+
 /// The triangles of one copy of a mesh, as a node shows it.
 #[derive(Clone, Debug)]
-pub(in crate::scene) struct MeshRange {
+pub(crate) struct MeshRange {
     pub triangles: Range<usize>,
     /// Name for messages.
     pub name: String,
@@ -29,6 +36,7 @@ pub(in crate::scene) struct MeshRange {
 struct Faults {
     doubled: usize,
     open: usize,
+    covers: usize,
     turned: usize,
     holes: usize,
     t_junctions: usize,
@@ -37,7 +45,7 @@ struct Faults {
 /// Repairs the glass of a scene: doubled faces count once, open sheets become thin panes, and
 /// outermost shells with faces inwards are turned. Returns the solid of each triangle, as
 /// [`Scene::shells`](crate::scene::Scene::shells), and one warning for each mesh that is not clean.
-pub(in crate::scene) fn repair(
+pub(crate) fn repair(
     triangles: &mut Vec<Triangle>,
     materials: &mut Vec<Material>,
     meshes: &[MeshRange],
@@ -59,16 +67,27 @@ pub(in crate::scene) fn repair(
 
     let groups = groups(triangles, &mesh_of, &is_glass);
     let mut found = Shells::new(triangles, &groups);
+    // First halves of one glass, then parts of several.
+    found.join(triangles, |a, b| a == b);
+    found.join(triangles, |_, _| true);
     let mesh = |shell: &Shell| mesh_of[shell.triangles[0] as usize];
-    for shell in found.shells.iter().filter(|shell| is_sheet(shell)) {
+    let (sheets, solids): (Vec<Shell>, Vec<Shell>) = found.shells.into_iter().partition(is_sheet);
+    let (covers, sheets): (Vec<Shell>, Vec<Shell>) =
+        sheets.into_iter().partition(|shell| ends_at_opaque(shell, triangles, materials));
+    covers.iter().for_each(|shell| faults[mesh(shell)].covers += 1);
+    let covers = covers.into_iter().map(|shell| Shell { is_cover: true, ..shell });
+    found.shells = solids.into_iter().chain(covers).collect();
+    for shell in &sheets {
         faults[mesh(shell)].open += 1;
         let solid = triangles[shell.triangles[0] as usize].material;
         let pane = pane_of(materials, solid);
         shell.triangles.iter().for_each(|i| triangles[*i as usize].material = pane);
     }
-    found.shells.retain(|shell| !is_sheet(shell));
     for i in 0..found.shells.len() {
         let shell = &found.shells[i];
+        if shell.is_cover {
+            continue;
+        }
         let fault = &mut faults[mesh(shell)];
         fault.holes += usize::from(!shell.is_closed());
         fault.t_junctions += usize::from(shell.has_t_junctions);
@@ -96,11 +115,42 @@ fn is_sheet(shell: &Shell) -> bool {
     !(shell.is_closed() || shell.openness < SMALL_HOLE && shell.hole_edges <= HOLE_EDGES)
 }
 
+/// Whether a sheet ends at opaque surfaces all around, as the water of a pool does: no path comes
+/// past its rim.
+fn ends_at_opaque(shell: &Shell, triangles: &[Triangle], materials: &[Material]) -> bool {
+    let reach = RIM_GAP * shell.bounds.diagonal();
+    let near = |point: Vec3, triangle: &Triangle| {
+        let bounds = Bounds::from(triangle);
+        let is_opaque = matches!(materials[triangle.material as usize].surface, Surface::Diffuse { .. });
+        is_opaque
+            && point.cmpge(bounds.min - reach).all()
+            && point.cmple(bounds.max + reach).all()
+            && distance(point, triangle) <= reach
+    };
+    let step = (shell.rim.len() / RIM_PROBES).max(1);
+    !shell.rim.is_empty()
+        && shell.rim.iter().step_by(step).all(|point| triangles.iter().any(|triangle| near(*point, triangle)))
+}
+
+/// Distance of a point from a triangle (Ericson 2005, "Real-Time Collision Detection", 5.1.5).
+fn distance(point: Vec3, triangle: &Triangle) -> f32 {
+    let [a, b, c] = triangle.positions;
+    let along = |from: Vec3, to: Vec3| {
+        let edge = to - from;
+        let t = ((point - from).dot(edge) / edge.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (from + t * edge).distance(point)
+    };
+    let normal = (b - a).cross(c - a);
+    let inside = [(a, b), (b, c), (c, a)].iter().all(|(p, q)| (*q - *p).cross(point - *p).dot(normal) >= 0.0);
+    let plane = (point - a).dot(normal.normalize_or_zero()).abs();
+    if inside { plane } else { along(a, b).min(along(b, c)).min(along(c, a)) }
+}
+
 /// Which triangles to keep: of glass that lies in one place several times the first, whichever way
 /// its faces look.
 fn without_doubles(triangles: &[Triangle], mesh_of: &[usize], is_glass: &[bool], faults: &mut [Faults]) -> Vec<bool> {
     let corners = |triangle: &Triangle| {
-        let mut keys = triangle.positions.map(|p| (p + glam::Vec3::ZERO).to_array().map(f32::to_bits));
+        let mut keys = triangle.positions.map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
         keys.sort_unstable();
         keys
     };
@@ -168,13 +218,17 @@ fn turn(triangle: &mut Triangle) {
 
 fn warning(name: &str, faults: &Faults) -> Option<String> {
     let parts = [
-        (faults.doubled > 0, "has doubled faces, which count once".to_owned()),
-        (faults.open > 0, "is an open sheet, taken for a thin pane (a solid has to be closed)".to_owned()),
-        (faults.turned > 0, "is wound inside out and was turned".to_owned()),
-        (faults.holes > 0, "has holes, but is taken for a solid".to_owned()),
-        (faults.t_junctions > 0, "has T-junctions, but is taken for closed".to_owned()),
+        (faults.doubled > 0, "has doubled faces, which count once"),
+        (faults.open > 0, "is an open sheet, taken for a thin pane (a solid has to be closed)"),
+        (
+            faults.covers > 0,
+            "is an open sheet that ends at opaque surfaces, taken for the face of a solid that fills what lies behind",
+        ),
+        (faults.turned > 0, "is wound inside out and was turned"),
+        (faults.holes > 0, "has holes, but is taken for a solid"),
+        (faults.t_junctions > 0, "has T-junctions, but is taken for closed"),
     ];
-    let said: Vec<String> = parts.into_iter().filter(|(holds, _)| *holds).map(|(_, text)| text).collect();
+    let said: Vec<&str> = parts.into_iter().filter(|(holds, _)| *holds).map(|(_, text)| text).collect();
     (!said.is_empty()).then(|| format!("{name}: its glass {}", said.join("; ")))
 }
 

@@ -1,10 +1,10 @@
 //! Shells: connected parts of the surfaces of glass, and what they enclose.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, mem};
 
 use glam::{DVec3, Vec3};
 
-use super::NONE;
+use super::solid::{COVER_BIT, NONE};
 use crate::scene::{Bounds, Triangle};
 
 /// A connected part of a mesh: its triangles share vertices.
@@ -21,6 +21,10 @@ pub(super) struct Shell {
     pub hole_edges: usize,
     /// Faces meet along parts of edges.
     pub has_t_junctions: bool,
+    /// Vertices at holes.
+    pub rim: Vec<Vec3>,
+    /// An open sheet that ends at opaque surfaces, and stands for a solid behind it.
+    pub is_cover: bool,
 }
 
 /// The shells of several meshes.
@@ -43,6 +47,29 @@ impl Shells {
         found
     }
 
+    /// Joins open shells that share vertices: halves of a solid that are meshes of their own. Those
+    /// that are closed together replace their parts; `alike` tells which materials may meet.
+    pub(super) fn join(&mut self, triangles: &[Triangle], alike: impl Fn(u32, u32) -> bool) {
+        let (closed, open): (Vec<Shell>, Vec<Shell>) =
+            mem::take(&mut self.shells).into_iter().partition(Shell::is_closed);
+        self.shells = closed;
+        let mut left: Vec<Vec<u32>> = open.iter().map(|shell| shell.triangles.clone()).collect();
+        while let Some(first) = left.first().map(|part| triangles[part[0] as usize].material) {
+            let (group, rest): (Vec<_>, Vec<_>) =
+                left.into_iter().partition(|part| alike(first, triangles[part[0] as usize].material));
+            left = rest;
+            for part in connected(triangles, &group.concat()) {
+                let whole = measure(triangles, part);
+                if whole.is_closed() {
+                    self.shells.push(whole);
+                } else {
+                    let is_part = |shell: &&Shell| whole.triangles.contains(&shell.triangles[0]);
+                    self.shells.extend(open.iter().filter(is_part).cloned());
+                }
+            }
+        }
+    }
+
     /// The shells of scenes that no file describes: a group for each material of glass.
     pub(super) fn of_materials(triangles: &[Triangle], is_glass: &[bool]) -> Self {
         let mut groups = vec![Vec::new(); is_glass.len()];
@@ -56,8 +83,12 @@ impl Shells {
     pub(super) fn solids(&self, triangles: &[Triangle]) -> Vec<u32> {
         let mut of = vec![NONE; self.triangles];
         for (i, shell) in self.shells.iter().enumerate() {
-            let solid = if shell.volume < 0.0 { self.around(triangles, shell).unwrap_or(i) } else { i };
-            shell.triangles.iter().for_each(|triangle| of[*triangle as usize] = solid as u32);
+            let solid = match shell.is_cover {
+                true => i as u32 | COVER_BIT,
+                false if shell.volume < 0.0 => self.around(triangles, shell).unwrap_or(i) as u32,
+                false => i as u32,
+            };
+            shell.triangles.iter().for_each(|triangle| of[*triangle as usize] = solid);
         }
         of
     }
@@ -66,7 +97,8 @@ impl Shells {
     pub(super) fn around(&self, triangles: &[Triangle], inner: &Shell) -> Option<usize> {
         let corner = triangles[inner.triangles[0] as usize].positions[0];
         let outer = self.shells.iter().enumerate().filter(|(_, shell)| {
-            shell.volume > inner.volume.abs()
+            !shell.is_cover
+                && shell.volume > inner.volume.abs()
                 && shell.bounds.min.cmple(corner).all()
                 && shell.bounds.max.cmpge(corner).all()
                 && winding(triangles, shell, corner.as_dvec3()) > 0.5
@@ -161,6 +193,8 @@ fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
     }
     let open: Vec<_> = edges.into_iter().filter(|(_, (count, ..))| *count != 0).collect();
     let loops = boundary(&open);
+    let rim =
+        open.iter().flat_map(|((p, q), _)| [*p, *q].map(|bits| Vec3::from_array(bits.map(f32::from_bits)))).collect();
     let missing: f64 = loops.iter().map(|(vector, _)| vector.length()).sum();
     Shell {
         triangles: part,
@@ -169,6 +203,8 @@ fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
         openness: missing / area.max(f64::MIN_POSITIVE),
         hole_edges: loops.iter().filter(|(v, _)| v.length() > CLOSED * area).map(|(_, n)| *n).max().unwrap_or(0),
         has_t_junctions: !open.is_empty() && loops.iter().any(|(v, _)| v.length() <= CLOSED * area),
+        rim,
+        is_cover: false,
     }
 }
 
