@@ -419,8 +419,14 @@ pub struct CameraTile {
     pub filter_steps: u32,
     /// Samples in the tile's margin: they follow those of its pixels.
     pub margin: u32,
-    /// Media around the lens, as in [`Light::media`].
+    /// Media around the lens, as in [`Light::media`]; around the rays' start if that lies elsewhere.
     pub media: [u32; MEDIA_DEPTH],
+    /// Depths along the axis between which the camera sees, metres.
+    pub near_depth: f32,
+    pub far_depth: f32,
+    /// Depth at which parallel rays start, metres, at most 0.
+    pub start_depth: f32,
+    pub pad: u32,
 }
 
 /// What the first ray of a camera sample hit.

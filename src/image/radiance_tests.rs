@@ -105,8 +105,7 @@ fn radiance_files_of_either_signature_are_read() {
 fn all_eight_orientations_are_the_same_picture() {
     // Three columns and two rows: red is the column plus one, green the row plus one.
     let pixel = |x: u8, y: u8| [64 * (x + 1), 64 * (y + 1), 0, 130];
-    let expected: Vec<[f32; 3]> =
-        (0..6).map(|i| [f32::from(i % 3 + 1_u8), f32::from(i / 3 + 1), 0.0]).collect();
+    let expected: Vec<[f32; 3]> = (0..6).map(|i| [f32::from(i % 3 + 1_u8), f32::from(i / 3 + 1), 0.0]).collect();
     let file = |sizes: &str, places: [(u8, u8); 6]| {
         let pixels = places.map(|(x, y)| pixel(x, y));
         [format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{sizes}\n").as_bytes(), pixels.as_flattened()].concat()

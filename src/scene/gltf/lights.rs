@@ -88,6 +88,8 @@ fn spot(spot: Option<&Spot>, name: &str, place: &str, notes: &mut Notes) -> Read
     }
     // The specification requires an inner angle below the outer one, but exporters write equal ones
     // for an edge without falloff, and angles that were edited one by one.
-    notes.add(format!("light {name:?}: inner cone angle {inner} is not below the outer, {outer}: an edge without falloff"));
+    notes.add(format!(
+        "light {name:?}: inner cone angle {inner} is not below the outer, {outer}: an edge without falloff"
+    ));
     Ok(LightKind::Spot { inner: outer.next_down(), outer })
 }

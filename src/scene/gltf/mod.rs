@@ -93,8 +93,8 @@ fn assemble(
     let shapes = meshes::check(&document, &mut notes)?;
 
     let worlds = nodes::worlds(root)?;
-    let placed = nodes::flatten(root, chosen, &worlds)?;
-    let cache = MeshCache::read(&document, &placed, &shapes, &worlds, &mut notes)?;
+    let placed = nodes::flatten(root, chosen, &worlds, &mut notes)?;
+    let cache = MeshCache::read(&document, &placed.shown, &shapes, &worlds, &mut notes)?;
     let instances = cache.instances();
     let contents = NodeContents::read(root, &placed, &mut notes)?;
     let mut bounds = WorldBounds::EMPTY;
@@ -158,12 +158,14 @@ struct NodeContents {
 }
 
 impl NodeContents {
-    fn read(root: &json::Root, placed: &[nodes::PlacedNode], notes: &mut Notes) -> Read<Self> {
+    fn read(root: &json::Root, placed: &nodes::PlacedNodes, notes: &mut Notes) -> Read<Self> {
         let mut contents = Self::default();
-        for placed in placed {
+        for placed in &placed.shown {
             contents.lights.extend(lights::read(root, placed, notes)?);
-            contents.cameras.extend(cameras::read(root, placed)?);
             contents.spheres.extend(spheres::read(root, placed, notes)?);
+        }
+        for placed in &placed.cameras {
+            contents.cameras.extend(cameras::read(root, placed, notes)?);
         }
         contents.cameras.sort_by_key(|(index, ..)| *index);
         Ok(contents)
