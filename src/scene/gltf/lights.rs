@@ -19,7 +19,7 @@ const ROUNDED_RIGHT_ANGLE: f32 = 1.01 * FRAC_PI_2;
 /// A light and its world position; a directional light has none.
 pub(super) type PlacedLight = (Option<DVec3>, Light);
 
-/// Light of a node, unless it is dark.
+/// Light of a node, which may have no intensity.
 pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) -> Read<Option<PlacedLight>> {
     let node = &root.nodes[placed.node];
     let Some(reference) = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref())
@@ -50,7 +50,8 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
     }
     if intensity == Vec3::ZERO {
         notes.add(format!("light {name:?} has no intensity"));
-        return Ok(None);
+        let dark = Light { name, kind: LightKind::Point, position: Vec3::ZERO, direction: Vec3::NEG_Z, intensity };
+        return Ok(Some((None, dark)));
     }
     if light.range.is_some() {
         notes.add("the range of lights is not read: they reach everywhere");

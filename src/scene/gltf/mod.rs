@@ -143,7 +143,10 @@ fn read_materials(
             scene.materials.push(materials::default_material(notes)?);
             continue;
         }
-        scene.materials.push(materials::read(root, i, notes)?);
+        let material = materials::read(root, i, notes)?;
+        let emits = root.materials[i].emissive_factor.0 != [0.0; 3];
+        scene.names_dark_light |= emits && material.emission == Vec3::ZERO;
+        scene.materials.push(material);
     }
     Ok(slots)
 }
@@ -152,6 +155,8 @@ fn read_materials(
 #[derive(Default)]
 struct NodeContents {
     lights: Vec<PlacedLight>,
+    /// A light of intensity 0 is among the nodes.
+    names_dark_light: bool,
     /// With the index in the file, which determines their order.
     cameras: Vec<(usize, DVec3, Camera)>,
     spheres: Vec<PlacedSphere>,
@@ -161,7 +166,9 @@ impl NodeContents {
     fn read(root: &json::Root, placed: &nodes::PlacedNodes, notes: &mut Notes) -> Read<Self> {
         let mut contents = Self::default();
         for placed in &placed.shown {
-            contents.lights.extend(lights::read(root, placed, notes)?);
+            let light = lights::read(root, placed, notes)?;
+            contents.names_dark_light |= light.as_ref().is_some_and(|(_, light)| light.intensity == Vec3::ZERO);
+            contents.lights.extend(light.filter(|(_, light)| light.intensity != Vec3::ZERO));
             contents.spheres.extend(spheres::read(root, placed, notes)?);
         }
         for placed in &placed.cameras {
@@ -176,6 +183,7 @@ impl NodeContents {
         let center = scene.center;
         let at = |position: DVec3| (position - center).as_vec3();
         let light = |(p, light): PlacedLight| Light { position: p.map_or(Vec3::ZERO, at), ..light };
+        scene.names_dark_light |= self.names_dark_light;
         scene.lights = self.lights.into_iter().map(light).collect();
         scene.cameras = self.cameras.into_iter().map(|(_, p, camera)| Camera { position: at(p), ..camera }).collect();
         if scene.cameras.is_empty() {
