@@ -1,6 +1,8 @@
 //! What a file says of what is seen: hidden nodes, clipping planes, mirrored cameras, dark lights.
 
-use caustica::scene::Camera;
+use std::path::Path;
+
+use caustica::scene::{Camera, Environment};
 use glam::Vec3;
 use serde_json::{Value, json};
 use support::gltf::{loaded, message, triangle};
@@ -133,5 +135,31 @@ fn clipping_planes_are_read() {
         assert_eq!(planes, (0.0, endless));
         let said = format!("camera \"view\": zfar {far} is not beyond znear {near}: nothing is clipped");
         assert_eq!(notes, [said]);
+    }
+}
+
+#[test]
+fn environments_may_be_held_in_any_of_eight_orders() {
+    // Four columns and three rows, each pixel of its own colour.
+    let pixel = |x: u8, y: u8| [40 * (x + 1), 60 * (y + 1), 200, 129];
+    let read = |sizes: &str, places: &[(u8, u8)]| {
+        let pixels: Vec<u8> = places.iter().flat_map(|(x, y)| pixel(*x, *y)).collect();
+        let bytes = [format!("#?RADIANCE\n\n{sizes}\n").as_bytes(), &pixels].concat();
+        Environment::from_bytes(&bytes, Path::new("sky.hdr"), 1.0, 0.0).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let order = |count: u8, backward: bool| (0..count).map(move |i| if backward { count - 1 - i } else { i });
+    let from_left: Vec<(u8, u8)> = (0..12).map(|i| (i % 4, i / 4)).collect();
+    let usual = read("-Y 3 +X 4", &from_left);
+    assert_eq!((usual.width, usual.height), (4, 3));
+    for (from_right, from_bottom) in [(false, false), (false, true), (true, false), (true, true)] {
+        let (x, y) = (if from_right { "-X 4" } else { "+X 4" }, if from_bottom { "+Y 3" } else { "-Y 3" });
+        let rows: Vec<_> = order(3, from_bottom).flat_map(|y| order(4, from_right).map(move |x| (x, y))).collect();
+        let columns: Vec<_> = order(4, from_right).flat_map(|x| order(3, from_bottom).map(move |y| (x, y))).collect();
+        for (sizes, places) in [(format!("{y} {x}"), &rows), (format!("{x} {y}"), &columns)] {
+            let turned = read(&sizes, places);
+            assert_eq!((turned.width, turned.height, &turned.pixels), (4, 3, &usual.pixels), "{sizes}");
+            let control = read("-Y 3 +X 4", places);
+            assert_eq!(control.pixels == usual.pixels, sizes == "-Y 3 +X 4", "control: {sizes}");
+        }
     }
 }

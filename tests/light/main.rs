@@ -8,3 +8,4 @@ mod modes;
 mod pixels;
 mod references;
 mod refraction;
+mod seen;
