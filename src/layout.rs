@@ -419,7 +419,7 @@ pub struct CameraTile {
     pub filter_steps: u32,
     /// Samples in the tile's margin: they follow those of its pixels.
     pub margin: u32,
-    /// Media around the lens, as in [`Light::media`]; around the rays' start if that lies elsewhere.
+    /// Media around the start of the rays, as in [`Light::media`].
     pub media: [u32; MEDIA_DEPTH],
     /// Depths along the axis between which the camera sees, metres.
     pub near_depth: f32,

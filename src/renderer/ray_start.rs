@@ -12,8 +12,8 @@ use crate::{
     scene::{Camera, MediaTable, Projection, Scene},
 };
 
-/// Pixels by which rays reach beyond the picture at most: those of pixel filters, and of the margins
-/// of tiles.
+/// Pixels by which rays reach beyond the picture at most: those of pixel filters, and of the
+/// margins of tiles.
 const BEYOND_PICTURE: f32 = 16.0;
 
 /// Start of a camera's rays.

@@ -125,6 +125,9 @@ fn clipping_planes_are_read() {
     let endless = f32::INFINITY;
     assert_eq!(perspective(json!({ "znear": 0.5 })), ((0.5, endless), vec![]));
     assert_eq!(perspective(json!({ "znear": 0.5, "zfar": 4 })), ((0.5, 4.0), vec![]));
+    // The triangle lies 3 m before the camera.
+    let said = r#"camera "view": sees to zfar, 2 m; the scene reaches to 3 m"#.to_owned();
+    assert_eq!(perspective(json!({ "znear": 0.5, "zfar": 2 })), ((0.5, 2.0), vec![said]));
     assert_eq!(perspective(json!({ "znear": 0 })), ((0.0, endless), vec![]));
     assert_eq!(perspective(json!({ "znear": -2 })), ((0.0, endless), vec![]), "nothing lies behind the eye");
     assert_eq!(orthographic(0.0, 9.0), ((0.0, 9.0), vec![]));

@@ -9,7 +9,7 @@ use json::validation::Checked;
 
 use super::fault::{Notes, Read, fault};
 use super::nodes::PlacedNode;
-use crate::scene::{Camera, Projection};
+use crate::scene::{Bounds, Camera, Projection};
 
 /// Camera of a node, with its index in the file and its world position.
 pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) -> Read<Option<(usize, DVec3, Camera)>> {
@@ -56,7 +56,8 @@ fn clipping(camera: &json::Camera, name: &str, notes: &mut Notes) -> [f32; 2] {
     [0.0, f32::INFINITY]
 }
 
-/// Whether a camera mirrors the picture left to right, and upside down, by a negative magnification.
+/// Whether a camera mirrors the picture left to right, and upside down, by a negative
+/// magnification.
 fn mirrored(camera: &json::Camera, name: &str, notes: &mut Notes) -> [bool; 2] {
     let orthographic = camera.orthographic.as_ref().filter(|_| camera.type_ == Checked::Valid(Type::Orthographic));
     let mirrored = orthographic.map_or([false; 2], |view| [view.xmag < 0.0, view.ymag < 0.0]);
@@ -68,6 +69,18 @@ fn mirrored(camera: &json::Camera, name: &str, notes: &mut Notes) -> [bool; 2] {
     };
     notes.add(format!("camera {name:?}: a negative magnification mirrors the picture, {ways}"));
     mirrored
+}
+
+/// Notes where the view of a camera ends before the scene does.
+pub(super) fn note_end(camera: &Camera, bounds: Bounds, notes: &mut Notes) {
+    let depth = |i: usize| {
+        let corner = Vec3::from_array([0, 1, 2].map(|k| if i >> k & 1 == 0 { bounds.min[k] } else { bounds.max[k] }));
+        (corner - camera.position).dot(camera.forward)
+    };
+    let end = (0..8).map(depth).fold(f32::NEG_INFINITY, f32::max);
+    if end > 1.001 * camera.far {
+        notes.add(format!("camera {:?}: sees to zfar, {} m; the scene reaches to {end} m", camera.name, camera.far));
+    }
 }
 
 /// Projection of the camera at JSON path `place`, and the aspect ratio (width over height) if the

@@ -186,8 +186,9 @@ impl NodeContents {
         scene.names_dark_light |= self.names_dark_light;
         scene.lights = self.lights.into_iter().map(light).collect();
         scene.cameras = self.cameras.into_iter().map(|(_, p, camera)| Camera { position: at(p), ..camera }).collect();
+        let bounds = scene.bounds();
+        scene.cameras.iter().for_each(|camera| cameras::note_end(camera, bounds, notes));
         if scene.cameras.is_empty() {
-            let bounds = scene.bounds();
             if bounds != Bounds::EMPTY {
                 notes.add("no camera: one is made that frames the whole scene");
             }
