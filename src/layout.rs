@@ -450,8 +450,14 @@ pub struct CameraTile {
     pub filter_steps: u32,
     /// Samples in the tile's margin. They follow those of its pixels.
     pub margin: u32,
-    /// Media around the lens, as in [`Light::media`].
+    /// Media around the start of the rays, as in [`Light::media`].
     pub media: [u32; MEDIA_WORDS],
+    /// Depths along the axis between which the camera sees, metres.
+    pub near_depth: f32,
+    pub far_depth: f32,
+    /// Depth at which parallel rays start, metres, at most 0.
+    pub start_depth: f32,
+    pub pad: u32,
 }
 
 /// First hit of a camera sample.

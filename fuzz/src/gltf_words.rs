@@ -16,5 +16,5 @@
     "KHR_mesh_quantization", "KHR_texture_transform", "KHR_implicit_shapes", "shapes", "shape", "sphere", "radius",
     "EXT_mesh_gpu_instancing", "TRANSLATION", "ROTATION", "SCALE", "EXT_meshopt_compression", "KHR_meshopt_compression",
     "filter", "ATTRIBUTES", "TRIANGLES", "INDICES", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "KHR_draco_mesh_compression",
-    "MSFT_lod", "data:application/octet-stream;base64,AAAA", "data:,", "a.bin", "../a.bin", "/etc/hostname", "file:///a",
+    "KHR_node_visibility", "visible", "MSFT_lod", "data:application/octet-stream;base64,AAAA", "data:,", "a.bin", "../a.bin", "/etc/hostname", "file:///a",
 ]

@@ -20,7 +20,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     layout::{self, LightChoice},
-    scene::{LUMENS_PER_WATT, LightKind, MIN_FALLOFF, Scene},
+    scene::{LUMENS_PER_WATT, LightKind, Scene, spot_heights},
     settings::{LightSampling, LightSettings, LightUnit},
 };
 
@@ -171,9 +171,9 @@ impl LightTable {
         let (kind, name, e2) = match light.kind {
             LightKind::Point => (layout::POINT_LIGHT, "point", Vec3::ZERO),
             LightKind::Spot { inner, outer } => {
-                let height = 1.0 - f64::from(outer).cos();
-                let width = (f64::from(inner).cos() - f64::from(outer).cos()).max(f64::from(MIN_FALLOFF));
-                (layout::SPOT_LIGHT, "spot", Vec3::new(height as f32, width as f32, 0.0))
+                // The falloff divides by its width.
+                let [height, width] = spot_heights(inner, outer).map(|x| (x as f32).max(f32::MIN_POSITIVE));
+                (layout::SPOT_LIGHT, "spot", Vec3::new(height, width, 0.0))
             }
             LightKind::Directional => (layout::DIRECTIONAL_LIGHT, "directional", Vec3::ZERO),
         };

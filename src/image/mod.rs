@@ -9,6 +9,7 @@ pub mod film;
 pub mod flip;
 mod frame;
 pub mod layers;
+mod orientation;
 mod png;
 mod radiance;
 mod tonemap;

@@ -12,7 +12,10 @@ use exr::{
 };
 use image::{ImageDecoder, ImageError, codecs::hdr::HdrDecoder};
 
-use super::file::open_regular;
+use super::{
+    file::open_regular,
+    orientation::{Orientation, size_line},
+};
 use crate::error::{Error, Result};
 
 /// Size limit of a file, bytes: above the size of the largest picture uncompressed.
@@ -117,13 +120,20 @@ fn exr_problem(error: exr::error::Error) -> Problem {
 }
 
 fn decode_hdr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
+    // The decoder knows one orientation. It is given the same scanlines under a line of sizes that
+    // says that one.
+    let end = bytes.len();
+    let (line, orientation, usual) = size_line(bytes).unwrap_or((end..end, Orientation::USUAL, String::new()));
+    let reader = bytes[..line.start].chain(usual.as_bytes()).chain(&bytes[line.end..]);
     // The strict decoder accepts only one of the signatures in use; this one accepts any.
-    let decoder = HdrDecoder::new_nonstrict(Cursor::new(bytes)).map_err(hdr_problem)?;
+    let decoder = HdrDecoder::new_nonstrict(reader).map_err(hdr_problem)?;
     let exposure = decoder.metadata().exposure.unwrap_or(1.0);
-    let (width, height) = decoder.dimensions();
-    let (width, height) = checked_size(width.into(), height.into(), bytes.len())?;
-    let mut pixels = vec![[0.0; 3]; width as usize * height as usize];
+    let (along, across) = decoder.dimensions();
+    let (along, across) = checked_size(along.into(), across.into(), bytes.len())?;
+    let mut pixels = vec![[0.0; 3]; along as usize * across as usize];
     decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(hdr_problem)?;
+    let (pixels, (width, height)) = orientation.turned(pixels, (along as usize, across as usize));
+    let (width, height) = (width as u32, height as u32);
     let note = format!("its EXPOSURE of {exposure} is not undone, as in other renderers");
     Ok(RadiancePicture { width, height, pixels, notes: Vec::from_iter((exposure != 1.0).then_some(note)) })
 }

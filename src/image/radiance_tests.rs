@@ -102,6 +102,41 @@ fn radiance_files_of_either_signature_are_read() {
 }
 
 #[test]
+fn all_eight_orientations_are_the_same_picture() {
+    // Three columns and two rows: red is the column plus one, green the row plus one.
+    let pixel = |x: u8, y: u8| [64 * (x + 1), 64 * (y + 1), 0, 130];
+    let expected: Vec<[f32; 3]> = (0..6).map(|i| [f32::from(i % 3 + 1_u8), f32::from(i / 3 + 1), 0.0]).collect();
+    let file = |sizes: &str, places: [(u8, u8); 6]| {
+        let pixels = places.map(|(x, y)| pixel(x, y));
+        [format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{sizes}\n").as_bytes(), pixels.as_flattened()].concat()
+    };
+    let cases = [
+        ("-Y 2 +X 3", [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)]),
+        ("+Y 2 +X 3", [(0, 1), (1, 1), (2, 1), (0, 0), (1, 0), (2, 0)]),
+        ("-Y 2 -X 3", [(2, 0), (1, 0), (0, 0), (2, 1), (1, 1), (0, 1)]),
+        ("+Y 2 -X 3", [(2, 1), (1, 1), (0, 1), (2, 0), (1, 0), (0, 0)]),
+        ("+X 3 -Y 2", [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)]),
+        ("+X 3 +Y 2", [(0, 1), (0, 0), (1, 1), (1, 0), (2, 1), (2, 0)]),
+        ("-X 3 -Y 2", [(2, 0), (2, 1), (1, 0), (1, 1), (0, 0), (0, 1)]),
+        ("-X 3 +Y 2", [(2, 1), (2, 0), (1, 1), (1, 0), (0, 1), (0, 0)]),
+    ];
+    for (sizes, places) in cases {
+        let picture = decoded(&file(sizes, places));
+        assert_eq!((picture.width, picture.height), (3, 2), "{sizes}");
+        assert_eq!(picture.pixels, expected, "{sizes}");
+        let unturned = decoded(&file("-Y 2 +X 3", places)).pixels == expected;
+        assert_eq!(unturned, sizes == "-Y 2 +X 3", "control: {sizes}");
+    }
+    // Scanlines of the transposed ones are compressed along their own axis.
+    let run = |value: u8| [136, value];
+    let column = |r: u8, g: u8| [&[2, 2, 0, 8][..], &run(r), &run(g), &run(0), &run(129)].concat();
+    let bytes = [&b"#?RADIANCE\n\n-X 2 +Y 8\n"[..], &column(128, 64), &column(64, 0)].concat();
+    let picture = decoded(&bytes);
+    assert_eq!((picture.width, picture.height), (2, 8));
+    assert_eq!(picture.pixels, [[0.5, 0.0, 0.0], [1.0, 0.5, 0.0]].repeat(8));
+}
+
+#[test]
 fn invalid_radiance_is_repaired_and_noted() {
     let (inf, nan) = (f32::INFINITY, f32::NAN);
     let bytes =
@@ -151,9 +186,14 @@ fn what_cannot_be_read_is_one_line() {
         ),
         (b"#?RADIANCE\n".to_vec(), "is damaged: Format error decoding Hdr: EOF in header"),
         (
-            b"#?RADIANCE\n\n+X 2 -Y 2\n".to_vec(),
-            "cannot be read: The decoder for Hdr does not support the format features Orientation +X -Y",
+            b"#?RADIANCE\n\n+X 2 -X 2\n".to_vec(),
+            "cannot be read: The decoder for Hdr does not support the format features Orientation +X -X",
         ),
+        (
+            b"#?RADIANCE\n\n*Y 2 +X 2\n".to_vec(),
+            "cannot be read: The decoder for Hdr does not support the format features Orientation *Y +X",
+        ),
+        (b"#?RADIANCE\n\n+X 2 -Y 2\n".to_vec(), "is damaged: it ends too early"),
         (
             b"#?RADIANCE\n\n-Y two +X 2\n".to_vec(),
             "is damaged: Format error decoding Hdr: Cannot parse height dimension value as u32: invalid digit found in \

@@ -48,8 +48,9 @@ impl Wavefront {
         })
     }
 
-    /// Starts paths by `start` in that many invocations, then advances them by `step` until none is
-    /// left or each has hit `most_surfaces` surfaces. At most `most_paths` paths live at once.
+    /// Starts paths by `start` in that many invocations, then moves them on by `step` until none is
+    /// left or each has met the second number of surfaces; few are expected to meet more than the
+    /// first. At most `most_paths` live at once.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -60,7 +61,7 @@ impl Wavefront {
         (start, invocations): (&Step, u64),
         step: &Step,
         most_paths: u64,
-        most_surfaces: u32,
+        (expected_surfaces, most_surfaces): (u32, u32),
     ) -> Result<Counters> {
         let bind = |bound: &Step, input: usize| bound.kernel.bind(gpu, &self.bindings(scene, bound.buffers, input));
         let advance = self.advance.bind(gpu, &self.bindings(scene, &[], 0));
@@ -70,7 +71,8 @@ impl Wavefront {
         start.kernel.dispatch(&mut encoder, &bind(start, 1), invocations);
         let mut surfaces = 0;
         loop {
-            for _ in 0..SURFACES_PER_SUBMISSION.min(most_surfaces - surfaces) {
+            let until = if surfaces < expected_surfaces { expected_surfaces } else { most_surfaces };
+            for _ in 0..SURFACES_PER_SUBMISSION.min(until - surfaces) {
                 self.advance.dispatch(&mut encoder, &advance, 1);
                 let bindings = &steps[(surfaces % 2) as usize];
                 step.kernel.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most_paths);

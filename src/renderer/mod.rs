@@ -5,6 +5,7 @@
 
 mod gatherer;
 mod maps;
+mod ray_start;
 mod render;
 mod session;
 mod size;

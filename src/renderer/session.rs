@@ -154,7 +154,8 @@ impl<'a> Session<'a> {
         check_samples(maps.settings(), picture)?;
         let number = self.scene.camera_number(picture.camera.as_deref())?;
         let camera = (&self.scene.cameras[number], self.camera_media[number]);
-        let pass = CameraPass::new(self.gpu, &self.buffers, camera, maps.settings(), estimate, picture)?;
+        let scene = (self.scene, &self.buffers);
+        let pass = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, picture)?;
         let mut stats = maps.stats().clone();
         let films = pass.render(gatherer, stage, &mut stats, progress)?;
         Ok((films, stats))

@@ -1,6 +1,6 @@
 //! Second pass: the one loop over the tiles of a picture.
 
-use super::{size::picture_size, tally};
+use super::{ray_start::ray_start, size::picture_size, tally};
 use crate::{
     bvh::Media,
     error::Result,
@@ -8,7 +8,7 @@ use crate::{
     image::Film,
     passes::{CameraTracer, FinalGather, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
-    scene::Camera,
+    scene::{Camera, Scene},
     settings::{Crop, EstimateSettings, PhotonSettings, PictureSettings},
     stats::{Stats, timed},
     upload::SceneBuffers,
@@ -46,10 +46,10 @@ pub(crate) struct CameraPass<'a> {
 }
 
 impl<'a> CameraPass<'a> {
-    /// Creates the pass. Rays start inside of `media`, the media around the centre of the camera.
+    /// `media` are those around the middle of the camera; `geometry` is the scene in the buffers.
     pub fn new(
         gpu: &'a Gpu,
-        scene: &'a SceneBuffers,
+        (geometry, scene): (&Scene, &'a SceneBuffers),
         (camera, media): (&Camera, Media),
         photons: &PhotonSettings,
         estimate: &EstimateSettings,
@@ -57,7 +57,9 @@ impl<'a> CameraPass<'a> {
     ) -> Result<Self> {
         let size = picture_size(camera, picture)?;
         let shares = estimate.share_reach > 0.0 && photons.mode.traces_photons();
-        let tracer = CameraTracer::new(gpu, scene, (camera, media), size, photons, picture, shares)?;
+        let start = ray_start((geometry, &scene.solids), (camera, media), size);
+        let tracer = CameraTracer::new(gpu, scene, (camera, start.media), size, photons, picture, shares)?;
+        let tracer = if start.depth < 0.0 { tracer.starting_at(start.depth) } else { tracer };
         let rays = Some(photons.final_gather).filter(|rays| *rays > 0);
         let final_gather = rays.map(|rays| FinalGather::new(gpu, scene, &tracer, photons.sampler, rays));
         Ok(Self {

@@ -49,6 +49,12 @@ pub struct Camera {
     pub projection: Projection,
     /// Aspect ratio, width over height, if the file gives one.
     pub aspect: Option<f32>,
+    /// Depth along the viewing direction at which the view begins, metres: nearer surfaces are not
+    /// seen, but take part in the light. 0 for none of a perspective camera; that of an
+    /// orthographic one may be below 0.
+    pub near: f32,
+    /// Depth at which the view ends, metres, > `near`; infinite for none.
+    pub far: f32,
     /// Keeps the horizontal field of view of a square picture if the picture is higher than wide,
     /// so that nothing is cut off at the sides.
     pub keeps_width: bool,
@@ -92,6 +98,8 @@ impl Camera {
             forward: -back,
             projection: Projection::Perspective { yfov },
             aspect: None,
+            near: 0.0,
+            far: f32::INFINITY,
             keeps_width: true,
         }
     }

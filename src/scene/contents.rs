@@ -36,6 +36,9 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Punctual lights.
     pub lights: Vec<Light>,
+    /// Whether the file names a light that gives none: a punctual light of intensity 0, or the
+    /// emissive material of a surface with strength 0. Such a scene is dark, not without a light.
+    pub names_dark_light: bool,
     /// Environment light, infinitely far away.
     pub environment: Option<Environment>,
     /// Never empty after [`Scene::load`]: a file without cameras gets one that frames the scene.
@@ -88,10 +91,15 @@ impl Scene {
             || self.spheres.iter().any(|sphere| satisfies(sphere.material))
     }
 
+    /// Whether the scene names a light, dark or not.
+    fn names_light(&self) -> bool {
+        !self.lights.is_empty() || self.has_emission() || self.environment.is_some() || self.names_dark_light
+    }
+
     /// Adds a soft uniform sky ([`Environment::sky`]) to a scene without any light, and a warning.
-    /// A scene with an environment keeps it, dark or not.
+    /// A scene with a light or an environment keeps it, dark or not.
     pub fn add_default_light(&mut self) {
-        if self.lights.is_empty() && !self.has_emission() && self.environment.is_none() {
+        if !self.names_light() {
             self.environment = Some(Environment::sky());
             self.warnings.push("no light: lit by a uniform sky of radiance 1".to_owned());
         }
@@ -143,7 +151,7 @@ impl Scene {
         })
     }
 
-    /// Checks that the scene has geometry and light.
+    /// Checks that the scene has geometry, and names a light; the light may be dark.
     ///
     /// # Errors
     /// [`Error::Scene`], which names what is missing.
@@ -155,8 +163,7 @@ impl Scene {
                 if self.warnings.is_empty() { String::new() } else { format!(" ({})", self.warnings.join("; ")) };
             return Err(error("scene", format!("nothing to draw: it holds no triangle and no sphere{notes}")));
         }
-        if self.lights.is_empty() && !self.has_emission() && self.environment.as_ref().is_none_or(Environment::is_dark)
-        {
+        if !self.names_light() {
             let problem = "no light: add a light (KHR_lights_punctual) or an emissive material to the file, or give \
                            `scene.environment`";
             return Err(error("scene", problem.to_owned()));

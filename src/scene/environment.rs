@@ -62,7 +62,8 @@ impl Environment {
             return Err(wrong("environment strength", strength, &problem));
         }
         let name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
-        let warnings = picture.notes.into_iter().map(|note| format!("{name}: {note}")).collect();
+        let black = (brightest == 0.0).then(|| "is black: it gives no light".to_owned());
+        let warnings = picture.notes.into_iter().chain(black).map(|note| format!("{name}: {note}")).collect();
         Ok(Self {
             name,
             hash: hash(bytes),

@@ -79,18 +79,18 @@ impl Light {
     }
 }
 
-/// Minimum width, in cosines, of the falloff between the cones of a spot (KHR_lights_punctual,
-/// "Inner and Outer Cone Angles").
-pub const MIN_FALLOFF: f32 = 0.001;
+/// 1 − cos outer and cos inner − cos outer of a spot's cones. Accurate for narrow cones, whose
+/// cosines round to 1, and for cones that lie close to each other.
+pub(crate) fn spot_heights(inner: f32, outer: f32) -> [f64; 2] {
+    let (inner, outer) = (f64::from(inner), f64::from(outer));
+    let between = |a: f64, b: f64| 2.0 * (0.5 * (b + a)).sin() * (0.5 * (b - a)).sin();
+    [between(0.0, outer), between(inner, outer).max(0.0)]
+}
 
 /// Integral over the sphere of a spot's falloff, sr. The falloff is
 /// `clamp((cos θ − cos outer) / (cos inner − cos outer), 0, 1)²`, its integral
 /// 2π ((1 − cos inner) + (cos inner − cos outer)/3).
 fn spot_solid_angle(inner: f32, outer: f32) -> f32 {
-    let (inner, outer) = (f64::from(inner).cos(), f64::from(outer).cos());
-    let width = (inner - outer).max(f64::from(MIN_FALLOFF));
-    // In a cone so narrow that the falloff extends past its axis, full intensity is never reached.
-    let reached = ((1.0 - outer) / width).min(1.0);
-    let full = (1.0 - outer - width).max(0.0);
-    (std::f64::consts::TAU * (full + width * reached.powi(3) / 3.0)) as f32
+    let [height, width] = spot_heights(inner, outer);
+    (std::f64::consts::TAU * (height - width + width / 3.0)) as f32
 }

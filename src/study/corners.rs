@@ -106,6 +106,8 @@ mod tests {
             forward: -Vec3::Z,
             projection: Projection::Perspective { yfov: std::f32::consts::FRAC_PI_2 },
             aspect: None,
+            near: 0.0,
+            far: f32::INFINITY,
             keeps_width: false,
         };
         let mut frame = Frame::new(SIZE, SIZE, &[[1.0; 3]; (SIZE * SIZE) as usize]);

@@ -371,6 +371,36 @@ fn light_from_all_around_is_turned_and_scaled_as_asked() {
 }
 
 #[test]
+fn light_of_nothing_gives_a_black_picture() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name);
+    let dark = SCENE.replace("POSITIONS", TRIANGLE).replace(r#""intensity": 5"#, r#""intensity": 0"#);
+    fs::write(path("lamp.gltf"), dark).expect("can be written");
+    fs::write(path("sky.hdr"), b"#?RADIANCE\n\n-Y 1 +X 1\n\x80\x80\x80\x81").expect("can be written");
+    fs::write(path("black.hdr"), b"#?RADIANCE\n\n-Y 1 +X 1\n\0\0\0\0").expect("can be written");
+    let brightest = |words: &str| {
+        let ended = caustica(folder.path(), &format!("render {words} --size 8x8 --spp 1 --photons 1k -o out.exr"));
+        assert_eq!(ended.code, Some(0), "{words}: {}", ended.stderr);
+        let frame = caustica::image::read_exr(&path("out.exr")).expect("an EXR");
+        (frame.radiance().as_flattened().iter().copied().fold(0.0, f32::max), ended.stderr)
+    };
+    for (words, said) in [
+        ("lamp.gltf", r#"light "light 0" has no intensity"#),
+        ("lamp.gltf --mode photons --emission unaimed", "has no intensity"),
+        ("dark.gltf --background 0,0,0", "wrote out.exr"),
+        ("dark.gltf --env sky.hdr --env-strength 0", "wrote out.exr"),
+        ("dark.gltf --env black.hdr", "black.hdr: is black: it gives no light"),
+    ] {
+        let (radiance, stderr) = brightest(words);
+        assert_eq!(radiance, 0.0, "{words}");
+        assert!(stderr.contains(said) && !stderr.contains("sky of radiance"), "{words}: {stderr}");
+    }
+    let (radiance, stderr) = brightest("dark.gltf");
+    assert!(radiance > 0.9 && stderr.contains("no light: lit by a uniform sky"), "control: {radiance}, {stderr}");
+    assert_eq!(brightest("dark.gltf --background 0,0.25,0").0, 0.25, "control");
+}
+
+#[test]
 fn quiet_says_nothing_and_equal_runs_give_equal_files() {
     let folder = folder();
     let read = |name: &str| fs::read(folder.path().join(name)).expect("was written");

@@ -105,9 +105,19 @@ fn spots_and_directional_lights_shine_along_minus_z_of_their_node() {
     assert_eq!(notes, ["the range of lights is not read: they reach everywhere"]);
     let sharp = json!({ "type": "spot", "spot": { "innerConeAngle": 0.25, "outerConeAngle": 0.25 } });
     let (sharp, notes) = light(sharp, untouched);
-    let said = r#"light "lamp": inner and outer cone are equal; the falloff between them is very narrow"#;
+    let said = r#"light "lamp": inner cone angle 0.25 is not below the outer, 0.25: an edge without falloff"#;
     assert_eq!(notes, [said]);
     assert!(matches!(sharp.kind, LightKind::Spot { inner, outer: 0.25 } if inner < 0.25 && inner > 0.2499));
+    let (above, notes) =
+        light(json!({ "type": "spot", "spot": { "innerConeAngle": 0.8, "outerConeAngle": 0.25 } }), untouched);
+    let said = r#"light "lamp": inner cone angle 0.8 is not below the outer, 0.25: an edge without falloff"#;
+    assert_eq!((above, &notes[..]), (sharp, &[said.to_owned()][..]));
+    // Right angles that were rounded up, to four and to three digits.
+    for angle in [1.5708_f32, 1.571] {
+        let (half, notes) = light(json!({ "type": "spot", "spot": { "outerConeAngle": angle } }), untouched);
+        assert_eq!(half.kind, LightKind::Spot { inner: 0.0, outer: std::f32::consts::FRAC_PI_2 });
+        assert_eq!(notes, [format!(r#"light "lamp": outer cone angle {angle} is read as pi/2"#)]);
+    }
 
     // A rotation by 90° about +X takes -Z to +Y at any scale. A reflection reverses it.
     let sun = json!({ "type": "directional", "intensity": 3 });
@@ -125,11 +135,6 @@ fn spots_and_directional_lights_shine_along_minus_z_of_their_node() {
     // A directional light has no position: its node may lie at any distance.
     let far: fn(&mut Value) = |node| node["translation"] = json!([0, 1e30, 0]);
     assert_eq!(light(sun, far).0.position, Vec3::ZERO);
-    // A light of zero intensity is left out, with a warning.
-    let mut gltf = triangle();
-    gltf["extensions"]["KHR_lights_punctual"]["lights"][0] = json!({ "type": "spot", "intensity": 0 });
-    let scene = loaded(&gltf);
-    assert_eq!((scene.lights.len(), scene.warnings), (0, vec![r#"light "lamp" has no intensity"#.to_owned()]));
 }
 
 #[test]
@@ -219,7 +224,8 @@ fn a_scene_without_light_gets_a_sky_and_one_with_light_keeps_it() {
     let mut asked = loaded(&gltf);
     asked.environment = Some(Environment::uniform(Vec3::ZERO));
     asked.add_default_light();
-    assert!(asked.check_renderable().is_err());
+    assert!(asked.check_renderable().is_ok());
+    assert_eq!((asked.environment, asked.warnings), (Some(Environment::uniform(Vec3::ZERO)), vec![]));
     gltf["materials"][0]["emissiveFactor"] = json!([0, 0, 0.5]);
     let mut glowing = loaded(&gltf);
     glowing.add_default_light();

@@ -6,4 +6,5 @@ mod gltf_files;
 mod loading;
 mod loading_geometry;
 mod loading_values;
+mod loading_views;
 mod outputs;

@@ -8,4 +8,5 @@ mod modes;
 mod pixels;
 mod references;
 mod refraction;
+mod seen;
 mod solids;

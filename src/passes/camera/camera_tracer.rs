@@ -30,6 +30,10 @@ const PIXEL_SAMPLES: u32 = 256;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
+/// Depth of the near plane if there is none, metres.
+const UNCLIPPED: f32 = f32::MIN;
+/// Surfaces before the near plane that a ray passes at most.
+const MOST_UNSEEN: u32 = 1 << 12;
 /// Minimum number of pixels of a tile.
 const MIN_TILE_PIXELS: u32 = 64;
 
@@ -100,6 +104,8 @@ impl CameraTracer {
             branches,
             filter_steps: offsets.len() as u32 - 1,
             media,
+            near_depth: if camera.near == 0.0 { UNCLIPPED } else { camera.near },
+            far_depth: camera.far.min(f32::MAX),
             ..view(camera, size, photons, picture)?
         };
         let margin = if shares { margin_cells(tile_sides(&view)) * MARGIN_SAMPLES } else { 0 };
@@ -117,6 +123,14 @@ impl CameraTracer {
             view: CameraTile { margin, ..view },
             window: picture.window(size),
         })
+    }
+
+    /// Has parallel rays start at a depth below 0, where `media` of [`Self::new`] are; the camera
+    /// sees what it saw before.
+    #[must_use]
+    pub fn starting_at(self, depth: f32) -> Self {
+        let near_depth = if self.view.near_depth == UNCLIPPED { 0.0 } else { self.view.near_depth };
+        Self { view: CameraTile { start_depth: depth, near_depth, ..self.view }, ..self }
     }
 
     /// The tiles of the whole picture that overlap the data window, in order. A tile is the same
@@ -203,11 +217,19 @@ impl CameraTracer {
         let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
         let start = Step { kernel: start.kernel, buffers: &started };
         let trace = Step { kernel: trace.kernel, buffers: &followed };
-        // Without mirrors and glass, the first surface ends every path.
-        let most_surfaces = if scene.has_specular { layout::CHAIN_LIMIT } else { 1 };
-        let counters =
-            self.wavefront.run(gpu, scene, (&start, invocations.into()), &trace, most_paths, most_surfaces)?;
-        Ok(StepCount::from(counters))
+        // Without mirrors and glass, the first surface that the camera sees ends every path.
+        let surfaces = if scene.has_specular { layout::CHAIN_LIMIT } else { 1 };
+        let most_surfaces = surfaces + if self.view.near_depth == UNCLIPPED { 0 } else { MOST_UNSEEN };
+        let counters = self.wavefront.run(
+            gpu,
+            scene,
+            (&start, invocations.into()),
+            &trace,
+            most_paths,
+            (surfaces, most_surfaces),
+        )?;
+        let given_up = u64::from(counters.unfinished) + u64::from(counters.next);
+        Ok(StepCount { unfinished: given_up, ..StepCount::from(counters) })
     }
 
     /// Adds direct light at the tile's visible points.

@@ -75,7 +75,8 @@ impl PhotonKernels {
         let paths = u64::from(batch.paths);
         let emit = Step { kernel: &self.emit, buffers: &own };
         let bounce = Step { kernel: &self.bounce, buffers: &own };
-        let counters = buffers.wavefront.run(gpu, scene, (&emit, paths), &bounce, paths, batch.max_surfaces)?;
+        let surfaces = (batch.max_surfaces, batch.max_surfaces);
+        let counters = buffers.wavefront.run(gpu, scene, (&emit, paths), &bounce, paths, surfaces)?;
         Ok(BatchResult { counters, counts: gpu.read(&buffers.counts, 0, paths * u64::from(MAP_KINDS))? })
     }
 

@@ -7,12 +7,12 @@ use gltf::json;
 use json::camera::Type;
 use json::validation::Checked;
 
-use super::fault::{Read, fault};
+use super::fault::{Notes, Read, fault};
 use super::nodes::PlacedNode;
-use crate::scene::{Camera, Projection};
+use crate::scene::{Bounds, Camera, Projection};
 
 /// Camera of a node, with its index in the file and its world position.
-pub(super) fn read(root: &json::Root, placed: &PlacedNode) -> Read<Option<(usize, DVec3, Camera)>> {
+pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) -> Read<Option<(usize, DVec3, Camera)>> {
     let node = &root.nodes[placed.node];
     let Some(index) = node.camera.map(|camera| camera.value()) else { return Ok(None) };
     let camera = &root.cameras[index];
@@ -22,8 +22,65 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode) -> Read<Option<(usize
     let Some([right, up, forward]) = axes(placed.world) else {
         return fault(format!("nodes[{}]", placed.node), "its transform leaves its camera no direction");
     };
-    let camera = Camera { name, position: Vec3::ZERO, right, up, forward, projection, aspect, keeps_width: false };
+    let [near, far] = clipping(camera, &name, notes);
+    let [mirrored_x, mirrored_y] = mirrored(camera, &name, notes);
+    let camera = Camera {
+        right: if mirrored_x { -right } else { right },
+        up: if mirrored_y { -up } else { up },
+        name,
+        position: Vec3::ZERO,
+        forward,
+        projection,
+        aspect,
+        keeps_width: false,
+        near,
+        far,
+    };
     Ok(Some((index, placed.world.w_axis.truncate(), camera)))
+}
+
+/// Depths at which the view of a camera begins and ends, metres. Planes between which nothing lies
+/// are left out.
+fn clipping(camera: &json::Camera, name: &str, notes: &mut Notes) -> [f32; 2] {
+    let (near, far) = match (&camera.type_, &camera.perspective, &camera.orthographic) {
+        (Checked::Valid(Type::Perspective), Some(perspective), _) => {
+            (perspective.znear.max(0.0), perspective.zfar.unwrap_or(f32::INFINITY))
+        }
+        (Checked::Valid(Type::Orthographic), _, Some(orthographic)) => (orthographic.znear, orthographic.zfar),
+        _ => (0.0, f32::INFINITY),
+    };
+    if near < far {
+        return [near, far];
+    }
+    notes.add(format!("camera {name:?}: zfar {far} is not beyond znear {near}: nothing is clipped"));
+    [0.0, f32::INFINITY]
+}
+
+/// Whether a camera mirrors the picture left to right, and upside down, by a negative
+/// magnification.
+fn mirrored(camera: &json::Camera, name: &str, notes: &mut Notes) -> [bool; 2] {
+    let orthographic = camera.orthographic.as_ref().filter(|_| camera.type_ == Checked::Valid(Type::Orthographic));
+    let mirrored = orthographic.map_or([false; 2], |view| [view.xmag < 0.0, view.ymag < 0.0]);
+    let ways = match mirrored {
+        [false, false] => return mirrored,
+        [true, false] => "left to right",
+        [false, true] => "upside down",
+        [true, true] => "left to right and upside down",
+    };
+    notes.add(format!("camera {name:?}: a negative magnification mirrors the picture, {ways}"));
+    mirrored
+}
+
+/// Notes where the view of a camera ends before the scene does.
+pub(super) fn note_end(camera: &Camera, bounds: Bounds, notes: &mut Notes) {
+    let depth = |i: usize| {
+        let corner = Vec3::from_array([0, 1, 2].map(|k| if i >> k & 1 == 0 { bounds.min[k] } else { bounds.max[k] }));
+        (corner - camera.position).dot(camera.forward)
+    };
+    let end = (0..8).map(depth).fold(f32::NEG_INFINITY, f32::max);
+    if end > 1.001 * camera.far {
+        notes.add(format!("camera {:?}: sees to zfar, {} m; the scene reaches to {end} m", camera.name, camera.far));
+    }
 }
 
 /// Projection of the camera at JSON path `place`, and the aspect ratio (width over height) if the
@@ -42,12 +99,12 @@ fn projection(camera: &json::Camera, place: &str) -> Read<(Projection, Option<f3
             (Projection::Perspective { yfov }, perspective.aspect_ratio)
         }
         (Checked::Valid(Type::Orthographic), _, Some(orthographic)) => {
-            let (xmag, ymag) = (orthographic.xmag, orthographic.ymag);
-            for (key, mag) in [("xmag", xmag), ("ymag", ymag)] {
-                if !positive(mag) {
+            for (key, mag) in [("xmag", orthographic.xmag), ("ymag", orthographic.ymag)] {
+                if !mag.is_normal() {
                     return fault(format!("{place}.orthographic.{key}"), format!("{mag} is not a positive number"));
                 }
             }
+            let (xmag, ymag) = (orthographic.xmag.abs(), orthographic.ymag.abs());
             if !positive(xmag / ymag) {
                 return fault(format!("{place}.orthographic"), "xmag / ymag is not a positive number");
             }

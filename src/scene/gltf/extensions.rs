@@ -8,9 +8,11 @@ use super::fault::{Notes, Read, fault};
 
 /// Compressed bufferViews.
 pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
+/// Nodes that are not there, nor what is below them.
+pub(super) const NODE_VISIBILITY: &str = "KHR_node_visibility";
 
 /// Extensions that are read, or that do not affect what is read.
-const SUPPORTED: [&str; 13] = [
+const SUPPORTED: [&str; 14] = [
     "EXT_mesh_gpu_instancing",
     MESHOPT,
     "KHR_draco_mesh_compression",
@@ -23,6 +25,7 @@ const SUPPORTED: [&str; 13] = [
     "KHR_materials_unlit",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    NODE_VISIBILITY,
     "KHR_texture_transform",
 ];
 

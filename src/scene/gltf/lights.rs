@@ -13,10 +13,13 @@ use super::fault::{Notes, Read, fault};
 use super::nodes::{self, PlacedNode};
 use crate::scene::{Light, LightKind};
 
+/// Largest outer angle that is taken for a right angle that was rounded up, radians.
+const ROUNDED_RIGHT_ANGLE: f32 = 1.01 * FRAC_PI_2;
+
 /// A light and its world position; a directional light has none.
 pub(super) type PlacedLight = (Option<DVec3>, Light);
 
-/// Light of a node, unless it is dark.
+/// Light of a node, which may have no intensity.
 pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) -> Read<Option<PlacedLight>> {
     let node = &root.nodes[placed.node];
     let Some(reference) = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref())
@@ -47,7 +50,8 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
     }
     if intensity == Vec3::ZERO {
         notes.add(format!("light {name:?} has no intensity"));
-        return Ok(None);
+        let dark = Light { name, kind: LightKind::Point, position: Vec3::ZERO, direction: Vec3::NEG_Z, intensity };
+        return Ok(Some((None, dark)));
     }
     if light.range.is_some() {
         notes.add("the range of lights is not read: they reach everywhere");
@@ -68,19 +72,25 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
 
 /// Cones of the spot light at JSON path `place`.
 fn spot(spot: Option<&Spot>, name: &str, place: &str, notes: &mut Notes) -> Read<LightKind> {
-    let (inner, outer) = spot.map_or((0.0, FRAC_PI_4), |spot| (spot.inner_cone_angle, spot.outer_cone_angle));
-    if !(outer > 0.0 && outer <= FRAC_PI_2) {
-        return fault(format!("{place}.spot.outerConeAngle"), format!("{outer} is not above 0 and at most pi/2"));
+    let (inner, given) = spot.map_or((0.0, FRAC_PI_4), |spot| (spot.inner_cone_angle, spot.outer_cone_angle));
+    if !(given > 0.0 && given <= ROUNDED_RIGHT_ANGLE) {
+        return fault(format!("{place}.spot.outerConeAngle"), format!("{given} is not above 0 and at most pi/2"));
     }
-    if !(inner >= 0.0 && inner <= outer) {
+    let outer = given.min(FRAC_PI_2);
+    if outer != given {
+        notes.add(format!("light {name:?}: outer cone angle {given} is read as pi/2"));
+    }
+    if !(inner >= 0.0 && inner.is_finite()) {
         let problem = format!("{inner} is not between 0 and the outer angle, {outer}");
         return fault(format!("{place}.spot.innerConeAngle"), problem);
     }
-    if inner == outer {
-        // The specification requires distinct angles, but exporters write equal ones for an edge
-        // without falloff.
-        notes.add(format!("light {name:?}: inner and outer cone are equal; the falloff between them is very narrow"));
-        return Ok(LightKind::Spot { inner: outer.next_down(), outer });
+    if inner < outer {
+        return Ok(LightKind::Spot { inner, outer });
     }
-    Ok(LightKind::Spot { inner, outer })
+    // The specification requires an inner angle below the outer one, but exporters write equal ones
+    // for an edge without falloff, and angles that were edited one by one.
+    notes.add(format!(
+        "light {name:?}: inner cone angle {inner} is not below the outer, {outer}: an edge without falloff"
+    ));
+    Ok(LightKind::Spot { inner: outer.next_down(), outer })
 }

@@ -144,6 +144,9 @@ fn emission(material: &json::Material, name: &str, place: &str, notes: &mut Note
         let at = format!("{place}.extensions.KHR_materials_emissive_strength.emissiveStrength");
         return fault(at, format!("{strength} is not a positive number that its factor can be multiplied by"));
     }
+    if factor != Vec3::ZERO && emission == Vec3::ZERO {
+        notes.add(format!("material {name:?}: emissive strength {strength} gives no light"));
+    }
     if material.emissive_texture.is_some() && emission != Vec3::ZERO {
         notes.add(format!(
             "material {name:?}: its emissive texture is not read yet: all of its surface gives light by the factor \

@@ -96,8 +96,8 @@ fn assemble(
     let shapes = meshes::check(&document, &mut notes)?;
 
     let worlds = nodes::worlds(root)?;
-    let placed = nodes::flatten(root, chosen, &worlds)?;
-    let cache = MeshCache::read(&document, &placed, &shapes, &worlds, &mut notes)?;
+    let placed = nodes::flatten(root, chosen, &worlds, &mut notes)?;
+    let cache = MeshCache::read(&document, &placed.shown, &shapes, &worlds, &mut notes)?;
     let instances = cache.instances();
     let contents = NodeContents::read(root, &placed, &mut notes)?;
     let mut bounds = WorldBounds::EMPTY;
@@ -160,7 +160,10 @@ fn read_materials(
             scene.materials.push(materials::default_material(notes)?);
             continue;
         }
-        scene.materials.push(materials::read(root, i, notes)?);
+        let material = materials::read(root, i, notes)?;
+        let emits = root.materials[i].emissive_factor.0 != [0.0; 3];
+        scene.names_dark_light |= emits && material.emission == Vec3::ZERO;
+        scene.materials.push(material);
     }
     Ok(slots)
 }
@@ -169,18 +172,24 @@ fn read_materials(
 #[derive(Default)]
 struct NodeContents {
     lights: Vec<PlacedLight>,
+    /// A light of intensity 0 is among the nodes.
+    names_dark_light: bool,
     /// With the index in the file, which determines their order.
     cameras: Vec<(usize, DVec3, Camera)>,
     spheres: Vec<PlacedSphere>,
 }
 
 impl NodeContents {
-    fn read(root: &json::Root, placed: &[nodes::PlacedNode], notes: &mut Notes) -> Read<Self> {
+    fn read(root: &json::Root, placed: &nodes::PlacedNodes, notes: &mut Notes) -> Read<Self> {
         let mut contents = Self::default();
-        for placed in placed {
-            contents.lights.extend(lights::read(root, placed, notes)?);
-            contents.cameras.extend(cameras::read(root, placed)?);
+        for placed in &placed.shown {
+            let light = lights::read(root, placed, notes)?;
+            contents.names_dark_light |= light.as_ref().is_some_and(|(_, light)| light.intensity == Vec3::ZERO);
+            contents.lights.extend(light.filter(|(_, light)| light.intensity != Vec3::ZERO));
             contents.spheres.extend(spheres::read(root, placed, notes)?);
+        }
+        for placed in &placed.cameras {
+            contents.cameras.extend(cameras::read(root, placed, notes)?);
         }
         contents.cameras.sort_by_key(|(index, ..)| *index);
         Ok(contents)
@@ -191,10 +200,12 @@ impl NodeContents {
         let center = scene.center;
         let at = |position: DVec3| (position - center).as_vec3();
         let light = |(p, light): PlacedLight| Light { position: p.map_or(Vec3::ZERO, at), ..light };
+        scene.names_dark_light |= self.names_dark_light;
         scene.lights = self.lights.into_iter().map(light).collect();
         scene.cameras = self.cameras.into_iter().map(|(_, p, camera)| Camera { position: at(p), ..camera }).collect();
+        let bounds = scene.bounds();
+        scene.cameras.iter().for_each(|camera| cameras::note_end(camera, bounds, notes));
         if scene.cameras.is_empty() {
-            let bounds = scene.bounds();
             if bounds != Bounds::EMPTY {
                 notes.add("no camera: one is made that frames the whole scene");
             }

@@ -4,8 +4,10 @@
 use glam::{DMat4, DQuat, DVec3};
 use gltf::json;
 use json::scene::Node;
+use serde_json::Value;
 
-use super::fault::{Read, fault};
+use super::extensions::NODE_VISIBILITY;
+use super::fault::{Notes, Read, fault};
 use crate::{Error, Result};
 
 /// A node with its transform to the world.
@@ -13,6 +15,15 @@ use crate::{Error, Result};
 pub(super) struct PlacedNode {
     pub(super) node: usize,
     pub(super) world: DMat4,
+}
+
+/// Nodes that a scene shows.
+#[derive(Debug, Default)]
+pub(super) struct PlacedNodes {
+    /// Nodes that have contents, parents first, without those that are hidden.
+    pub(super) shown: Vec<PlacedNode>,
+    /// Nodes that have a camera. A hidden camera takes pictures like any other.
+    pub(super) cameras: Vec<PlacedNode>,
 }
 
 /// Checks the references of nodes and scenes, and that the nodes form a forest.
@@ -97,16 +108,18 @@ fn roots(root: &json::Root) -> Vec<usize> {
     (0..root.nodes.len()).filter(|i| is_root[*i]).collect()
 }
 
-/// Nodes of a scene that have contents, parents first; of all nodes if the file has no scenes.
-/// Needs [`check`].
-pub(super) fn flatten(root: &json::Root, scene: usize, worlds: &[DMat4]) -> Read<Vec<PlacedNode>> {
-    let mut open: Vec<usize> = match root.scenes.get(scene) {
-        Some(scene) => scene.nodes.iter().rev().map(|node| node.value()).collect(),
-        None => roots(root).into_iter().rev().collect(),
+/// Nodes of a scene; all nodes if the file has no scenes. Needs [`check`].
+pub(super) fn flatten(root: &json::Root, scene: usize, worlds: &[DMat4], notes: &mut Notes) -> Read<PlacedNodes> {
+    let roots = match root.scenes.get(scene) {
+        Some(scene) => scene.nodes.iter().map(|node| node.value()).collect(),
+        None => roots(root),
     };
+    // Nodes yet to be visited, and whether all above them are visible.
+    let mut open: Vec<(usize, bool)> = roots.into_iter().rev().map(|node| (node, true)).collect();
     let mut seen = vec![false; root.nodes.len()];
-    let mut placed = Vec::new();
-    while let Some(index) = open.pop() {
+    let mut placed = PlacedNodes::default();
+    let mut hidden = 0;
+    while let Some((index, parent_visible)) = open.pop() {
         if std::mem::replace(&mut seen[index], true) {
             return fault(format!("scenes[{scene}].nodes"), format!("reach node {index} twice"));
         }
@@ -114,12 +127,29 @@ pub(super) fn flatten(root: &json::Root, scene: usize, worlds: &[DMat4]) -> Read
         if !world.is_finite() {
             return fault(format!("nodes[{index}]"), "its transform in the world is not finite");
         }
-        if node.mesh.is_some() || node.camera.is_some() || node.extensions.is_some() {
-            placed.push(PlacedNode { node: index, world });
+        let visible = visibility(node, index)? && parent_visible;
+        hidden += usize::from(!visible);
+        let placed_node = PlacedNode { node: index, world };
+        placed.cameras.extend(node.camera.map(|_| placed_node));
+        if visible && (node.mesh.is_some() || node.extensions.is_some()) {
+            placed.shown.push(placed_node);
         }
-        open.extend(node.children.iter().flatten().rev().map(|child| child.value()));
+        open.extend(node.children.iter().flatten().rev().map(|child| (child.value(), visible)));
+    }
+    if hidden > 0 {
+        notes.add(format!("nodes that the file hides (KHR_node_visibility) are left out: {hidden}"));
     }
     Ok(placed)
+}
+
+/// Whether the node itself is visible (KHR_node_visibility).
+fn visibility(node: &Node, index: usize) -> Read<bool> {
+    let extension = node.extensions.as_ref().and_then(|extensions| extensions.others.get(NODE_VISIBILITY));
+    match extension.and_then(|extension| extension.get("visible")) {
+        None => Ok(true),
+        Some(Value::Bool(visible)) => Ok(*visible),
+        Some(_) => fault(format!("nodes[{index}].extensions.{NODE_VISIBILITY}.visible"), "is not true or false"),
+    }
 }
 
 /// Local transform of a node.

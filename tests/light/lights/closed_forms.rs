@@ -2,7 +2,7 @@
 //!
 //! | test | closed form | negative control |
 //! |---|---|---|
-//! | spot | E = I f cos³θ/h², f the specification's falloff; flux I Ω | another inner cone; a larger floor |
+//! | spot | E = I f cos³θ/h², f the specification's falloff, in narrow cones too; flux I Ω | another inner cone; a larger floor |
 //! | directional | E = I cos θ | straight from above |
 //! | uniform sky | E = π L on an open floor | 2 % stronger |
 //! | square emitter | Lambert's formula for polygons, facing and askew | the back side; an emitter 5 cm higher |
@@ -54,6 +54,34 @@ fn a_spot_has_the_falloff_of_the_specification() {
 }
 
 #[test]
+fn narrow_spots_have_their_full_intensity_inside_of_the_inner_cone() {
+    let height = 2.0_f32;
+    let measured = |inner: f32, outer: f32, angle: f32| {
+        let mut scene = floor(1.0);
+        scene.lights.push(spot(vec3(0.0, height, 0.0), Vec3::NEG_Y, 3.0, inner, outer));
+        let x = height * angle.tan();
+        irradiance_at(&scene, vec3(x, 1.0, 0.00001), vec3(x, 0.0, 0.0), 1)
+    };
+    // Cones below 2.6 degrees, whose cosines differ by less than 0.001, and cones that lie close
+    // together. Between the cones the falloff is quadratic in the squares of small angles.
+    for (inner, outer) in [(0.0_f32, 0.01_f32), (0.0, 0.002), (0.02, 0.03), (0.3, 0.301)] {
+        for part in [-0.25_f32, 0.25, 0.5] {
+            let angle = (inner + part * (outer - inner)).max(0.0);
+            let cosine = f64::from(angle).cos();
+            let [full, none] = [inner, outer].map(|a| f64::from(a).cos());
+            let t = ((cosine - none) / (full - none)).min(1.0);
+            let right = 3.0 * t * t * cosine.powi(3) / 4.0;
+            let found = measured(inner, outer, angle);
+            assert!(within(found, right, 0.01), "{inner} to {outer} at {angle}: {found} instead of {right}");
+        }
+        assert_eq!(measured(inner, outer, 1.2 * outer), 0.0, "outside");
+        let middle = 0.5 * (inner + outer);
+        let (found, other) = (measured(inner, outer, middle), measured(inner, 1.1 * outer, middle));
+        assert!(!within(other, found, 0.01), "control: {other} of a wider cone");
+    }
+}
+
+#[test]
 fn photons_of_a_spot_carry_its_exact_flux() {
     // Three cases: a light inside a ball, unobstructed in all directions; and a light outside the
     // scene's bounding sphere above a floor that is wider, or narrower, than its cone.
@@ -74,6 +102,14 @@ fn photons_of_a_spot_carry_its_exact_flux() {
     };
     let (measured, right) = (outside(1.0, 0.05, 0.15), 5.0 * solid_angle(0.05, 0.15));
     assert!(within(measured, right, 1e-3), "a narrow cone: {measured} instead of {right}");
+    for (inner, outer) in [(0.0_f32, 0.01_f32), (0.0, 0.001), (0.02, 0.0201)] {
+        let [full, none] = [inner, outer].map(f64::from);
+        let right = 5.0 * 2.0 * PI * ((full / 2.0).sin().powi(2) * 4.0 / 3.0 + (none / 2.0).sin().powi(2) * 2.0 / 3.0);
+        for measured in [outside(1.0, inner, outer), inside(inner, outer)] {
+            assert!(within(measured, right, 2e-3), "{inner} to {outer}: {measured} W instead of {right} W");
+        }
+        assert!(!within(outside(1.0, inner, 1.01 * outer), right, 2e-3), "control: a wider cone");
+    }
     // A square of half side a at distance h subtends the solid angle 4 atan(a²/(h √(h² + 2a²))).
     let (measured, right) = (outside(1.0, 1.4, 1.5), 20.0 * (1.0 / (5.0 * 27.0_f64.sqrt())).atan());
     assert!(within(measured, right, 0.01), "a wide cone: {measured} instead of {right}");

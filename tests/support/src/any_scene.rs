@@ -72,12 +72,13 @@ fn sound(scene: &Scene) {
 }
 
 fn sound_camera(camera: &Camera) {
-    let Camera { name, position, right, up, forward, projection, aspect, keeps_width: _ } = camera;
+    let Camera { name, position, right, up, forward, projection, aspect, near, far, keeps_width: _ } = camera;
     let frame = [right, up, forward];
     let upright = frame.iter().all(|axis| (axis.length() - 1.0).abs() < 1e-3)
         && [right.dot(*up), up.dot(*forward), forward.dot(*right)].iter().all(|cosine| cosine.abs() < 1e-3);
     assert!(position.is_finite() && upright, "camera {name}: {position} {frame:?}");
     assert!(aspect.is_none_or(|aspect| aspect.is_finite() && aspect > 0.0), "camera {name}: aspect {aspect:?}");
+    assert!(near < far, "camera {name}: {near} to {far}");
     match projection {
         Projection::Perspective { yfov } => {
             assert!(*yfov > 0.0 && *yfov < std::f32::consts::PI, "camera {name}: yfov {yfov}");

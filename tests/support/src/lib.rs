@@ -84,6 +84,8 @@ pub fn camera(position: Vec3, target: Vec3, degrees: f32) -> Camera {
         forward,
         projection,
         aspect: Some(1.0),
+        near: 0.0,
+        far: f32::INFINITY,
         keeps_width: false,
     }
 }

@@ -118,6 +118,8 @@ fn room(light: Vec3) -> Scene {
             forward: Vec3::NEG_Z,
             projection: Projection::Perspective { yfov: 1.0 },
             aspect: None,
+            near: 0.0,
+            far: f32::INFINITY,
             keeps_width: false,
         }],
         ..Scene::default()
