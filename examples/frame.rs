@@ -177,7 +177,7 @@ impl View<'_> {
     /// Queries at the first hits; not valid on mirrors and glass, where no photon is stored.
     fn points(&self, scene: &Scene) -> Vec<VisiblePoint> {
         let on_delta = |p: Vec3| {
-            let spheres = scene.spheres.iter().filter(|s| scene.materials[s.material as usize].surface.is_delta());
+            let spheres = scene.spheres.iter().filter(|s| scene.materials[s.material as usize].surface.is_specular());
             spheres.into_iter().any(|s| ((p - s.center).length() / s.radius - 1.0).abs() < 1e-3)
         };
         let point = |i: usize| {

@@ -50,7 +50,7 @@ pub const SPHERE_BIT: u32 = 0x8000_0000;
 
 /// Set there when the primitive's material is a mirror, a pane or glass: where surfaces coincide,
 /// the others are met first.
-pub const DELTA_BIT: u32 = 0x4000_0000;
+pub const SPECULAR_BIT: u32 = 0x4000_0000;
 /// Set there when another surface lies in the same plane: hits within rounding are one interface.
 pub const CONTACT_BIT: u32 = 0x2000_0000;
 /// Position there of the slot of the solid that the primitive bounds, and its mask;
@@ -73,7 +73,7 @@ pub const LOST_SCALE: u32 = 4096;
 pub struct Primitive {
     pub v0: [f32; 3],
     /// Index into the materials, with [`SPHERE_BIT`] for a sphere; on the device also
-    /// [`DELTA_BIT`], [`CONTACT_BIT`] and the slot at [`SLOT_SHIFT`].
+    /// [`SPECULAR_BIT`], [`CONTACT_BIT`] and the slot at [`SLOT_SHIFT`].
     pub material: u32,
     pub e1: [f32; 3],
     /// Index of the primitive in the scene before the BVH reordered it.

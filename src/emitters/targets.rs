@@ -84,12 +84,12 @@ pub fn scene_target(scene: &Scene) -> Target {
 /// [`MAX_TARGETS`] clusters. Then halves are kept only where the sum of their cross-sections is
 /// smaller than that of the whole cluster.
 #[must_use]
-pub fn delta_targets(scene: &Scene) -> Vec<Target> {
-    let delta = items(scene, |material| scene.materials[material as usize].surface.is_delta());
-    if delta.is_empty() {
+pub fn specular_targets(scene: &Scene) -> Vec<Target> {
+    let specular = items(scene, |material| scene.materials[material as usize].surface.is_specular());
+    if specular.is_empty() {
         return Vec::new();
     }
-    let mut tree = vec![Cluster::new(delta)];
+    let mut tree = vec![Cluster::new(specular)];
     for _ in 1..MAX_TARGETS {
         let leaves = (0..tree.len()).filter(|&i| tree[i].halves.is_none() && tree[i].items.len() > 1);
         let largest = leaves.max_by(|&a, &b| tree[a].target.radius.total_cmp(&tree[b].target.radius));
@@ -157,20 +157,20 @@ mod tests {
     #[test]
     fn what_lies_apart_has_spheres_of_its_own() {
         let corners = [vec3(0.0, 0.0, 0.0), vec3(9.0, 0.0, 0.0), vec3(0.0, 0.0, 9.0), vec3(9.0, 0.0, 9.0)];
-        let apart = delta_targets(&scene(&corners, 1.0));
+        let apart = specular_targets(&scene(&corners, 1.0));
         assert_eq!(apart.len(), 4);
         assert!(apart.iter().all(|t| (1.0..1.001).contains(&t.radius) && corners.contains(&t.center)), "{apart:?}");
         // Halves of a close pair would have larger cross-sections together.
-        let close = delta_targets(&scene(&[Vec3::ZERO, vec3(0.1, 0.0, 0.0)], 1.0));
+        let close = specular_targets(&scene(&[Vec3::ZERO, vec3(0.1, 0.0, 0.0)], 1.0));
         assert_eq!(close.len(), 1);
-        assert!(delta_targets(&Scene::default()).is_empty());
+        assert!(specular_targets(&Scene::default()).is_empty());
     }
 
     #[test]
     fn there_are_never_too_many() {
         let line: Vec<Vec3> = (0..200).map(|i| vec3(10.0 * i as f32, 0.0, 0.0)).collect();
         let scene = scene(&line, 1.0);
-        let targets = delta_targets(&scene);
+        let targets = specular_targets(&scene);
         assert_eq!(targets.len(), MAX_TARGETS as usize);
         let held = |s: &Sphere| targets.iter().any(|t| t.center.distance(s.center) + s.radius <= t.radius);
         assert!(scene.spheres.iter().all(held));

@@ -87,7 +87,7 @@ impl<'a> Session<'a> {
     /// As [`super::render`].
     pub fn photon_maps(&self, settings: &PhotonSettings, progress: &dyn Progress) -> Result<PhotonMaps> {
         settings.check()?;
-        trace_maps(self.gpu, &self.buffers, settings, self.scene.has_delta(), self.stats.clone(), progress)
+        trace_maps(self.gpu, &self.buffers, settings, self.scene.has_specular(), self.stats.clone(), progress)
     }
 
     /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode,

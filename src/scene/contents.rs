@@ -73,8 +73,8 @@ impl Scene {
 
     /// Whether a surface has a specular BSDF, so that there can be caustics.
     #[must_use]
-    pub fn has_delta(&self) -> bool {
-        self.uses_material(|material| material.surface.is_delta())
+    pub fn has_specular(&self) -> bool {
+        self.uses_material(|material| material.surface.is_specular())
     }
 
     /// Whether a surface emits light.

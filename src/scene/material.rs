@@ -36,7 +36,7 @@ pub enum Surface {
 impl Surface {
     /// Whether all scattering is specular.
     #[must_use]
-    pub fn is_delta(&self) -> bool {
+    pub fn is_specular(&self) -> bool {
         !matches!(self, Surface::Diffuse { .. })
     }
 

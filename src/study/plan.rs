@@ -178,10 +178,10 @@ impl Plan {
 
 /// Mode of the reference for a mode: direct light by photons and by rays has the same expected
 /// value.
-pub(super) fn reference_mode(mode: Mode, has_delta: bool) -> Mode {
+pub(super) fn reference_mode(mode: Mode, has_specular: bool) -> Mode {
     match mode {
         Mode::Photons => Mode::Hybrid,
-        Mode::DirectPhotons if !has_delta => Mode::DirectRays,
+        Mode::DirectPhotons if !has_specular => Mode::DirectRays,
         other => other,
     }
 }

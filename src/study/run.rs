@@ -104,7 +104,7 @@ impl Study<'_> {
     fn reference_cells(&self, combination: &Combination) -> Vec<Settings> {
         let subject = &self.plan.subjects[combination.subject];
         let (Reference::Finer(finer), true) = (&subject.reference, combination.measured) else { return Vec::new() };
-        let mode = reference_mode(combination.settings.photons.mode, subject.scene.has_delta());
+        let mode = reference_mode(combination.settings.photons.mode, subject.scene.has_specular());
         finer_settings(&combination.settings, *finer, mode)
     }
 

@@ -7,7 +7,7 @@ use crate::{
         environment_map::EnvironmentMap,
         light_table::{Choices, LightTable},
         set_media,
-        targets::{delta_targets, scene_target},
+        targets::{scene_target, specular_targets},
     },
     error::Result,
     gpu::{Buffer, Gpu, Table},
@@ -36,7 +36,7 @@ pub struct LightBuffers {
     pub direct: ChoiceBuffer,
     /// Number of spheres around mirrors and glass. In `targets` they follow the sphere around the
     /// scene.
-    pub delta_targets: u32,
+    pub specular_targets: u32,
     pub has_environment: bool,
     pub warnings: Vec<String>,
     lights: Buffer,
@@ -55,7 +55,7 @@ impl LightBuffers {
     /// As [`LightTable::new`], and [`crate::Error::Limit`] if the lights exceed a binding.
     pub fn new(gpu: &Gpu, scene: &Scene, probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
-        let targets = delta_targets(scene);
+        let targets = specular_targets(scene);
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
@@ -80,7 +80,7 @@ impl LightBuffers {
             photons: upload("photon light choices", &table.for_photons(settings))?,
             aimed: upload("aimed light choices", &table.for_aimed_photons(&targets, &around, settings))?,
             direct: upload("direct light choices", &table.for_direct_light())?,
-            delta_targets: targets.len() as u32,
+            specular_targets: targets.len() as u32,
             has_environment: map.is_some(),
             warnings: reduced(scene, map.as_ref()).into_iter().collect(),
             lights: gpu.storage_with("lights", &table.lights)?,

@@ -11,7 +11,7 @@ use crate::{
         Buffer, Gpu, Kernel, Table,
         shaders::{Shader, shader},
     },
-    layout::{self, CONTACT_BIT, DELTA_BIT, MATERIAL_MASK, Primitive, SLOT_SHIFT, SPHERE_BIT},
+    layout::{self, CONTACT_BIT, MATERIAL_MASK, Primitive, SLOT_SHIFT, SPECULAR_BIT, SPHERE_BIT},
     scene::{Material, Medium, Scene, Solids, Surface},
     settings::{LightSettings, LightUnit, Sampler},
 };
@@ -85,7 +85,7 @@ impl SceneBuffers {
             materials: Table::new(gpu, "materials", &materials)?,
             media: Table::new(gpu, "media", &media)?,
             has_contacts: contacts.contains(&true),
-            has_specular: scene.has_delta(),
+            has_specular: scene.has_specular(),
             has_dielectrics: scene.materials.iter().any(|m| m.surface.ior().is_some()),
             has_spheres: !scene.spheres.is_empty(),
             // Rounded up to multiples of 16, so that few variants of a kernel are compiled.
@@ -161,10 +161,10 @@ fn marked(
     contacts: &[bool],
     lights: &LightTable,
 ) -> Vec<Primitive> {
-    let is_delta: Vec<bool> = scene.materials.iter().map(|m| m.surface.is_delta()).collect();
+    let is_specular: Vec<bool> = scene.materials.iter().map(|m| m.surface.is_specular()).collect();
     let mark = |(p, contact): (&Primitive, &bool)| {
-        let delta = is_delta.get((p.material & !SPHERE_BIT) as usize) == Some(&true);
-        let bits = if delta { DELTA_BIT } else { 0 } | if *contact { CONTACT_BIT } else { 0 };
+        let specular = is_specular.get((p.material & !SPHERE_BIT) as usize) == Some(&true);
+        let bits = if specular { SPECULAR_BIT } else { 0 } | if *contact { CONTACT_BIT } else { 0 };
         let material = p.material | bits | (solids.slot(p.id) << SLOT_SHIFT);
         Primitive { emitter: lights.emitter(p.id), material, ..*p }
     };

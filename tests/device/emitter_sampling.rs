@@ -9,7 +9,7 @@
 
 use std::f64::consts::PI;
 
-use caustica::{emitters::targets::delta_targets, scene::Scene, settings::LightSampling};
+use caustica::{emitters::targets::specular_targets, scene::Scene, settings::LightSampling};
 use glam::{DVec3, Vec3, vec3};
 use support::*;
 
@@ -32,7 +32,7 @@ fn aimed(radius: f32) -> Scene {
 fn aimed_emission_follows_the_balance_of_its_targets() {
     let drawn = |radius: f32| {
         let scene = aimed(radius);
-        let targets = delta_targets(&scene);
+        let targets = specular_targets(&scene);
         assert_eq!(targets.len(), 2);
         (probe("probe_emission", &scene, &rows(SAMPLES, [0.0, 0.0, 3.0, 0.0])), targets)
     };

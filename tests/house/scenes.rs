@@ -35,7 +35,7 @@ fn all_can_be_rendered_without_a_warning() {
         assert!(scene.check_renderable().is_ok(), "{name}");
         assert_eq!(scene.warnings, [""; 0], "{name}");
         assert_eq!(scene.camera(None).expect("a camera").name, "camera", "{name}");
-        assert_eq!(scene.has_delta(), name != "diffuse", "{name}");
+        assert_eq!(scene.has_specular(), name != "diffuse", "{name}");
     }
     assert_eq!((load("one-light.gltf").lights.len(), load("three-lights.gltf").lights.len()), (1, 3));
 }
@@ -75,7 +75,7 @@ fn open_edges(scene: &Scene) -> usize {
 fn the_water_is_a_closed_solid_with_its_outside_out() {
     let mut scene = load("water.gltf");
     let glass: Vec<_> =
-        scene.triangles.iter().filter(|t| scene.materials[t.material as usize].surface.is_delta()).collect();
+        scene.triangles.iter().filter(|t| scene.materials[t.material as usize].surface.is_specular()).collect();
     assert!(glass.len() >= 50_000, "{}", glass.len());
     assert!(glass.iter().all(|t| t.normals.iter().all(|n| n.dot(t.geometric_normal()) > 0.9)));
     // The enclosed volume is positive if the triangles face outwards (divergence theorem).

@@ -96,7 +96,7 @@ fn trace_photons(scene: &Scene, settings: &Settings) -> (TracedPhotons, [f64; 3]
     let bvh = Bvh::build(scene);
     let buffers = SceneBuffers::new(gpu, scene, &bvh, &settings.lights).expect("the scene fits");
     let tracer = PhotonTracer::new(gpu, &buffers, settings.photons.sampler);
-    let traced = tracer.trace(gpu, &buffers, &settings.photons, scene.has_delta(), &Silent).expect("photons trace");
+    let traced = tracer.trace(gpu, &buffers, &settings.photons, scene.has_specular(), &Silent).expect("photons trace");
     let photons: Vec<Photon> = traced.maps.global.read(gpu).expect("photons read back");
     let sum = |c: usize| photons.iter().map(|p| f64::from(p.flux[c])).sum::<f64>() / traced.maps.global.emitted as f64;
     let flux = [0, 1, 2].map(sum);

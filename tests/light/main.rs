@@ -1,6 +1,7 @@
 //! Pictures and photon maps against closed forms, against references, and modes against each other.
 
 mod analytic;
+mod contacts;
 mod extremes;
 mod flat_surfaces;
 mod lights;

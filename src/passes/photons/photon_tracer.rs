@@ -193,7 +193,7 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool)
         choices: &lights.aimed,
         stream: layout::STREAM_CAUSTIC,
         first_target: 1,
-        target_count: lights.delta_targets,
+        target_count: lights.specular_targets,
         rules: layout::AIM | layout::CAUSTICS_APART,
         fills: &[MapKind::Caustic],
     };

@@ -8,7 +8,7 @@ use super::fault::{Notes, Read, fault};
 use crate::scene::{Material, Surface};
 
 /// Roughness below which a lobe is narrower than a pixel and is read as specular.
-const DELTA_ROUGHNESS: f32 = 0.03;
+const SPECULAR_ROUGHNESS: f32 = 0.03;
 
 /// Default index of refraction in glTF.
 const DEFAULT_IOR: f32 = 1.5;
@@ -85,7 +85,7 @@ fn surface(material: &json::Material, name: &str, place: &str, notes: &mut Notes
     if transmission > 0.0 {
         notes.add(format!("material {name:?}: transmission {transmission} is read as 0"));
     }
-    if metallic >= 0.5 && roughness < DELTA_ROUGHNESS {
+    if metallic >= 0.5 && roughness < SPECULAR_ROUGHNESS {
         if metallic < 1.0 {
             notes.add(format!("material {name:?}: metallic {metallic} is read as 1"));
         }
@@ -103,7 +103,7 @@ fn surface(material: &json::Material, name: &str, place: &str, notes: &mut Notes
 
 /// Notes how the roughness of a mirror or glass is approximated.
 fn note_roughness(roughness: f32, name: &str, notes: &mut Notes) {
-    if roughness >= DELTA_ROUGHNESS {
+    if roughness >= SPECULAR_ROUGHNESS {
         notes.add(format!("material {name:?}: roughness {roughness} is read as 0 until rough materials come"));
     } else if roughness > 0.0 {
         notes.add(format!("material {name:?}: roughness {roughness} is small enough to be perfectly smooth"));

@@ -37,7 +37,7 @@ use support::gpu;
 fn traced(scene: &Scene, settings: &Settings) -> TracedPhotons {
     let buffers = SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &settings.lights).expect("the scene fits");
     let tracer = PhotonTracer::new(gpu(), &buffers, settings.photons.sampler);
-    tracer.trace(gpu(), &buffers, &settings.photons, scene.has_delta(), &Silent).expect("photons trace")
+    tracer.trace(gpu(), &buffers, &settings.photons, scene.has_specular(), &Silent).expect("photons trace")
 }
 
 /// Flux of a map's photons, W in the first channel.

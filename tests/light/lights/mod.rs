@@ -33,7 +33,7 @@ fn traced(scene: &Scene, settings: &Settings) -> TracedPhotons {
     let gpu = gpu();
     let buffers = SceneBuffers::new(gpu, scene, &Bvh::build(scene), &settings.lights).expect("the scene fits");
     let tracer = PhotonTracer::new(gpu, &buffers, settings.photons.sampler);
-    tracer.trace(gpu, &buffers, &settings.photons, scene.has_delta(), &Silent).expect("photons trace")
+    tracer.trace(gpu, &buffers, &settings.photons, scene.has_specular(), &Silent).expect("photons trace")
 }
 
 /// Total flux of the photons of `emitted` paths, W in the first channel.

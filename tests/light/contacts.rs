@@ -1,0 +1,104 @@
+//! Surfaces that lie in each other, one of them a lamp, and copies in one place.
+//!
+//! | test | closed form | negative control |
+//! |---|---|---|
+//! | lamp in a ceiling | irradiance below the middle of a square lamp; its own radiance is seen | a lamp behind the ceiling |
+//! | copies | the scene with one copy | a copy aside |
+
+use std::f64::consts::PI;
+
+use caustica::{
+    scene::{Scene, Triangle},
+    settings::Mode,
+};
+use glam::{Quat, Vec3, vec3};
+use serde_json::json;
+use support::{
+    gltf::{loaded, push, triangle},
+    *,
+};
+
+/// Part of the light of a square lamp that reaches a point below its middle: half side over distance
+/// (Modest 2013, "Radiative Heat Transfer", configuration 11 of appendix D, four times).
+fn form_factor(half: f64, distance: f64) -> f64 {
+    let x = half / distance;
+    let y = (1.0 + x * x).sqrt();
+    4.0 / PI * x / y * (x / y).atan()
+}
+
+/// A floor and a ceiling, with a lamp that lies `above` the ceiling's plane; in one order or the
+/// other, tilted as a whole.
+fn scene_with_lamp(half: f32, distance: f32, above: f32, lamp_first: bool, tilt: f32) -> Scene {
+    let mut scene = scene(&[diffuse(0.5)]);
+    scene.materials.push(emissive("lamp", 0.0, 10.0, false));
+    let square = |half: f32, height: f32| {
+        let corner = vec3(-half, height, -half);
+        (corner, Vec3::X * 2.0 * half, Vec3::Z * 2.0 * half)
+    };
+    // Both look down; the ceiling is larger and cut elsewhere.
+    let (lamp, ceiling) = (square(half, distance + above), square(3.7 * half, distance));
+    let mut add = |(corner, x, z): (Vec3, Vec3, Vec3), material| add_quad(&mut scene, corner, x, z, material);
+    if lamp_first {
+        add(lamp, 1);
+    }
+    add(ceiling, 0);
+    if !lamp_first {
+        add(lamp, 1);
+    }
+    let (corner, x, z) = square(4.0 * half, 0.0);
+    add_quad(&mut scene, corner, z, x, 0);
+    let turn = Quat::from_euler(glam::EulerRot::XYZ, tilt, 0.7 * tilt, 0.4 * tilt);
+    let turned = |t: &Triangle| Triangle {
+        positions: t.positions.map(|p| turn * p),
+        normals: t.normals.map(|n| turn * n),
+        ..*t
+    };
+    scene.triangles = scene.triangles.iter().map(turned).collect();
+    let eye = turn * vec3(0.0, 0.4 * distance, 0.0);
+    scene.cameras =
+        [vec3(0.001, 0.0, 0.0), vec3(0.001, distance, 0.0)].map(|target| camera(eye, turn * target, 4.0)).to_vec();
+    scene
+}
+
+#[test]
+fn a_lamp_in_the_plane_of_a_ceiling_shines_whatever_the_order() {
+    for (half, distance, tilt) in [(1.5, 1.0, 0.0), (0.8, 0.7, 0.6), (0.3, 0.9, 2.0)] {
+        let right = 5.0 * form_factor(f64::from(half), f64::from(distance));
+        let picture = |scene: &Scene, camera: usize, mode: Mode| {
+            let settings = settings(mode, 200_000, 12).with(|s| {
+                s.picture.camera = Some(camera.to_string());
+                s.picture.light_samples = 64;
+                s.estimate.neighbors = 200;
+            });
+            mean(&render_scene(scene, &settings))
+        };
+        for lamp_first in [true, false] {
+            let scene = scene_with_lamp(half, distance, 0.0, lamp_first, tilt);
+            let (floor, lamp) = (picture(&scene, 0, Mode::DirectRays), picture(&scene, 1, Mode::DirectRays));
+            assert!(within(floor, right, 0.01), "half {half}: {floor} instead of {right}");
+            assert!(within(lamp, 10.0, 1e-4), "half {half}: {lamp} is seen of the lamp");
+            let photons = picture(&scene, 0, Mode::DirectPhotons);
+            assert!(within(photons, right, 0.02), "half {half}: {photons} by photons instead of {right}");
+        }
+        let hidden = scene_with_lamp(half, distance, 0.01, true, tilt);
+        assert!(picture(&hidden, 0, Mode::DirectRays) < 0.01, "control: a lamp a centimetre behind the ceiling");
+    }
+}
+
+#[test]
+fn copies_in_one_place_are_there_once() {
+    let copies = |count: usize, aside: f32| {
+        let mut file = triangle();
+        for _ in 0..count {
+            let node = push(&mut file, "nodes", json!({ "mesh": 0, "translation": [aside, 0, 0] }));
+            file["scenes"][0]["nodes"].as_array_mut().expect("a list").push(json!(node));
+        }
+        loaded(&file)
+    };
+    let (one, many) = (copies(0, 0.0), copies(4000, 0.0));
+    assert_eq!(one.triangles, many.triangles);
+    assert_eq!(many.warnings, ["4000 copies of meshes lie exactly where others do and are not drawn"]);
+    assert_eq!(copies(3, 0.5).triangles.len(), 2, "control: three copies aside are one");
+    let count = |scene: &Scene| render_scene(scene, &settings(Mode::Hybrid, 1000, 8)).stats.unfinished_rays;
+    assert_eq!(count(&many), 0);
+}
