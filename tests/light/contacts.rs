@@ -18,8 +18,8 @@ use support::{
     *,
 };
 
-/// Part of the light of a square lamp that reaches a point below its middle: half side over distance
-/// (Modest 2013, "Radiative Heat Transfer", configuration 11 of appendix D, four times).
+/// Part of the light of a square lamp that reaches a point below its middle: half side over
+/// distance (Modest 2013, "Radiative Heat Transfer", configuration 11 of appendix D, four times).
 fn form_factor(half: f64, distance: f64) -> f64 {
     let x = half / distance;
     let y = (1.0 + x * x).sqrt();

@@ -102,12 +102,16 @@ fn meshes_that_are_no_clean_solids_are_named_and_never_too_bright() {
         .collect();
     let cross = Mesh::block(vec3(-1.0, -0.2, -0.2), vec3(1.0, 0.2, 0.2))
         .with(&Mesh::block(vec3(-0.2, -1.0, -0.2), vec3(0.2, 1.0, 0.2)));
+    // A lathe whose outline runs through itself.
+    let outline = [(0.0, -0.8), (1.0, -0.8), (0.3, 0.5), (0.9, 0.5), (0.4, -0.6), (0.0, 0.6)];
+    let bow_tie = Mesh::lathe(Vec3::ZERO, &outline, 12);
     for (name, mesh, said) in [
         ("open bowl", Mesh::lathe(Vec3::ZERO, &bowl, 24), "is an open sheet, taken for a thin pane"),
         ("doubled", ball.clone().with(&ball.clone().turned()), "has doubled faces, which count once"),
         ("inside out", ball.clone().turned(), "is wound inside out and was turned"),
         ("hole", holed, "has holes, but is taken for a solid"),
         ("parts that cross", cross, ""),
+        ("crossing itself", bow_tie, "crosses itself"),
         ("clean", ball.clone(), ""),
     ] {
         let scene = assert_white(name, &[(mesh, 0)], &glasses);

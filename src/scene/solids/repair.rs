@@ -40,6 +40,7 @@ struct Faults {
     turned: usize,
     holes: usize,
     t_junctions: usize,
+    crossings: usize,
 }
 
 /// Repairs the glass of a scene: doubled faces count once, open sheets become thin panes, and
@@ -91,6 +92,7 @@ pub(crate) fn repair(
         let fault = &mut faults[mesh(shell)];
         fault.holes += usize::from(!shell.is_closed());
         fault.t_junctions += usize::from(shell.has_t_junctions);
+        fault.crossings += usize::from(shell.is_closed() && shell.crosses_itself(triangles));
         if shell.volume < 0.0 {
             match found.around(triangles, shell) {
                 // A bubble is of the glass around it, whatever its own material.
@@ -226,6 +228,7 @@ fn warning(name: &str, faults: &Faults) -> Option<String> {
         ),
         (faults.turned > 0, "is wound inside out and was turned"),
         (faults.holes > 0, "has holes, but is taken for a solid"),
+        (faults.crossings > 0, "crosses itself: where it lies in itself, light may be bent too little"),
         (faults.t_junctions > 0, "has T-junctions, but is taken for closed"),
     ];
     let said: Vec<&str> = parts.into_iter().filter(|(holds, _)| *holds).map(|(_, text)| text).collect();

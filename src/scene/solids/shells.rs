@@ -37,6 +37,12 @@ pub(super) struct Shells {
 /// Holes smaller than this part of the surface are cracks of rounding.
 const CLOSED: f64 = 1e-4;
 
+/// Points at which a shell is probed at most, triangles visited for them in all, and their depth
+/// below a face over its size.
+const MAX_PROBES: usize = 256;
+const PROBE_COST: usize = 20_000_000;
+const PROBE_DEPTH: f64 = 1e-3;
+
 impl Shells {
     /// The shells of the triangles of each group.
     pub(super) fn new(triangles: &[Triangle], groups: &[Vec<u32>]) -> Self {
@@ -108,6 +114,19 @@ impl Shells {
 }
 
 impl Shell {
+    /// Whether faces lie inside of the shell, which then crosses itself; by some points just below
+    /// its faces.
+    pub(super) fn crosses_itself(&self, triangles: &[Triangle]) -> bool {
+        let probes = (PROBE_COST / self.triangles.len()).clamp(1, MAX_PROBES);
+        let step = (self.triangles.len() / probes).max(1);
+        self.triangles.iter().step_by(step).any(|i| {
+            let triangle = &triangles[*i as usize];
+            let [a, b, c] = triangle.positions.map(Vec3::as_dvec3);
+            let below = PROBE_DEPTH * triangle.area().sqrt() * triangle.geometric_normal().as_dvec3();
+            (winding(triangles, self, (a + b + c) / 3.0 - below) - self.volume.signum()).abs() > 0.5
+        })
+    }
+
     /// Nothing is missing but for rounding.
     pub(super) fn is_closed(&self) -> bool {
         self.openness < CLOSED
