@@ -2,7 +2,7 @@
 //! `survey_surface`, `gather`, `finish_gather`.
 
 use crate::{
-    density::Density,
+    density::Polynomial,
     gpu::{Gpu, Kernel},
     layout,
     upload::SceneBuffers,
@@ -63,10 +63,8 @@ pub(super) struct Variant {
 }
 
 impl Variant {
-    pub(super) fn new(density: Density, fixed_radius: bool, windows: u32) -> Self {
-        let polynomial = density.polynomial();
-        let (moments, power) = (polynomial.moments, polynomial.power);
-        Self { windows, moments, power, counts: fixed_radius }
+    pub(super) fn new(kernel: Polynomial, fixed_radius: bool, windows: u32) -> Self {
+        Self { windows, moments: kernel.moments, power: kernel.power, counts: fixed_radius }
     }
 }
 
