@@ -725,7 +725,7 @@ pub struct GridStep {
 }
 
 /// Bytes of `SearchState` in the shaders: the state of a query between dispatches.
-pub const SEARCH_STATE_BYTES: usize = 112;
+pub const SEARCH_STATE_BYTES: usize = 128;
 /// Bytes of `GatherState` in the shaders: the sums of a packet between dispatches.
 pub const GATHER_STATE_BYTES: usize = 1072;
 

@@ -217,7 +217,9 @@ impl<'s> Gather<'s> {
         let (sum_bindings, finish_bindings) =
             (sum.bind(gpu, &with_info(&infos[0])), finish.bind(gpu, &with_info(&infos[0])));
         let survey = survey.as_ref().zip(self.kernels.scene);
-        let survey = survey.map(|(kernel, scene)| (kernel, kernel.bind(gpu, &scene.with(&with_info(&infos[0])))));
+        let survey = survey.map(|(kernels, scene)| {
+            kernels.each_ref().map(|kernel| (kernel, kernel.bind(gpu, &scene.with(&with_info(&infos[0])))))
+        });
         let packets = u64::from(waiting.div_ceil(PACKET));
         let mut dispatches = 0;
         loop {
@@ -232,7 +234,7 @@ impl<'s> Gather<'s> {
                 let packets = packets.div_ceil(BLOCK).div_ceil(stride.into()) * BLOCK;
                 search.dispatch(&mut encoder, bindings, packets);
             }
-            if let Some((survey, bindings)) = &survey {
+            for (survey, bindings) in survey.iter().flatten() {
                 survey.dispatch(&mut encoder, bindings, waiting.into());
             }
             sum.dispatch(&mut encoder, &sum_bindings, packets);
