@@ -97,6 +97,7 @@ fn grid_rate(
         radius: None,
         max_radius: None,
         density: Settings::default().estimate.density(),
+        softness: 0,
     };
     let radiance = gpu.storage::<[f32; 4]>("radiance", count.into()).expect("it fits");
     let gathered = gathered_buffer(gpu, count).expect("it fits");

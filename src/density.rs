@@ -27,6 +27,12 @@ pub enum DensityKernel {
     Silverman,
 }
 
+/// An estimate of k photons weighs more than k, and these more softly, if k is below one of these:
+/// by (1 − qᵖ)³ below the first, (1 − qᵖ)² below the second, 1 − qᵖ below the third.
+const SOFT_BELOW: [u32; 3] = [16, 32, 100];
+/// Minimum number of photons that a softened kernel weighs.
+const LEAST_SOFT: u32 = 12;
+
 /// β of Jensen's Gaussian.
 const BETA: f64 = 1.953;
 /// Maximum number of coefficients of a polynomial, that is, of moments that the device sums.
@@ -91,6 +97,43 @@ impl Density {
         }
     }
 
+    /// What an estimate of `k` photons sums: how many, and the softness of the kernel
+    /// ([`Self::softened`]).
+    ///
+    /// The ball up to the (k+1)-th photon holds k of them where photons lie at random, but k + ½ on
+    /// average where they lie in a regular pattern, as those of Sobol numbers do. An estimate whose
+    /// kernel ends at that ball is then too dark by ½/k. Photons nearer to the middle have no part
+    /// in this: among them, the ball's radius is as good as independent of the pattern. With few
+    /// photons, the kernel is therefore softened at its rim, and stretched over as many more photons
+    /// as leave its variance the same: (∫ K)²/∫ K², times the number of photons, is kept.
+    #[must_use]
+    pub fn of_few(self, k: u32) -> (u32, u32) {
+        let most = if self.kernel == DensityKernel::Constant { 3 } else { 2 };
+        let softness = SOFT_BELOW.iter().filter(|below| k < **below).count().min(most);
+        if softness == 0 {
+            return (k, 0);
+        }
+        let softness = softness as u32;
+        let stretched = f64::from(k) * self.polynomial().spread() / self.softened(softness).spread();
+        (LEAST_SOFT.max(stretched.ceil() as u32), softness)
+    }
+
+    /// The kernel times (1 − qᵖ)^`softness`: at most 3 for the constant kernel, 2 for the others.
+    #[must_use]
+    pub fn softened(self, softness: u32) -> Polynomial {
+        let mut polynomial = self.polynomial();
+        if self.kernel == DensityKernel::Gaussian {
+            // Fewer coefficients leave room for the factor.
+            polynomial.moments = MAX_MOMENTS as u32 - softness;
+            polynomial.coefficients = interpolated(gaussian, polynomial.moments as usize);
+        }
+        for _ in 0..softness {
+            (1..MAX_MOMENTS).rev().for_each(|m| polynomial.coefficients[m] -= polynomial.coefficients[m - 1]);
+            polynomial.moments += 1;
+        }
+        polynomial
+    }
+
     /// Polynomial that the device sums: exact but for the Gaussian, which it approximates to 2e-5.
     #[must_use]
     pub fn polynomial(self) -> Polynomial {
@@ -103,7 +146,7 @@ impl Density {
             DensityKernel::Cone => of(1, &[1.0, -1.0 / f64::from(self.cone_constant)]),
             DensityKernel::Constant => of(2, &[1.0]),
             DensityKernel::Epanechnikov => of(2, &[1.0, -1.0]),
-            DensityKernel::Gaussian => of(2, &interpolated(gaussian)),
+            DensityKernel::Gaussian => of(2, &interpolated(gaussian, MAX_MOMENTS)),
             DensityKernel::Silverman => of(2, &[1.0, -2.0, 1.0]),
         }
     }
@@ -135,6 +178,16 @@ impl Polynomial {
         (0..).zip(self.coefficients).map(|(m, c)| 2.0 * c / f64::from(self.power * m + 2)).sum()
     }
 
+    /// (∫ K)²/∫ K² over the disc, relative to its area: the part of the photons that counts, if
+    /// equal weights of fewer photons would give the same variance.
+    fn spread(&self) -> f64 {
+        let pairs = (0..MAX_MOMENTS).flat_map(|m| (0..MAX_MOMENTS).map(move |n| (m, n)));
+        let term = |(m, n): (usize, usize)| {
+            2.0 * self.coefficients[m] * self.coefficients[n] / f64::from(self.power * (m + n) as u32 + 2)
+        };
+        self.mean().powi(2) / pairs.map(term).sum::<f64>()
+    }
+
     /// Relative radius q within which the given fraction of the integral of the kernel lies, for
     /// 0 ≤ fraction ≤ 1.
     #[must_use]
@@ -157,22 +210,21 @@ fn gaussian(q2: f64) -> f64 {
     1.0 - (1.0 - (-BETA * q2 / 2.0).exp()) / (1.0 - (-BETA).exp())
 }
 
-/// Coefficients of the polynomial that interpolates `f` at the Chebyshev nodes of [0, 1], by
-/// Newton's divided differences.
-fn interpolated(f: impl Fn(f64) -> f64) -> [f64; MAX_MOMENTS] {
-    const N: usize = MAX_MOMENTS;
-    let node = |i: usize| 0.5 + 0.5 * ((2 * i + 1) as f64 * std::f64::consts::PI / (2 * N) as f64).cos();
-    let nodes: [f64; N] = std::array::from_fn(node);
+/// The `n` coefficients of the polynomial that interpolates `f` at the Chebyshev nodes of [0, 1],
+/// by Newton's divided differences; zeros behind them.
+fn interpolated(f: impl Fn(f64) -> f64, n: usize) -> [f64; MAX_MOMENTS] {
+    let node = |i: usize| 0.5 + 0.5 * ((2 * i + 1) as f64 * std::f64::consts::PI / (2 * n) as f64).cos();
+    let nodes: [f64; MAX_MOMENTS] = std::array::from_fn(node);
     let mut differences = nodes.map(f);
-    for order in 1..N {
-        for i in (order..N).rev() {
+    for order in 1..n {
+        for i in (order..n).rev() {
             differences[i] = (differences[i] - differences[i - 1]) / (nodes[i] - nodes[i - order]);
         }
     }
     // Expands Horner's scheme in (t - node).
-    let mut coefficients = [0.0; N];
-    for i in (0..N).rev() {
-        for m in (1..N).rev() {
+    let mut coefficients = [0.0; MAX_MOMENTS];
+    for i in (0..n).rev() {
+        for m in (1..n).rev() {
             coefficients[m] = coefficients[m - 1] - nodes[i] * coefficients[m];
         }
         coefficients[0] = differences[i] - nodes[i] * coefficients[0];
@@ -240,6 +292,30 @@ mod tests {
             let q = polynomial.quantile(0.3);
             let inside = integral(|x| if x < q { polynomial.at(x) } else { 0.0 }, polynomial.mean());
             assert!((inside - 0.3).abs() < 1e-3, "{density:?}: {inside}");
+        }
+    }
+
+    #[test]
+    fn kernels_of_few_photons_are_soft_at_the_rim_and_of_the_same_variance() {
+        for density in all() {
+            for k in [1, 2, 5, 10, 20, 30, 50, 99] {
+                let (photons, softness) = density.of_few(k);
+                let soft = density.softened(softness);
+                assert!((integral(|q| soft.at(q), soft.mean()) - 1.0).abs() < 1e-6, "{density:?}, k = {k}");
+                assert!(soft.at(1.0).abs() < 1e-9 && soft.at(0.5) > 0.0, "{density:?}, k = {k}");
+                let counts = |polynomial: Polynomial| {
+                    let mean = integral(|q| polynomial.at(q), 1.0);
+                    mean * mean / integral(|q| polynomial.at(q).powi(2), 1.0)
+                };
+                let ratio = f64::from(photons) * counts(soft) / (f64::from(k) * counts(density.polynomial()));
+                let same = ratio > 0.999 && f64::from(photons - 1) * ratio < f64::from(photons);
+                assert!(same || photons == LEAST_SOFT, "{density:?}, k = {k}: {ratio}");
+            }
+            assert_eq!(density.of_few(100), (100, 0));
+            assert_eq!(density.softened(0), density.polynomial());
+            // Control: most plain kernels do not end softly.
+            let cone = density.kernel == DensityKernel::Cone && density.cone_constant > 1.0;
+            assert!(!cone || density.softened(0).at(1.0) > 0.1, "{density:?}");
         }
     }
 }

@@ -529,7 +529,7 @@ pub const PILOT_STRIDE: u32 = 8;
 /// One block in this many is searched before the other pilots.
 pub const FIRST_PILOT_STRIDE: u32 = 64;
 /// Maximum number of rays that survey one disc.
-pub const MOST_RAYS: u32 = 150;
+pub const MOST_RAYS: u32 = 180;
 
 /// One cell of the photon grid: [`CELL_PHOTONS`] consecutive photons along a Hilbert curve, or
 /// [`CELL_FAN`] cells of the next finer level. Cells are stored level by level, from the coarsest,
@@ -732,7 +732,7 @@ pub struct GridStep {
 }
 
 /// Bytes of `SearchState` in the shaders: the state of a query between dispatches.
-pub const SEARCH_STATE_BYTES: usize = 112;
+pub const SEARCH_STATE_BYTES: usize = 128;
 /// Bytes of `GatherState` in the shaders: the sums of a packet between dispatches.
 pub const GATHER_STATE_BYTES: usize = 1072;
 

@@ -78,8 +78,8 @@ pub fn compare(
         sabotage: options.sabotage,
         radiance: Default::default(),
     };
-    // Every visible point is gathered: no two share an estimate.
-    let estimate = EstimateSettings { share_reach: 0.0, ..settings.estimate.clone() };
+    // Every visible point is gathered: no two share an estimate. Both sides make the raw one.
+    let estimate = EstimateSettings { share_reach: 0.0, raw: true, ..settings.estimate.clone() };
     let (films, mut stats) =
         session.films(&maps, &estimate, &settings.picture, (&mut sides, Stage::Compare), progress)?;
     let [grid, kdtree] = [0, 1].map(|side: usize| films[side].finish());

@@ -10,7 +10,7 @@ use crate::{
     gpu::Gpu,
     layout::{Gathered, VisiblePoint},
     map_kind::MapKind,
-    passes::{EstimateRequest, EstimateSharing, Gather, GatherOptions, PhotonMap, StepCount, Tile},
+    passes::{EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, PhotonMap, StepCount, Tile},
     progress::Progress,
     reference::{Estimate, KdMap},
     settings::{EstimateSettings, Search},
@@ -61,7 +61,10 @@ impl<'a> MapGatherer<'a> {
                 Searches::KdTree(trees)
             }
         };
-        Ok(Self { maps, search, sharing: EstimateSharing::new(gpu, estimate.share_reach), estimate, observer })
+        // Kernels of few photons are stretched over more: that does not widen what they tell of.
+        let stretched = GatherSettings::from(estimate).neighbors as f32 / estimate.neighbors as f32;
+        let sharing = EstimateSharing::new(gpu, estimate.share_reach / stretched.sqrt());
+        Ok(Self { maps, search, sharing, estimate, observer })
     }
 
     /// Adds the light of one map at the tile's visible points. `index` is the index in the photon

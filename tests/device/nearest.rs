@@ -68,7 +68,7 @@ fn run(gpu: &Gpu, gather: &mut Gather, map: &PhotonMap, points: &[VisiblePoint],
 }
 
 fn settings(k: u32) -> GatherSettings {
-    GatherSettings { neighbors: k, radius: None, max_radius: None, density: CONE }
+    GatherSettings { neighbors: k, radius: None, max_radius: None, density: CONE, softness: 0 }
 }
 
 /// Number of valid points whose answer differs from brute force over `photons`: in the count, in

@@ -42,25 +42,26 @@ pub struct GatherSettings {
     pub radius: Option<f32>,
     /// Largest radius, metres.
     pub max_radius: Option<f32>,
-    /// Density kernel.
+    /// Density kernel, and how far it is softened ([`Density::softened`]).
     pub density: Density,
+    pub softness: u32,
 }
 
 impl GatherSettings {
     /// Kernels for a map of that many windows.
     fn variant(&self, windows: u32) -> Variant {
-        Variant::new(self.density, self.radius.is_some(), windows)
+        Variant::new(self.density.softened(self.softness), self.radius.is_some(), windows)
     }
 }
 
 impl From<&EstimateSettings> for GatherSettings {
+    /// Few photons are weighed as in [`Density::of_few`], unless the estimate is raw.
     fn from(settings: &EstimateSettings) -> Self {
-        Self {
-            neighbors: settings.neighbors,
-            radius: settings.radius.filter(|_| settings.search == Search::Radius),
-            max_radius: settings.max_radius,
-            density: settings.density(),
-        }
+        let radius = settings.radius.filter(|_| settings.search == Search::Radius);
+        let (density, k) = (settings.density(), settings.neighbors);
+        let is_plain = settings.raw || radius.is_some();
+        let (neighbors, softness) = if is_plain { (k, 0) } else { density.of_few(k) };
+        Self { neighbors, radius, max_radius: settings.max_radius, density, softness }
     }
 }
 
@@ -148,7 +149,7 @@ impl<'s> Gather<'s> {
         (radiance, gathered): (&Buffer, &Buffer),
         progress: &dyn Progress,
     ) -> Result<GatherStats> {
-        let polynomial = settings.density.polynomial();
+        let polynomial = settings.density.softened(settings.softness);
         let compiled = self.kernels.compile(gpu, settings.variant(map.windows()));
         if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
             self.scratch = Some(Scratch::new(gpu, count.min(BATCH))?);
@@ -216,7 +217,9 @@ impl<'s> Gather<'s> {
         let (sum_bindings, finish_bindings) =
             (sum.bind(gpu, &with_info(&infos[0])), finish.bind(gpu, &with_info(&infos[0])));
         let survey = survey.as_ref().zip(self.kernels.scene);
-        let survey = survey.map(|(kernel, scene)| (kernel, kernel.bind(gpu, &scene.with(&with_info(&infos[0])))));
+        let survey = survey.map(|(kernels, scene)| {
+            kernels.each_ref().map(|kernel| (kernel, kernel.bind(gpu, &scene.with(&with_info(&infos[0])))))
+        });
         let packets = u64::from(waiting.div_ceil(PACKET));
         let mut dispatches = 0;
         loop {
@@ -231,7 +234,7 @@ impl<'s> Gather<'s> {
                 let packets = packets.div_ceil(BLOCK).div_ceil(stride.into()) * BLOCK;
                 search.dispatch(&mut encoder, bindings, packets);
             }
-            if let Some((survey, bindings)) = &survey {
+            for (survey, bindings) in survey.iter().flatten() {
                 survey.dispatch(&mut encoder, bindings, waiting.into());
             }
             sum.dispatch(&mut encoder, &sum_bindings, packets);

@@ -1,8 +1,8 @@
 //! Kernels of the search and the sum, and what they are compiled for. Kernels: `search_radius`,
-//! `survey_surface`, `gather`, `finish_gather`.
+//! `survey_surface`, `survey_narrow`, `gather`, `finish_gather`.
 
 use crate::{
-    density::Density,
+    density::Polynomial,
     gpu::{Gpu, Kernel},
     layout,
     upload::SceneBuffers,
@@ -63,10 +63,8 @@ pub(super) struct Variant {
 }
 
 impl Variant {
-    pub(super) fn new(density: Density, fixed_radius: bool, windows: u32) -> Self {
-        let polynomial = density.polynomial();
-        let (moments, power) = (polynomial.moments, polynomial.power);
-        Self { windows, moments, power, counts: fixed_radius }
+    pub(super) fn new(kernel: Polynomial, fixed_radius: bool, windows: u32) -> Self {
+        Self { windows, moments: kernel.moments, power: kernel.power, counts: fixed_radius }
     }
 }
 
@@ -74,7 +72,7 @@ impl Variant {
 #[derive(Debug)]
 pub(super) struct Compiled {
     pub(super) search: Kernel,
-    pub(super) survey: Option<Kernel>,
+    pub(super) survey: Option<[Kernel; 2]>,
     pub(super) sum: Kernel,
     pub(super) finish: Kernel,
 }
@@ -111,7 +109,9 @@ impl<'s> GatherKernels<'s> {
         ];
         let kernel = |stem| Kernel::new(gpu, stem, &overrides);
         let with_budget = [overrides.as_slice(), &[("TRACE_BUDGET", SURVEY_TRACE_BUDGET.into())]].concat();
-        let survey = |scene: &SceneBuffers| scene.kernel_with(gpu, "survey_surface", &with_budget);
+        let survey = |scene: &SceneBuffers| {
+            ["survey_surface", "survey_narrow"].map(|stem| scene.kernel_with(gpu, stem, &with_budget))
+        };
         let compiled = Compiled {
             search: kernel("search_radius"),
             survey: self.scene.filter(|_| self.options.surveys()).map(survey),
