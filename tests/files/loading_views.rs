@@ -52,7 +52,7 @@ fn hidden_nodes_and_all_below_them_are_not_there() {
     gltf["extensionsRequired"] = json!(["KHR_node_visibility"]);
     gltf["extensions"]["KHR_implicit_shapes"] = json!({ "shapes": [{ "type": "sphere", "sphere": { "radius": 1 } }] });
     let ball = json!({ "extensions": { "KHR_implicit_shapes": { "shape": 0 } }, "extras": { "material": 0 } });
-    let grid = json!({ "mesh": 0, "children": [3, 1] });
+    let grid = json!({ "mesh": 0, "translation": [0, 0, -1], "children": [3, 1] });
     gltf["nodes"].as_array_mut().expect("a list").extend([ball, grid, json!({ "name": "group", "children": [4] })]);
     gltf["scenes"][0]["nodes"] = json!([0, 2, 5]);
     let view = || "view".to_owned();
