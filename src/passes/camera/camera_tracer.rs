@@ -5,17 +5,18 @@
 use super::{
     direct_light::DirectLighting,
     tile::{StepCount, Tile},
+    view::{UNCLIPPED, view},
 };
 use crate::{
     bvh::Media,
-    error::{Error, Result},
+    error::Result,
     gpu::{Buffer, Gpu, Kernel},
     layout::{self, CameraTile, Counters, FirstHit, Gathered, MARGIN_CELL, MARGIN_SAMPLES, PixelSums, VisiblePoint},
     passes::{
         estimate::SharedPoints,
         wavefront::{Step, Wavefront},
     },
-    scene::{Camera, Projection},
+    scene::Camera,
     settings::{Crop, PhotonSettings, PictureSettings},
     upload::{SceneBuffers, sampler_constant},
 };
@@ -30,8 +31,6 @@ const PIXEL_SAMPLES: u32 = 256;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
-/// Depth of the near plane if there is none, metres.
-const UNCLIPPED: f32 = f32::MIN;
 /// Surfaces before the near plane that a ray passes at most.
 const MOST_UNSEEN: u32 = 1 << 12;
 /// Minimum number of pixels of a tile.
@@ -104,8 +103,6 @@ impl CameraTracer {
             branches,
             filter_steps: offsets.len() as u32 - 1,
             media,
-            near_depth: if camera.near == 0.0 { UNCLIPPED } else { camera.near },
-            far_depth: camera.far.min(f32::MAX),
             ..view(camera, size, photons, picture)?
         };
         let margin = if shares { margin_cells(tile_sides(&view)) * MARGIN_SAMPLES } else { 0 };
@@ -304,35 +301,4 @@ fn tile_sides(view: &CameraTile) -> (u32, u32) {
 /// Number of cells in the margin of a tile of that size.
 fn margin_cells((width, height): (u32, u32)) -> u32 {
     2 * (width / MARGIN_CELL + 2) + 2 * (height / MARGIN_CELL)
-}
-
-/// The camera for a picture of that size. The vertical angle of view is kept; the horizontal one
-/// follows from the aspect ratio.
-fn view(
-    camera: &Camera,
-    (width, height): (u32, u32),
-    photons: &PhotonSettings,
-    picture: &PictureSettings,
-) -> Result<CameraTile> {
-    let parallel = matches!(camera.projection, Projection::Orthographic { .. });
-    if parallel && picture.aperture > 0.0 {
-        let problem = "needs a perspective camera; this one is orthographic".to_owned();
-        return Err(Error::Setting { name: "picture.aperture", value: picture.aperture.to_string(), problem });
-    }
-    let half_height = camera.half_height_at(1.0, (width, height));
-    let half_width = half_height * width as f32 / height as f32;
-    Ok(CameraTile {
-        position: camera.position.to_array(),
-        seed: photons.seed,
-        right: (camera.right * half_width).to_array(),
-        width,
-        up: (camera.up * half_height).to_array(),
-        height,
-        forward: camera.forward.to_array(),
-        spp: picture.spp,
-        parallel: u32::from(parallel),
-        lens_radius: 0.5 * picture.aperture,
-        focus: picture.focus.unwrap_or(1.0),
-        ..Default::default()
-    })
 }

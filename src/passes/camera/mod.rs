@@ -4,6 +4,7 @@ pub mod camera_tracer;
 mod direct_light;
 pub mod final_gather;
 pub mod tile;
+mod view;
 
 pub use camera_tracer::{CameraKernels, CameraTracer};
 pub use final_gather::FinalGather;
