@@ -145,14 +145,27 @@ fn winding(triangles: &[Triangle], shell: &Shell, point: DVec3) -> f64 {
     shell.triangles.iter().map(angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
+/// A vertex by its bits.
+type Key = [u32; 3];
+
+/// An edge between two vertices in the order of their keys, relative to the first vertex of its
+/// shell, metres.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    /// Faces that run along it, less those that run against it.
+    count: i32,
+    from: DVec3,
+    to: DVec3,
+}
+
 /// Bits of a position, by which equal vertices are found; −0 is 0.
-fn key(position: Vec3) -> [u32; 3] {
+fn key(position: Vec3) -> Key {
     (position + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
 /// Parts of a group whose triangles share vertices, in the order of their first triangles.
 fn connected(triangles: &[Triangle], group: &[u32]) -> Vec<Vec<u32>> {
-    let mut ids: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut ids: HashMap<Key, u32> = HashMap::new();
     let mut parent: Vec<u32> = Vec::new();
     let mut corner_ids = Vec::with_capacity(group.len());
     for &triangle in group {
@@ -195,7 +208,7 @@ fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
     let (mut volume, mut area) = (0.0, 0.0);
     let bounds = part.iter().map(|i| Bounds::from(&triangles[*i as usize])).fold(Bounds::EMPTY, Bounds::union);
     // Directed edges without a partner in the other direction.
-    let mut edges: HashMap<([u32; 3], [u32; 3]), (i32, DVec3, DVec3)> = HashMap::new();
+    let mut edges: HashMap<(Key, Key), Edge> = HashMap::new();
     for &triangle in &part {
         let positions = triangles[triangle as usize].positions;
         let [a, b, c] = positions.map(|p| p.as_dvec3() - origin);
@@ -207,10 +220,10 @@ fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
             let (p, q) = (key(p), key(q));
             let (edge, direction) = if p < q { ((p, q), 1) } else { ((q, p), -1) };
             let (from, to) = if p < q { (from, to) } else { (to, from) };
-            edges.entry(edge).or_insert((0, from, to)).0 += direction;
+            edges.entry(edge).or_insert(Edge { count: 0, from, to }).count += direction;
         }
     }
-    let open: Vec<_> = edges.into_iter().filter(|(_, (count, ..))| *count != 0).collect();
+    let open: Vec<((Key, Key), Edge)> = edges.into_iter().filter(|(_, edge)| edge.count != 0).collect();
     let loops = boundary(&open);
     let rim =
         open.iter().flat_map(|((p, q), _)| [*p, *q].map(|bits| Vec3::from_array(bits.map(f32::from_bits)))).collect();
@@ -228,10 +241,10 @@ fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
 }
 
 /// Vector area and number of edges of each connected part of a boundary.
-fn boundary(open: &[(([u32; 3], [u32; 3]), (i32, DVec3, DVec3))]) -> Vec<(DVec3, usize)> {
+fn boundary(open: &[((Key, Key), Edge)]) -> Vec<(DVec3, usize)> {
     let mut sorted: Vec<_> = open.iter().collect();
     sorted.sort_by_key(|(edge, _)| *edge);
-    let mut ids: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut ids: HashMap<Key, u32> = HashMap::new();
     let mut parent: Vec<u32> = Vec::new();
     for ((p, q), _) in &sorted {
         let [a, b] = [p, q].map(|corner| {
@@ -244,11 +257,11 @@ fn boundary(open: &[(([u32; 3], [u32; 3]), (i32, DVec3, DVec3))]) -> Vec<(DVec3,
         parent[a.max(b) as usize] = a.min(b);
     }
     let mut parts: HashMap<u32, (DVec3, usize)> = HashMap::new();
-    for ((p, _), (count, from, to)) in sorted {
+    for ((p, _), edge) in sorted {
         let root = find(&mut parent, ids[p]);
         let part = parts.entry(root).or_default();
         // The hole's outline runs against the faces' edges.
-        part.0 -= 0.5 * f64::from(*count) * from.cross(*to);
+        part.0 -= 0.5 * f64::from(edge.count) * edge.from.cross(edge.to);
         part.1 += 1;
     }
     let mut found: Vec<_> = parts.into_iter().collect();
