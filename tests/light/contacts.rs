@@ -65,20 +65,22 @@ fn a_lamp_in_the_plane_of_a_ceiling_shines_whatever_the_order() {
     for (half, distance, tilt) in [(1.5, 1.0, 0.0), (0.8, 0.7, 0.6), (0.3, 0.9, 2.0)] {
         let right = 5.0 * form_factor(f64::from(half), f64::from(distance));
         let picture = |scene: &Scene, camera: usize, mode: Mode| {
-            let settings = settings(mode, 200_000, 12).with(|s| {
+            let settings = settings(mode, 50_000, 8).with(|s| {
                 s.picture.camera = Some(camera.to_string());
                 s.picture.light_samples = 64;
                 s.estimate.neighbors = 200;
             });
             mean(&render_scene(scene, &settings))
         };
+        // The same photons leave a lamp that hangs free, below its ceiling by a tenth of a millimetre.
+        let alone = picture(&scene_with_lamp(half, distance, -1e-4, true, tilt), 0, Mode::DirectPhotons);
         for lamp_first in [true, false] {
             let scene = scene_with_lamp(half, distance, 0.0, lamp_first, tilt);
             let (floor, lamp) = (picture(&scene, 0, Mode::DirectRays), picture(&scene, 1, Mode::DirectRays));
             assert!(within(floor, right, 0.01), "half {half}: {floor} instead of {right}");
             assert!(within(lamp, 10.0, 1e-4), "half {half}: {lamp} is seen of the lamp");
             let photons = picture(&scene, 0, Mode::DirectPhotons);
-            assert!(within(photons, right, 0.02), "half {half}: {photons} by photons instead of {right}");
+            assert!(within(photons, alone, 1e-3), "half {half}: {photons} by photons, {alone} without the ceiling");
         }
         let hidden = scene_with_lamp(half, distance, 0.01, true, tilt);
         assert!(picture(&hidden, 0, Mode::DirectRays) < 0.01, "control: a lamp a centimetre behind the ceiling");
