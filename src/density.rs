@@ -104,8 +104,8 @@ impl Density {
     /// average where they lie in a regular pattern, as those of Sobol numbers do. An estimate whose
     /// kernel ends at that ball is then too dark by ½/k. Photons nearer to the middle have no part
     /// in this: among them, the ball's radius is as good as independent of the pattern. With few
-    /// photons, the kernel is therefore softened at its rim, and stretched over as many more photons
-    /// as leave its variance the same: (∫ K)²/∫ K², times the number of photons, is kept.
+    /// photons, the kernel is therefore softened at its rim, and stretched over as many more
+    /// photons as leave its variance the same: (∫ K)²/∫ K², times the number of photons, is kept.
     #[must_use]
     pub fn of_few(self, k: u32) -> (u32, u32) {
         let most = if self.kernel == DensityKernel::Constant { 3 } else { 2 };
