@@ -3,9 +3,11 @@
 mod analytic;
 mod contacts;
 mod extremes;
+mod few_photons;
 mod flat_surfaces;
 mod lights;
 mod modes;
+mod narrow_things;
 mod pixels;
 mod references;
 mod refraction;

@@ -1,0 +1,175 @@
+//! Indirect light on things that are narrower than the disc of an estimate, in a room of 2 m.
+//!
+//! | things | right | negative control |
+//! |---|---|---|
+//! | rods of 4 and 2 cm, a grate | a path tracer outside of the crate, 400 paths a pixel of 60 bounces | the raw estimate; a brighter lamp |
+//! | wires of 6 mm, leaves of 8 mm | final gathering, whose rays mostly end on walls | the raw estimate |
+//! | a folded sheet and a torus, 10,000 to 1,000,000 photons | each other | light a tenth stronger |
+
+use std::f32::consts::TAU;
+
+use caustica::{
+    renderer::Render,
+    scene::{Projection, Scene, Triangle},
+    settings::{Mode, Settings},
+};
+use glam::{Vec3, vec3};
+use support::{photons::Random, *};
+
+/// A closed room with a lamp, seen from above.
+fn room(half_view: f32) -> Scene {
+    let mut scene = scene(&[diffuse(0.7)]);
+    scene.materials[0].double_sided = true;
+    add_box(&mut scene, Vec3::ONE, Vec3::NEG_ONE, 0);
+    scene.lights.push(point_light(vec3(0.1, 0.8, 0.1), 3.0));
+    let mut above = camera(vec3(0.0, 0.3, 0.0), Vec3::ZERO, 60.0);
+    (above.right, above.up) = (Vec3::X, Vec3::NEG_Z);
+    above.projection = Projection::Orthographic { ymag: half_view };
+    scene.cameras.push(above);
+    scene
+}
+
+/// Surface over a grid of `u` and `v` from 0 to 1, which yields places and normals.
+fn add_grid(scene: &mut Scene, (nu, nv): (u32, u32), at: impl Fn(f32, f32) -> (Vec3, Vec3)) {
+    for i in 0..nu {
+        for j in 0..nv {
+            let corner = |di, dj| at((i + di) as f32 / nu as f32, (j + dj) as f32 / nv as f32);
+            let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+            for [p, q, r] in [[a, b, c], [a, c, d]] {
+                let (positions, normals) = ([p.0, q.0, r.0], [p.1, q.1, r.1]);
+                scene.triangles.push(Triangle { positions, normals, material: 0 });
+            }
+        }
+    }
+}
+
+/// Rods of twelve sides, 1.8 m long, side by side.
+fn rods(radius: f32, count: u32, half_view: f32) -> Scene {
+    let mut scene = room(half_view);
+    for i in 0..count {
+        let x = -0.81 + 1.62 * i as f32 / (count - 1) as f32;
+        add_grid(&mut scene, (12, 1), |u, v| {
+            let normal = vec3((TAU * u).cos(), (TAU * u).sin(), 0.0);
+            (vec3(x, 0.0, 0.9 - 1.8 * v) + radius * normal, normal)
+        });
+    }
+    scene
+}
+
+/// Bars of 1 cm with gaps of 2 cm.
+fn grate() -> Scene {
+    let mut scene = room(0.2);
+    for i in 0..45 {
+        let x = -0.675 + 0.03 * i as f32;
+        add_box(&mut scene, vec3(x - 0.005, -0.02, -0.7), vec3(x + 0.005, 0.0, 0.7), 0);
+    }
+    scene
+}
+
+/// Square leaves of 8 mm, turned at random.
+fn leaves() -> Scene {
+    let mut scene = room(0.12);
+    let mut random = Random(4);
+    for _ in 0..4000 {
+        let center = (random.vector() - 0.5) * vec3(1.4, 0.2, 1.4);
+        let (a, b) = random.direction().any_orthonormal_pair();
+        add_quad(&mut scene, center - 0.004 * (a + b), 0.008 * a, 0.008 * b, 0);
+    }
+    scene
+}
+
+fn bent_sheet() -> Scene {
+    let mut scene = room(0.8);
+    add_grid(&mut scene, (14, 1), |u, v| {
+        let fold = if (14.0 * u).round() as u32 % 2 == 0 { 0.0 } else { 0.05 };
+        (vec3(-0.7 + 1.4 * u, fold, 0.7 - 1.4 * v), Vec3::Y)
+    });
+    for triangle in &mut scene.triangles {
+        let [a, b, c] = triangle.positions;
+        triangle.normals = [(b - a).cross(c - a).normalize(); 3];
+    }
+    scene
+}
+
+fn torus() -> Scene {
+    let mut scene = room(0.8);
+    add_grid(&mut scene, (96, 24), |u, v| {
+        let around = vec3((TAU * u).cos(), 0.0, (TAU * u).sin());
+        let normal = (TAU * v).cos() * around - (TAU * v).sin() * Vec3::Y;
+        (0.6 * around + 0.04 * normal, normal)
+    });
+    scene
+}
+
+fn asked(photons: u32) -> Settings {
+    Settings::default().with(|s| {
+        s.photons.mode = Mode::Hybrid;
+        s.photons.global = photons;
+        s.picture.size = Some((64, 64));
+    })
+}
+
+/// Pixels on the things, above the floor by more than half a metre.
+fn on_things(render: &Render) -> Vec<f64> {
+    let pixels = render.frame.radiance().iter().zip(render.frame.depth());
+    pixels.filter(|(_, depth)| **depth < 0.5).map(|(rgb, _)| f64::from(rgb[1])).collect()
+}
+
+fn mean_of(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Mean and greatest of the pixels on the things, over some seeds.
+fn found(scene: &Scene, settings: &Settings, seeds: u32) -> (f64, f64) {
+    let pixels: Vec<f64> = (0..seeds)
+        .flat_map(|seed| on_things(&render_scene(scene, &settings.clone().with(|s| s.photons.seed = seed))))
+        .collect();
+    (mean_of(&pixels), pixels.iter().copied().fold(0.0, f64::max))
+}
+
+#[test]
+fn rods_and_bars_have_the_light_of_a_path_tracer() {
+    // Mean, and greatest pixel of the path tracer.
+    let table = [
+        ("rods of 4 cm", rods(0.02, 10, 0.8), 1.558, 2.44),
+        ("rods of 2 cm", rods(0.01, 10, 0.3), 2.005, 2.45),
+        ("grate", grate(), 2.216, 2.57),
+    ];
+    for (name, things, right, greatest) in table {
+        let (mean, most) = found(&things, &asked(200_000), 3);
+        assert!(within(mean, right, 0.03), "{name}: {mean:.3}, right {right}");
+        assert!(most < 1.5 * greatest, "{name}: a pixel of {most:.2}");
+        let (raw, _) = found(&things, &asked(200_000).with(|s| s.estimate.raw = true), 1);
+        assert!(!within(raw, right, 0.1), "control: {name}: raw {raw:.3}, right {right}");
+        let mut brighter = things;
+        brighter.lights[0].intensity *= 1.1;
+        let (mean, _) = found(&brighter, &asked(200_000), 1);
+        assert!(!within(mean, right, 0.03), "control: {name}: light a tenth stronger is {mean:.3}, right {right}");
+    }
+}
+
+#[test]
+fn wires_and_leaves_have_the_light_that_final_gathering_finds() {
+    for (name, things) in [("wires", rods(0.003, 20, 0.12)), ("leaves", leaves())] {
+        let right = found(&things, &asked(200_000).with(|s| s.photons.final_gather = 32), 1);
+        let (mean, most) = found(&things, &asked(200_000), 8);
+        assert!(within(mean, right.0, 0.06), "{name}: {mean:.3}, right {:.3}", right.0);
+        assert!(most < 3.0 * right.1, "{name}: a pixel of {most:.2}, right at most {:.2}", right.1);
+        let (raw, _) = found(&things, &asked(200_000).with(|s| s.estimate.raw = true), 2);
+        assert!(!within(raw, right.0, 0.06), "control: {name}: raw {raw:.3}, right {:.3}", right.0);
+    }
+}
+
+#[test]
+fn bent_things_are_as_bright_with_few_photons_as_with_many() {
+    for (name, mut things) in [("folded sheet", bent_sheet()), ("torus", torus())] {
+        let (right, _) = found(&things, &asked(1_000_000), 1);
+        for photons in [10_000, 50_000, 200_000] {
+            let (mean, _) = found(&things, &asked(photons), 4);
+            assert!(within(mean, right, 0.03), "{name}, {photons} photons: {mean:.3}, right {right:.3}");
+        }
+        things.lights[0].intensity *= 1.1;
+        let (brighter, _) = found(&things, &asked(200_000), 1);
+        assert!(!within(brighter, right, 0.03), "control: {name}: light a tenth stronger passes");
+    }
+}
