@@ -81,7 +81,7 @@ fn leaves() -> Scene {
 fn bent_sheet() -> Scene {
     let mut scene = room(0.8);
     add_grid(&mut scene, (14, 1), |u, v| {
-        let fold = if (14.0 * u).round() as u32 % 2 == 0 { 0.0 } else { 0.05 };
+        let fold = if ((14.0 * u).round() as u32).is_multiple_of(2) { 0.0 } else { 0.05 };
         (vec3(-0.7 + 1.4 * u, fold, 0.7 - 1.4 * v), Vec3::Y)
     });
     for triangle in &mut scene.triangles {
