@@ -72,7 +72,8 @@ fn a_lamp_in_the_plane_of_a_ceiling_shines_whatever_the_order() {
             });
             mean(&render_scene(scene, &settings))
         };
-        // The same photons leave a lamp that hangs free, below its ceiling by a tenth of a millimetre.
+        // The same photons leave a lamp that hangs free, below its ceiling by a tenth of a
+        // millimetre.
         let alone = picture(&scene_with_lamp(half, distance, -1e-4, true, tilt), 0, Mode::DirectPhotons);
         for lamp_first in [true, false] {
             let scene = scene_with_lamp(half, distance, 0.0, lamp_first, tilt);
