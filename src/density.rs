@@ -31,7 +31,7 @@ pub enum DensityKernel {
 /// by (1 − qᵖ)³ below the first, (1 − qᵖ)² below the second, 1 − qᵖ below the third.
 const SOFT_BELOW: [u32; 3] = [16, 32, 100];
 /// Minimum number of photons that a softened kernel weighs.
-const LEAST_SOFT: u32 = 12;
+const MIN_SOFT: u32 = 12;
 
 /// β of Jensen's Gaussian.
 const BETA: f64 = 1.953;
@@ -115,7 +115,7 @@ impl Density {
         }
         let softness = softness as u32;
         let stretched = f64::from(k) * self.polynomial().spread() / self.softened(softness).spread();
-        (LEAST_SOFT.max(stretched.ceil() as u32), softness)
+        (MIN_SOFT.max(stretched.ceil() as u32), softness)
     }
 
     /// The kernel times (1 − qᵖ)^`softness`: at most 3 for the constant kernel, 2 for the others.
@@ -309,7 +309,7 @@ mod tests {
                 };
                 let ratio = f64::from(photons) * counts(soft) / (f64::from(k) * counts(density.polynomial()));
                 let same = ratio > 0.999 && f64::from(photons - 1) * ratio < f64::from(photons);
-                assert!(same || photons == LEAST_SOFT, "{density:?}, k = {k}: {ratio}");
+                assert!(same || photons == MIN_SOFT, "{density:?}, k = {k}: {ratio}");
             }
             assert_eq!(density.of_few(100), (100, 0));
             assert_eq!(density.softened(0), density.polynomial());

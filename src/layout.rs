@@ -529,7 +529,7 @@ pub const PILOT_STRIDE: u32 = 8;
 /// One block in this many is searched before the other pilots.
 pub const FIRST_PILOT_STRIDE: u32 = 64;
 /// Maximum number of rays that survey one disc.
-pub const MOST_RAYS: u32 = 180;
+pub const MAX_RAYS: u32 = 180;
 
 /// One cell of the photon grid: [`CELL_PHOTONS`] consecutive photons along a Hilbert curve, or
 /// [`CELL_FAN`] cells of the next finer level. Cells are stored level by level, from the coarsest,

@@ -19,5 +19,5 @@ pub use buffer::{Buffer, MemoryCount};
 pub use commands::Commands;
 pub use device::Gpu;
 pub use kernel::{Bindings, Kernel};
-pub use pace::{MOST_PER_DISPATCH, Pacing};
+pub use pace::{MAX_PER_DISPATCH, Pacing};
 pub use table::Table;

@@ -3,8 +3,8 @@
 //! such watchdog.
 //!
 //! Each kernel's cost per invocation is measured on the device. A dispatch that would take longer
-//! than [`MOST_PER_DISPATCH`] is cut into parts, and a submission is closed before it takes longer
-//! than [`MOST_PER_SUBMISSION`]. Nothing that reaches the picture depends on the cuts: an
+//! than [`MAX_PER_DISPATCH`] is cut into parts, and a submission is closed before it takes longer
+//! than [`MAX_PER_SUBMISSION`]. Nothing that reaches the picture depends on the cuts: an
 //! invocation knows its number, never its part.
 
 use std::{
@@ -26,15 +26,15 @@ pub enum Pacing {
 
 /// The longest that a dispatch should take: a quarter of the 100 ms that it may, for the next can
 /// be four times as costly.
-pub const MOST_PER_DISPATCH: Duration = Duration::from_millis(25);
+pub const MAX_PER_DISPATCH: Duration = Duration::from_millis(25);
 /// The longest that a submission should take.
-const MOST_PER_SUBMISSION: Duration = Duration::from_millis(100);
+const MAX_PER_SUBMISSION: Duration = Duration::from_millis(100);
 /// Invocations of a part at least: fewer would not fill a GPU, nor end much sooner.
-pub(super) const LEAST_PART: u64 = 4096;
+pub(super) const MIN_PART: u64 = 4096;
 /// Invocations of a part of a kernel that was never measured.
 pub(super) const UNMEASURED: u64 = 1 << 14;
 /// Invocations of a part that is timed, at least: fewer tell of latency, not of cost.
-pub(super) const LEAST_TIMED: u64 = LEAST_PART / 2;
+pub(super) const MIN_TIMED: u64 = MIN_PART / 2;
 /// What is left of a cost that later measures fall below. Slow, for a queue of paths that dries up
 /// measures less and less.
 const DECAY: f64 = 0.98;
@@ -68,9 +68,9 @@ impl Pace {
             Pacing::Parts(n) => {
                 return Part { invocations: left.min(workgroups_of(n.into())), seconds: Some(f64::INFINITY) };
             }
-            Pacing::Measured => self.cost(stem).map(|cost| (MOST_PER_DISPATCH.as_secs_f64() / cost) as u64),
+            Pacing::Measured => self.cost(stem).map(|cost| (MAX_PER_DISPATCH.as_secs_f64() / cost) as u64),
         };
-        let part = most.unwrap_or(UNMEASURED).max(LEAST_PART);
+        let part = most.unwrap_or(UNMEASURED).max(MIN_PART);
         // Equal parts, so that none is a short rest.
         let parts = left.div_ceil(part).max(1);
         let invocations = left.min(workgroups_of(left.div_ceil(parts)));
@@ -79,10 +79,10 @@ impl Pace {
 
     /// Whether a submission of that length has room for the part.
     pub fn fits(&self, seconds: f64, part: &Part) -> bool {
-        seconds == 0.0 || seconds + part.seconds.unwrap_or(f64::INFINITY) <= MOST_PER_SUBMISSION.as_secs_f64()
+        seconds == 0.0 || seconds + part.seconds.unwrap_or(f64::INFINITY) <= MAX_PER_SUBMISSION.as_secs_f64()
     }
 
-    /// Takes note of what a part of at least [`LEAST_TIMED`] invocations took.
+    /// Takes note of what a part of at least [`MIN_TIMED`] invocations took.
     pub fn measured(&self, stem: &'static str, invocations: u64, seconds: f64) {
         let cost = (seconds / invocations as f64).max(1e-15);
         let mut costs = self.costs.lock().unwrap_or_else(PoisonError::into_inner);
@@ -127,9 +127,9 @@ mod tests {
         assert!(parts(&pace, 1 << 17, 1.0)[1..].iter().all(|n| (4032..=4096).contains(n)));
         // Seconds that fall are believed little by little.
         assert_eq!(parts(&pace, 1 << 12, 1e-9), [4096]);
-        assert_eq!(pace.part("kernel", 1 << 17).invocations, LEAST_PART);
+        assert_eq!(pace.part("kernel", 1 << 17).invocations, MIN_PART);
         for _ in 0..2000 {
-            pace.measured("kernel", LEAST_PART, 0.0);
+            pace.measured("kernel", MIN_PART, 0.0);
         }
         assert_eq!(pace.part("kernel", 1 << 17).invocations, 1 << 17);
     }

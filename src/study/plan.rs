@@ -64,14 +64,14 @@ pub struct Finer {
 }
 
 /// Maximum number of photons in a pass of a reference, unless the study itself uses more.
-const MOST_PHOTONS: u32 = 1_000_000;
+const MAX_PHOTONS: u32 = 1_000_000;
 
 impl Finer {
     /// Default for a study: several passes with ten times the photons of its finest map, up to a
     /// limit, and `samples` samples a pixel.
     #[must_use]
     pub fn than(most_photons: u32, spp: u32) -> Self {
-        let photons = most_photons.saturating_mul(10).min(MOST_PHOTONS.max(most_photons));
+        let photons = most_photons.saturating_mul(10).min(MAX_PHOTONS.max(most_photons));
         Self { photons, neighbors: 50, spp, passes: 4 }
     }
 }

@@ -23,8 +23,8 @@ use caustica::{
 const SIZE: usize = 32;
 const BLOCK: usize = 8;
 /// The largest relative differences of photon counts and of means.
-const MOST_PHOTONS: f64 = 0.001;
-const MOST_MEAN: f64 = 0.002;
+const MAX_PHOTONS: f64 = 0.001;
+const MAX_MEAN: f64 = 0.002;
 
 /// Paths of SwiftShader's ICD manifest in distributions: Debian, Fedora.
 const DRIVERS: [&str; 2] =
@@ -96,11 +96,11 @@ fn is_close(a: f64, b: f64, most: f64) -> bool {
 }
 
 fn same_photons(a: &Rendered, b: &Rendered) -> bool {
-    a.photons().into_iter().zip(b.photons()).all(|(a, b)| is_close(a as f64, b as f64, MOST_PHOTONS))
+    a.photons().into_iter().zip(b.photons()).all(|(a, b)| is_close(a as f64, b as f64, MAX_PHOTONS))
 }
 
 fn same_mean(a: &Rendered, b: &Rendered) -> bool {
-    is_close(a.mean(), b.mean(), MOST_MEAN)
+    is_close(a.mean(), b.mean(), MAX_MEAN)
 }
 
 /// Renders of a scene: on the default driver with two seeds, and on SwiftShader.

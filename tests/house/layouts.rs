@@ -143,7 +143,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         QUERY_BLOCK,
         PILOT_STRIDE,
         FIRST_PILOT_STRIDE,
-        MOST_RAYS,
+        MAX_RAYS,
         TABLE_COLUMNS
     ]
     .to_vec()

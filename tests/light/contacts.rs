@@ -14,7 +14,8 @@ use caustica::{
 use glam::{Quat, Vec3, vec3};
 use serde_json::json;
 use support::{
-    gltf::{loaded, push, triangle},
+    gltf::{lambert, loaded, push, triangle},
+    meshes::{Mesh, scene_of},
     *,
 };
 
@@ -86,6 +87,42 @@ fn a_lamp_in_the_plane_of_a_ceiling_shines_whatever_the_order() {
         let hidden = scene_with_lamp(half, distance, 0.01, true, tilt);
         assert!(picture(&hidden, 0, Mode::DirectRays) < 0.01, "control: a lamp a centimetre behind the ceiling");
     }
+}
+
+#[test]
+fn a_lamp_twice_in_one_place_shines_once() {
+    // The second lamp is brighter, of a material and a mesh of its own, and has its corners in
+    // another order.
+    let lamps = |second: Option<([u32; 3], f32)>| {
+        let quad = |order: [u32; 3], height: f32| Mesh {
+            positions: vec![vec3(-1.0, height, -1.0), vec3(1.0, height, -1.0), vec3(0.0, height, 1.0)],
+            triangles: vec![order],
+        };
+        let mut floor = quad([0, 2, 1], 0.0);
+        floor.positions.iter_mut().for_each(|p| *p *= 5.0);
+        let mut meshes = vec![(floor, 0), (quad([0, 1, 2], 1.0), 1)];
+        meshes.extend(second.map(|(order, height)| (quad(order, height), 2)));
+        let lamp =
+            |emission: f32| json!({ "emissiveFactor": [emission; 3], "pbrMetallicRoughness": { "metallicFactor": 0 } });
+        let mut scene = scene_of(&meshes, &[lambert([0.5; 3]), lamp(0.5), lamp(1.0)]);
+        scene.cameras = vec![camera(vec3(0.0, 0.5, 0.001), Vec3::ZERO, 30.0)];
+        scene
+    };
+    let once = lamps(None);
+    let power = |scene: &Scene| {
+        let of = |mode| mean(&render_scene(scene, &settings(mode, 20_000, 6)));
+        [of(Mode::DirectRays), of(Mode::DirectPhotons)]
+    };
+    let right = power(&once);
+    let twice = lamps(Some(([1, 2, 0], 1.0)));
+    assert_eq!(power(&twice), right);
+    assert!(
+        twice.warnings.iter().any(|line| line.starts_with("1 emissive triangles lie exactly")),
+        "{:?}",
+        twice.warnings
+    );
+    let apart = power(&lamps(Some(([1, 2, 0], 0.9))));
+    assert!(apart[0] > 1.5 * right[0], "control: a lamp below it adds light: {apart:?}");
 }
 
 #[test]

@@ -32,7 +32,7 @@ const PIXEL_SAMPLES: u32 = 256;
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
 /// Surfaces before the near plane that a ray passes at most.
-const MOST_UNSEEN: u32 = 1 << 12;
+const MAX_UNSEEN: u32 = 1 << 12;
 /// Minimum number of pixels of a tile.
 const MIN_TILE_PIXELS: u32 = 64;
 
@@ -216,7 +216,7 @@ impl CameraTracer {
         let trace = Step { kernel: trace.kernel, buffers: &followed };
         // Without mirrors and glass, the first surface that the camera sees ends every path.
         let surfaces = if scene.has_specular { layout::CHAIN_LIMIT } else { 1 };
-        let most_surfaces = surfaces + if self.view.near_depth == UNCLIPPED { 0 } else { MOST_UNSEEN };
+        let most_surfaces = surfaces + if self.view.near_depth == UNCLIPPED { 0 } else { MAX_UNSEEN };
         let counters = self.wavefront.run(
             gpu,
             scene,

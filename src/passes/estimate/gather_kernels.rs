@@ -12,7 +12,7 @@ use crate::{
 /// the loop iterations of software Vulkan.
 const SURVEY_TRACE_BUDGET: u32 = 230;
 // Software Vulkan ends all loops of a subgroup after 65,535 iterations in total.
-const _: () = assert!(layout::MOST_RAYS * (SURVEY_TRACE_BUDGET + 1) < 65_535);
+const _: () = assert!(layout::MAX_RAYS * (SURVEY_TRACE_BUDGET + 1) < 65_535);
 
 /// Options that the kernels are compiled with; for tests and benchmarks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

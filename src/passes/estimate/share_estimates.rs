@@ -12,7 +12,7 @@ use crate::{
 /// few already. Sizes between these save little too, because each round costs time of its own.
 const ROUNDS: [u32; 3] = [64, 4, 1];
 /// Minimum number of samples of a cell. Of fewer, most would be queries themselves.
-const LEAST_CELL: u32 = 4;
+const MIN_CELL: u32 = 4;
 /// Stride of the pixels of a cell in the first round that have a candidate sample for its query.
 const FIRST_STEP: u32 = ROUNDS[0] / MARGIN_SAMPLES;
 const _: () = assert!(ROUNDS[0] == MARGIN_CELL * MARGIN_CELL);
@@ -92,7 +92,7 @@ impl EstimateSharing {
     pub fn run(&mut self, gpu: &Gpu, map_number: u32, tile: &SharedPoints, estimates: &mut Estimates) -> Result<()> {
         let count = tile.pixels * tile.samples * tile.branches;
         for cell_pixels in ROUNDS {
-            if self.reach == 0.0 || cell_pixels * tile.samples < LEAST_CELL {
+            if self.reach == 0.0 || cell_pixels * tile.samples < MIN_CELL {
                 break;
             }
             let is_first = cell_pixels == ROUNDS[0];

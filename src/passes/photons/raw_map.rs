@@ -10,7 +10,7 @@ use crate::{
 
 /// Minimum growth of a map over a window of paths, as a fraction of its capacity. A map that gains
 /// less is idle.
-const LEAST_GROWTH: f64 = 1e-4;
+const MIN_GROWTH: f64 = 1e-4;
 
 /// Photons in the order of their paths.
 #[derive(Debug)]
@@ -97,7 +97,7 @@ impl RawMap {
     pub(crate) fn close_if_idle(&mut self, name: &str, window: u64) -> Option<String> {
         let gained = self.stored - self.stored_before;
         self.stored_before = self.stored;
-        if !self.open || gained as f64 >= LEAST_GROWTH * self.capacity as f64 {
+        if !self.open || gained as f64 >= MIN_GROWTH * self.capacity as f64 {
             return None;
         }
         self.open = false;

@@ -20,6 +20,7 @@ mod accessor;
 mod buffers;
 mod cameras;
 mod container;
+mod doubled_lamps;
 mod draco;
 mod extensions;
 mod fault;
@@ -123,6 +124,7 @@ fn assemble(
     let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges);
     warnings.into_iter().for_each(|warning| notes.add(warning));
     (scene.triangles, scene.shells) = (triangles, shells);
+    doubled_lamps::remove(&mut scene, &mut notes);
     scene.spheres = contents.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
     contents.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();

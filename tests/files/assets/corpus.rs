@@ -7,7 +7,7 @@ use support::{any_environment, any_scene};
 use super::memory::peak;
 
 /// Maximum memory for reading a file of a corpus, whatever sizes it claims.
-const MOST_BYTES: i64 = 200 << 20;
+const MAX_BYTES: i64 = 200 << 20;
 
 /// Passes each file of a corpus to `check`. Returns the numbers of accepted and of refused files.
 fn replay<T>(corpus: &str, check: impl Fn(&[u8]) -> Result<T, String>) -> (usize, usize) {
@@ -19,7 +19,7 @@ fn replay<T>(corpus: &str, check: impl Fn(&[u8]) -> Result<T, String>) -> (usize
         let bytes = fs::read(&path).expect("can be read");
         println!("{}", path.display());
         let (most, read) = peak(|| check(&bytes));
-        assert!(most < MOST_BYTES, "{}: {most} bytes at once", path.display());
+        assert!(most < MAX_BYTES, "{}: {most} bytes at once", path.display());
         match read {
             Ok(_) => counts.0 += 1,
             Err(_) => counts.1 += 1,
