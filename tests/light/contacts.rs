@@ -102,8 +102,7 @@ fn a_lamp_twice_in_one_place_shines_once() {
         floor.positions.iter_mut().for_each(|p| *p *= 5.0);
         let mut meshes = vec![(floor, 0), (quad([0, 1, 2], 1.0), 1)];
         meshes.extend(second.map(|(order, height)| (quad(order, height), 2)));
-        let lamp =
-            |emission: f32| json!({ "emissiveFactor": [emission; 3], "pbrMetallicRoughness": { "metallicFactor": 0 } });
+        let lamp = |emission: f32| json!({ "emissiveFactor": vec![emission; 3], "pbrMetallicRoughness": { "metallicFactor": 0 } });
         let mut scene = scene_of(&meshes, &[lambert([0.5; 3]), lamp(0.5), lamp(1.0)]);
         scene.cameras = vec![camera(vec3(0.0, 0.5, 0.001), Vec3::ZERO, 30.0)];
         scene
