@@ -247,6 +247,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             // The scene.
             "mesh_cache",
             "placing",
+            "doubled_lamps",
         ],
     ),
 ];
