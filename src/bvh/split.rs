@@ -51,13 +51,13 @@ impl Ord for Piece {
 /// The boxes of all primitives, whose whole boxes are given, each with the index of its primitive.
 pub(super) fn pieces(primitives: &[Primitive], whole: Vec<Bounds>) -> (Vec<Bounds>, Vec<u32>) {
     let all = whole.iter().copied().fold(Bounds::EMPTY, Bounds::union);
-    let crowd = whole.iter().map(half_area).sum::<f32>() / half_area(&all);
+    let crowd = whole.iter().map(|bounds| bounds.half_area()).sum::<f32>() / all.half_area();
     let mut indices: Vec<u32> = (0..primitives.len() as u32).collect();
     if !crowd.is_finite() || crowd < CROWDED {
         return (whole, indices);
     }
     let piece = |(bounds, primitive): (&Bounds, &u32)| Piece {
-        area: half_area(bounds),
+        area: bounds.half_area(),
         bounds: *bounds,
         primitive: *primitive,
     };
@@ -82,11 +82,6 @@ pub(super) fn pieces(primitives: &[Primitive], whole: Vec<Bounds>) -> (Vec<Bound
     (done.iter().map(|piece| piece.bounds).collect(), indices)
 }
 
-fn half_area(bounds: &Bounds) -> f32 {
-    let size = bounds.max - bounds.min;
-    size.x * size.y + size.y * size.z + size.z * size.x
-}
-
 /// The boxes of the parts of a triangle on both sides of the middle of its box; `None` where that
 /// gains nothing.
 fn halves(piece: &Piece, primitive: &Primitive) -> Option<[Piece; 2]> {
@@ -107,7 +102,7 @@ fn halves(piece: &Piece, primitive: &Primitive) -> Option<[Piece; 2]> {
     });
     sides[0].max[axis] = sides[0].max[axis].min(middle);
     sides[1].min[axis] = sides[1].min[axis].max(middle);
-    let areas = sides.map(|side| half_area(&side));
+    let areas = sides.map(|side| side.half_area());
     let valid = sides.iter().all(|side| side.min.cmple(side.max).all());
     let made = |i: usize| Piece { area: areas[i], bounds: sides[i], primitive: piece.primitive };
     (valid && areas[0] + areas[1] < 0.9 * piece.area).then(|| [made(0), made(1)])

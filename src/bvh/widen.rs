@@ -78,7 +78,7 @@ impl Widener<'_> {
         let mut children = self.binary.nodes[index].to_vec();
         while children.len() < WIDTH {
             let interior = children.iter().enumerate().filter(|(_, child)| child.count == 0);
-            let largest = interior.max_by(|a, b| half_area(a.1.bounds).total_cmp(&half_area(b.1.bounds)));
+            let largest = interior.max_by(|a, b| a.1.bounds.half_area().total_cmp(&b.1.bounds.half_area()));
             let Some((largest, child)) = largest else { break };
             let opened = self.binary.nodes[child.first as usize];
             children.splice(largest..=largest, opened);
@@ -93,9 +93,4 @@ impl Widener<'_> {
         };
         self.binary.nodes[index].iter().flat_map(open).collect()
     }
-}
-
-fn half_area(bounds: Bounds) -> f32 {
-    let size = bounds.max - bounds.min;
-    size.x * size.y + size.y * size.z + size.z * size.x
 }

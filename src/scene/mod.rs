@@ -22,5 +22,6 @@ pub(crate) use light::spot_heights;
 pub use light::{LUMENS_PER_WATT, Light, LightKind};
 pub use load_options::LoadOptions;
 pub use material::{Material, Medium, Surface};
+pub(crate) use shape::vertex_bits;
 pub use shape::{Bounds, Sphere, Triangle};
 pub use solids::{NO_SLOT, Solids};

@@ -33,6 +33,11 @@ impl Triangle {
     }
 }
 
+/// A vertex by its bits, by which equal ones are found; −0 is 0.
+pub(crate) fn vertex_bits(position: Vec3) -> [u32; 3] {
+    (position + Vec3::ZERO).to_array().map(f32::to_bits)
+}
+
 /// An exact sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
@@ -69,6 +74,13 @@ impl Bounds {
     #[must_use]
     pub fn union(self, other: Bounds) -> Bounds {
         Bounds { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Half of the surface, m²; 0 for the empty box.
+    #[must_use]
+    pub fn half_area(self) -> f32 {
+        let size = (self.max - self.min).max(Vec3::ZERO);
+        size.x * size.y + size.y * size.z + size.z * size.x
     }
 
     /// Length of the diagonal, metres; 0 for the empty box.

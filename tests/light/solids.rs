@@ -241,6 +241,23 @@ fn thin_glass_far_from_the_origin_is_no_thicker_than_it_is() {
 }
 
 #[test]
+fn more_solids_in_one_place_than_are_told_apart_are_counted() {
+    let counted = |count: usize| {
+        let glasses: Vec<Value> = (0..count).map(|i| glass_of(1.2 + 0.1 * i as f32)).collect();
+        let meshes: Vec<_> = (0..count).map(|i| (Mesh::block(Vec3::splat(-1.0), Vec3::splat(1.0)), i)).collect();
+        in_furnace(scene_of(&meshes, &glasses), vec3(0.4, 1.2, 4.0)).stats
+    };
+    let (five, seven) = (counted(5), counted(7));
+    assert_eq!(five.media_overflows, 0);
+    assert!(seven.media_overflows > 100, "{} of seven solids", seven.media_overflows);
+    assert!(
+        seven.warnings.iter().any(|line| line.contains("surfaces of glass lay in one place")),
+        "{:?}",
+        seven.warnings
+    );
+}
+
+#[test]
 fn priority_decides_which_solid_fills_the_space() {
     // A large ball of the index of air and a small one of glass in it: the large one hides it.
     let of = |priority: i32| {

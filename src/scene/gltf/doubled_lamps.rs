@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use glam::Vec3;
 
 use super::fault::Notes;
-use crate::scene::{Scene, Triangle};
+use crate::scene::{Scene, Triangle, vertex_bits};
 
 /// Leaves out emissive triangles that lie exactly where another one does and face the same way: a
 /// ray meets one of them, and photons and direct light must not come from both.
@@ -13,7 +13,7 @@ pub(super) fn remove(scene: &mut Scene, notes: &mut Notes) {
     let shines: Vec<bool> = scene.materials.iter().map(|material| material.emission != Vec3::ZERO).collect();
     let mut known = HashSet::new();
     let mut is_first = |triangle: &Triangle| {
-        let corners = triangle.positions.map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
+        let corners = triangle.positions.map(vertex_bits);
         // The smallest corner first: the order of the others tells which way the triangle faces.
         let start = (0..3).min_by_key(|i| corners[*i]).unwrap_or(0);
         known.insert([0, 1, 2].map(|i| corners[(start + i) % 3]))

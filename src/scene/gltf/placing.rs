@@ -7,7 +7,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::fault::{Notes, Read, fault};
 use super::mesh_cache::MeshInstance;
 use super::meshes::MeshPrimitive;
-use crate::scene::Triangle;
+use crate::scene::{Triangle, vertex_bits};
 
 /// Maximum size of a scene, metres.
 pub(super) const MAX_EXTENT: f64 = 1e18;
@@ -114,7 +114,7 @@ fn without_copies(
     meshes: Vec<PlacedMesh>,
     notes: &mut Notes,
 ) -> (Vec<Triangle>, Vec<PlacedMesh>) {
-    let corners = |triangle: &Triangle| triangle.positions.map(|p| p.to_array().map(f32::to_bits));
+    let corners = |triangle: &Triangle| triangle.positions.map(vertex_bits);
     let mut known: HashMap<_, Vec<Range<usize>>> = HashMap::new();
     let mut is_copy = |range: &Range<usize>| {
         let own = &triangles[range.clone()];

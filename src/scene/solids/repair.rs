@@ -11,7 +11,7 @@ use super::{
 };
 use glam::Vec3;
 
-use crate::scene::{Bounds, Material, Surface, Triangle};
+use crate::scene::{Bounds, Material, Surface, Triangle, vertex_bits};
 
 /// Part of the surface below which a hole of few edges counts as a missing triangle.
 const SMALL_HOLE: f64 = 0.05;
@@ -152,7 +152,7 @@ fn distance(point: Vec3, triangle: &Triangle) -> f32 {
 /// its faces look.
 fn without_doubles(triangles: &[Triangle], mesh_of: &[usize], is_glass: &[bool], faults: &mut [Faults]) -> Vec<bool> {
     let corners = |triangle: &Triangle| {
-        let mut keys = triangle.positions.map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
+        let mut keys = triangle.positions.map(vertex_bits);
         keys.sort_unstable();
         keys
     };

@@ -5,7 +5,7 @@ use std::{collections::HashMap, mem};
 use glam::{DVec3, Vec3};
 
 use super::solid::{COVER_BIT, NONE};
-use crate::scene::{Bounds, Triangle};
+use crate::scene::{Bounds, Triangle, vertex_bits};
 
 /// A connected part of a mesh: its triangles share vertices.
 #[derive(Clone, Debug)]
@@ -158,11 +158,6 @@ struct Edge {
     to: DVec3,
 }
 
-/// Bits of a position, by which equal vertices are found; −0 is 0.
-fn key(position: Vec3) -> Key {
-    (position + Vec3::ZERO).to_array().map(f32::to_bits)
-}
-
 /// Parts of a group whose triangles share vertices, in the order of their first triangles.
 fn connected(triangles: &[Triangle], group: &[u32]) -> Vec<Vec<u32>> {
     let mut ids: HashMap<Key, u32> = HashMap::new();
@@ -170,7 +165,7 @@ fn connected(triangles: &[Triangle], group: &[u32]) -> Vec<Vec<u32>> {
     let mut corner_ids = Vec::with_capacity(group.len());
     for &triangle in group {
         let corners = triangles[triangle as usize].positions.map(|p| {
-            *ids.entry(key(p)).or_insert_with(|| {
+            *ids.entry(vertex_bits(p)).or_insert_with(|| {
                 parent.push(parent.len() as u32);
                 parent.len() as u32 - 1
             })
@@ -217,7 +212,7 @@ fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
         for (p, q, from, to) in
             [(0, 1, a, b), (1, 2, b, c), (2, 0, c, a)].map(|(i, j, from, to)| (positions[i], positions[j], from, to))
         {
-            let (p, q) = (key(p), key(q));
+            let (p, q) = (vertex_bits(p), vertex_bits(q));
             let (edge, direction) = if p < q { ((p, q), 1) } else { ((q, p), -1) };
             let (from, to) = if p < q { (from, to) } else { (to, from) };
             edges.entry(edge).or_insert(Edge { count: 0, from, to }).count += direction;
