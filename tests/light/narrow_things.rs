@@ -163,7 +163,7 @@ fn rods_and_bars_have_the_light_of_a_path_tracer() {
 #[test]
 fn wires_and_leaves_have_the_light_that_final_gathering_finds() {
     for (name, things) in [("wires", rods(0.003, 20, 0.12)), ("leaves", leaves())] {
-        let right = found(&things, &asked(200_000).with(|s| s.photons.final_gather = 32), 1);
+        let right = found(&things, &asked(200_000).with(|s| s.photons.final_gather = 12), 1);
         let (pixels, raw) = found_and_raw(&things, &asked(200_000), 4, 2);
         let (mean, most, raw) = (mean_of(&pixels), greatest_of(&pixels), mean_of(&raw));
         assert!(within(mean, right.0, 0.06), "{name}: {mean:.3}, right {:.3}", right.0);
