@@ -23,7 +23,7 @@ impl Random {
 }
 
 fn triangle(positions: [Vec3; 3]) -> Triangle {
-    let mut triangle = Triangle { positions, normals: [Vec3::ZERO; 3], material: 0 };
+    let mut triangle = Triangle::new(positions, [Vec3::ZERO; 3], 0);
     triangle.normals = [triangle.geometric_normal(); 3];
     triangle
 }

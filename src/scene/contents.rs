@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
 
-use super::{Bounds, Camera, Environment, Light, Material, Sphere, Triangle};
+use super::{Attributes, Bounds, Camera, Environment, Image, Light, Material, Sphere, Triangle};
 use crate::{
     Error, Result,
     image::{EnvironmentProvenance, Provenance},
@@ -27,6 +27,10 @@ pub struct Scene {
     pub center: DVec3,
     /// Triangles of all meshes.
     pub triangles: Vec<Triangle>,
+    /// What the corners of triangles with textures or colours carry.
+    pub attributes: Vec<Attributes>,
+    /// Images of the materials' textures.
+    pub images: Vec<Image>,
     /// Index of the solid of glass that each triangle bounds, `u32::MAX` for none; empty where no
     /// file says which triangles belong together.
     pub shells: Vec<u32>,

@@ -12,6 +12,7 @@ mod load_options;
 mod material;
 mod shape;
 mod solids;
+mod texture;
 mod words;
 
 pub use camera::{Camera, Projection};
@@ -21,7 +22,8 @@ pub use environment::Environment;
 pub(crate) use light::spot_heights;
 pub use light::{LUMENS_PER_WATT, Light, LightKind};
 pub use load_options::LoadOptions;
-pub use material::{Material, Medium, Surface};
+pub use material::{Alpha, Material, Medium, SHARP_ROUGHNESS, Surface, Textures};
 pub(crate) use shape::vertex_bits;
 pub use shape::{Bounds, Sphere, Triangle};
 pub use solids::{NO_SLOT, Solids};
+pub use texture::{Attributes, Image, Texture, UV_SETS, Wrap};

@@ -181,6 +181,7 @@ fn material(material: &Material, unit: LightUnit) -> layout::Material {
             Surface::Mirror { .. } => layout::MIRROR,
             Surface::Glass { .. } => layout::GLASS,
             Surface::Pane { .. } => layout::PANE,
+            Surface::Layered { .. } => layout::DIFFUSE,
         },
         emission: emission_in(material.emission, unit).to_array(),
         ior: surface.ior().unwrap_or(1.0),

@@ -32,7 +32,7 @@ fn room(side: i32) -> Scene {
     for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
         for [a, b, c] in [[at(i, j), at(i, j + 1), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i + 1, j)]] {
             let normals = [(b - a).cross(c - a).normalize(); 3];
-            scene.triangles.push(caustica::scene::Triangle { positions: [a, b, c], normals, material: 0 });
+            scene.triangles.push(caustica::scene::Triangle::new([a, b, c], normals, 0));
         }
     }
     scene.spheres.push(sphere(vec3(0.2, 0.6, 0.0), 0.35, 1));

@@ -22,7 +22,7 @@ fn name(material: &json::Material, index: usize) -> String {
 pub(super) fn default_material(notes: &mut Notes) -> Read<Material> {
     let name = "default material".to_owned();
     let surface = surface(&json::Material::default(), &name, "materials", notes)?;
-    Ok(Material { name, surface, emission: Vec3::ZERO, double_sided: false, priority: 0 })
+    Ok(Material::new(&name, surface))
 }
 
 /// A material of the file.
@@ -33,7 +33,8 @@ pub(super) fn read(root: &json::Root, index: usize, notes: &mut Notes) -> Read<M
     let surface = surface(material, &name, &place, notes)?;
     let emission = emission(material, &name, &place, notes)?;
     note_unread(material, notes);
-    Ok(Material { name, surface, emission, double_sided: material.double_sided, priority: priority(material, &place)? })
+    let priority = priority(material, &place)?;
+    Ok(Material { emission, double_sided: material.double_sided, priority, ..Material::new(&name, surface) })
 }
 
 /// Rank among overlapping solids: `extras.caustica.priority`, an integer; 0 without one.

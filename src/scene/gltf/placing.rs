@@ -200,7 +200,7 @@ fn add_triangles(
         // side.
         let corners = if mirrored(a as usize) { [a, c, b] } else { [a, b, c] }.map(|corner| corner as usize);
         let (positions, normals) = of(corners);
-        let mut triangle = Triangle { positions, normals: [Vec3::ZERO; 3], material };
+        let mut triangle = Triangle::new(positions, [Vec3::ZERO; 3], material);
         let flat = triangle.geometric_normal();
         if flat == Vec3::ZERO {
             continue;

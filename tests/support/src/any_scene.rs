@@ -45,7 +45,7 @@ fn sound(scene: &Scene) {
         let emission = material.emission;
         assert!(emission.is_finite() && emission.min_element() >= 0.0, "material {i}: emission {emission}");
         let (color, ior) = match material.surface {
-            Surface::Diffuse { albedo } => (albedo, 1.0),
+            Surface::Diffuse { albedo } | Surface::Layered { base: albedo, .. } => (albedo, 1.0),
             Surface::Mirror { tint } => (tint, 1.0),
             Surface::Glass { ior, tint } | Surface::Pane { ior, tint } => (tint, ior),
         };
