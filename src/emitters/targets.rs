@@ -85,7 +85,7 @@ pub fn scene_target(scene: &Scene) -> Target {
 /// smaller than that of the whole cluster.
 #[must_use]
 pub fn specular_targets(scene: &Scene) -> Vec<Target> {
-    let specular = items(scene, |material| scene.materials[material as usize].surface.is_specular());
+    let specular = items(scene, |material| scene.materials[material as usize].casts_caustics());
     if specular.is_empty() {
         return Vec::new();
     }

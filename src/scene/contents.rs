@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
 
-use super::{Attributes, Bounds, Camera, Environment, Image, Light, Material, Sphere, Triangle};
+use super::{Attributes, Bounds, Camera, Environment, Image, Light, Material, Sphere, Surface, Triangle};
 use crate::{
     Error, Result,
     image::{EnvironmentProvenance, Provenance},
@@ -75,10 +75,16 @@ impl Scene {
         (center, corners.chain(balls).fold(0.0, f32::max))
     }
 
-    /// Whether a surface has a specular BSDF, so that there can be caustics.
+    /// Whether a surface is sharp enough for caustics.
     #[must_use]
     pub fn has_specular(&self) -> bool {
-        self.uses_material(|material| material.surface.is_specular())
+        self.uses_material(Material::casts_caustics)
+    }
+
+    /// Whether a surface has another lobe than a diffuse one.
+    #[must_use]
+    pub fn has_lobes(&self) -> bool {
+        self.uses_material(|m| !matches!(m.surface, Surface::Diffuse { .. }) || m.clearcoat > 0.0)
     }
 
     /// Whether a surface emits light.

@@ -58,6 +58,12 @@ impl Surface {
         }
     }
 
+    /// Whether there is a diffuse base under a coat.
+    #[must_use]
+    pub fn is_coated(&self) -> bool {
+        matches!(*self, Surface::Layered { metallic, specular, .. } if metallic < 1.0 && specular > 0.0)
+    }
+
     /// Whether light passes through the surface.
     #[must_use]
     pub fn transmits(&self) -> bool {
@@ -192,6 +198,10 @@ pub struct Material {
 /// Roughness below which a lobe is perfectly specular: narrower than a pixel.
 pub const SHARP_ROUGHNESS: f32 = 0.03;
 
+/// Roughness up to which a lobe of metal or glass casts caustics: above it the light that it throws
+/// is as smooth as that of diffuse surfaces.
+pub const CAUSTIC_ROUGHNESS: f32 = 0.35;
+
 impl Material {
     /// A material of that name and surface: smooth where it is specular, without emission or
     /// textures.
@@ -213,6 +223,18 @@ impl Material {
             priority: 0,
             textures: Textures::default(),
         }
+    }
+
+    /// Whether what the surface reflects or transmits is sharp enough for caustics: mirrors, metals,
+    /// glass and panes up to [`CAUSTIC_ROUGHNESS`].
+    #[must_use]
+    pub fn casts_caustics(&self) -> bool {
+        let is_clear = match self.surface {
+            Surface::Diffuse { .. } => false,
+            Surface::Mirror { .. } | Surface::Glass { .. } | Surface::Pane { .. } => true,
+            Surface::Layered { metallic, .. } => metallic >= 0.5,
+        };
+        is_clear && self.roughness <= CAUSTIC_ROUGHNESS
     }
 
     /// Medium inside the solid that the surface bounds.

@@ -22,7 +22,7 @@ pub use environment::Environment;
 pub(crate) use light::spot_heights;
 pub use light::{LUMENS_PER_WATT, Light, LightKind};
 pub use load_options::LoadOptions;
-pub use material::{Alpha, Material, Medium, SHARP_ROUGHNESS, Surface, Textures};
+pub use material::{Alpha, CAUSTIC_ROUGHNESS, Material, Medium, SHARP_ROUGHNESS, Surface, Textures};
 pub(crate) use shape::vertex_bits;
 pub use shape::{Bounds, Sphere, Triangle};
 pub use solids::{NO_SLOT, Solids};

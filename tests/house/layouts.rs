@@ -41,17 +41,18 @@ fn twins() -> Vec<Twin> {
     twins! {
         BvhNode { grid, low, high }
         Primitive { v0, material, e1, id, e2, emitter }
-        Normals { n0, n1, n2, flat_shaded }
-        Material { color, kind, emission, ior, double_sided, pad0, pad1, pad2 }
-        Medium { tint, ior }
+        Normals { n0, n1, n2, attributes }
+        Medium { tint, ior, absorption, pad }
         Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
         Path { origin, history, direction, bounces, beta, left, media }
         Photon { position, wi, flux, normal }
-        VisiblePoint { position, next_map, weight, offset, ng, media_low, ns, media_high }
-        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays }
+        VisiblePoint { position, next_map, weight, offset, ng, media_low, ns, media_high, view, coat }
+        LobeLight { light_count, pad0, pad1, pad2 }
+        LobePoint { position, offset, beta, alpha, f0, eta, f90, ng, compensation, ns, view, pad }
+        Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays, reads }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, pad1 }
         Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, pad0, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, pad }
@@ -97,10 +98,23 @@ fn constants() -> Vec<(&'static str, f64)> {
         SPHERE_BIT,
         SPECULAR_BIT,
         CONTACT_BIT,
+        ALPHA_BIT,
         DIFFUSE,
         MIRROR,
         GLASS,
         PANE,
+        LAYERED,
+        MATERIAL_TEXELS,
+        ATTRIBUTE_TEXELS,
+        DOUBLE_SIDED_BIT,
+        MASK_BIT,
+        BLEND_BIT,
+        CAUSTIC_BIT,
+        WRAP_MIRROR,
+        WRAP_CLAMP,
+        LINEAR_BIT,
+        SRGB_BIT,
+        SECOND_UV_BIT,
         POINT_LIGHT,
         SPOT_LIGHT,
         DIRECTIONAL_LIGHT,

@@ -25,8 +25,8 @@ pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) ->
         ..Path::default()
     };
     let paths = gpu.storage_with("paths", &rays.iter().map(path).collect::<Vec<_>>()).expect("fits");
-    let queue = gpu.storage_with("queue", &(0..rays.len() as u32).collect::<Vec<_>>()).expect("fits");
-    let queue_out = gpu.storage::<u32>("queue out", count).expect("fits");
+    let (all, none) = (0..rays.len() as u32, vec![0; rays.len()]);
+    let queues = gpu.storage_with("queues", &all.chain(none).collect::<Vec<_>>()).expect("fits");
     let start = Counters { current: rays.len() as u32, ..Counters::default() };
     let counters = gpu.storage_with("counters", &[start]).expect("fits");
     let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
@@ -36,8 +36,7 @@ pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) ->
     let own = [
         ("tile", &tile),
         ("paths", &paths),
-        ("queue_in", &queue),
-        ("queue_out", &queue_out),
+        ("queues", &queues),
         ("counters", &counters),
         ("points", &points),
         ("first_hits", &first_hits),
