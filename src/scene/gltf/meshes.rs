@@ -5,7 +5,7 @@ use gltf::json;
 use json::mesh::{Primitive, Semantic};
 
 use super::accessor::{Column, Document};
-use super::attributes::{self, VertexAttributes};
+use super::attributes::{self, Triangles, VertexAttributes};
 use super::fault::{Notes, Read, fault};
 use super::material_table::MaterialTable;
 use super::primitives::{Checker, Shape, attribute, joint_sets};
@@ -139,7 +139,14 @@ fn read_part(
         let normal = |vertex: &u32| morphed(&normals, &morphs, *vertex, |morph| morph.normals.as_ref());
         vertices.used.iter().map(normal).collect()
     });
-    part.attributes = attributes::read(document, primitive, slot, &vertices.used, place)?;
+    let triangles = Triangles {
+        vertices: &vertices.used,
+        positions: &part.positions,
+        normals: part.normals.as_deref(),
+        corners: &part.corners,
+        is_morphed: !morphs.is_empty(),
+    };
+    part.attributes = attributes::read(document, primitive, slot, triangles, place)?;
     if let Some(joints) = deformation.joints {
         part.influences = influences(document, primitive, &vertices.used, joints, place)?;
     }

@@ -43,6 +43,7 @@ mod root;
 mod skins;
 mod spheres;
 mod strict_json;
+mod tangents;
 mod textures;
 mod topology;
 mod variants;
@@ -152,6 +153,7 @@ fn assemble(
     warnings.into_iter().for_each(|warning| notes.add(warning));
     (scene.triangles, scene.attributes, scene.shells) = (triangles, attributes, shells);
     doubled_lamps::remove(&mut scene, &mut notes);
+    placing::turn_tangents(&scene.triangles, &mut scene.attributes);
     placing::keep_attributes_in_use(&mut scene.triangles, &mut scene.attributes);
     contents.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();

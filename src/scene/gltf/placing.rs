@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, ops::Range};
 
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3, Vec4};
 
 use super::fault::{Notes, Read, fault};
 use super::mesh_cache::MeshInstance;
@@ -146,6 +146,15 @@ impl Placed {
     }
 }
 
+/// Lets normal maps of faces that were turned stand out to the other side: with the opposite normal,
+/// tangent and sign, the normal that the map gives is the opposite one.
+pub(super) fn turn_tangents(triangles: &[Triangle], attributes: &mut [Attributes]) {
+    for triangle in triangles.iter().filter(|triangle| triangle.is_turned && triangle.attributes > 0) {
+        let tangents = &mut attributes[triangle.attributes as usize - 1].tangents;
+        *tangents = tangents.map(|tangent| -tangent);
+    }
+}
+
 /// Leaves out the attributes of triangles that are no longer there.
 pub(super) fn keep_attributes_in_use(triangles: &mut [Triangle], attributes: &mut Vec<Attributes>) {
     let used = triangles.iter().filter(|triangle| triangle.attributes > 0).count();
@@ -164,53 +173,76 @@ fn total(primitives: &[MeshPrimitive], of: impl Fn(&MeshPrimitive) -> usize) -> 
     primitives.iter().map(of).sum()
 }
 
+/// How a vertex of a primitive moves to the scene.
+struct Move {
+    to_scene: DMat4,
+    to_normal: DMat3,
+    mirrored: bool,
+}
+
+impl Move {
+    fn new(to_scene: DMat4) -> Self {
+        let linear = DMat3::from_mat4(to_scene);
+        let mirrored = linear.determinant() < 0.0;
+        Self { to_scene, to_normal: cofactors(linear, mirrored), mirrored }
+    }
+
+    fn position(&self, position: Vec3) -> Vec3 {
+        self.to_scene.transform_point3(position.as_dvec3()).as_vec3()
+    }
+
+    fn normal(&self, normal: Vec3) -> Vec3 {
+        (self.to_normal * normal.as_dvec3()).normalize_or_zero().as_vec3()
+    }
+
+    /// Unit tangent at a unit normal. A mirrored bitangent is on the other side of both.
+    fn tangent(&self, tangent: Vec4, normal: Vec3) -> Vec4 {
+        let moved = self.to_scene.transform_vector3(tangent.truncate().as_dvec3()).normalize_or_zero().as_vec3();
+        let sign = if (tangent.w < 0.0) == self.mirrored { 1.0 } else { -1.0 };
+        let along = if moved == Vec3::ZERO { normal.any_orthonormal_vector() } else { moved };
+        along.extend(sign)
+    }
+}
+
 /// Triangles of one primitive with non-zero area.
 fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, placed: &mut Placed) {
-    let linear = DMat3::from_mat4(to_scene);
-    let mirrored = linear.determinant() < 0.0;
-    let to_normal = cofactors(linear, mirrored);
-    let positions: Vec<Vec3> =
-        primitive.positions.iter().map(|position| to_scene.transform_point3(position.as_dvec3()).as_vec3()).collect();
-    let normals: Option<Vec<Vec3>> = primitive.normals.as_ref().map(|normals| {
-        normals.iter().map(|normal| (to_normal * normal.as_dvec3()).normalize_or_zero().as_vec3()).collect()
-    });
+    let all = Move::new(to_scene);
+    let positions: Vec<Vec3> = primitive.positions.iter().map(|position| all.position(*position)).collect();
+    let normals: Option<Vec<Vec3>> =
+        primitive.normals.as_ref().map(|normals| normals.iter().map(|normal| all.normal(*normal)).collect());
     let of = |corners: [usize; 3]| {
         let normals = normals.as_ref();
         (corners.map(|corner| positions[corner]), normals.map(|normals| corners.map(|corner| normals[corner])))
     };
-    add_triangles(primitive, |_| mirrored, of, placed);
+    add_triangles(primitive, |_| &all, of, placed);
 }
 
 /// The same for a skin, whose joints transform each vertex separately.
 fn place_skinned(instance: &MeshInstance<'_>, primitive: &MeshPrimitive, center: DVec3, placed: &mut Placed) {
     let vertices = 0..primitive.positions.len();
-    let moves: Vec<DMat4> =
-        vertices.map(|v| DMat4::from_translation(-center) * instance.matrix(primitive, v, DMat4::IDENTITY)).collect();
-    let mirrored = |v: usize| DMat3::from_mat4(moves[v]).determinant() < 0.0;
-    let position = |v: usize| moves[v].transform_point3(primitive.positions[v].as_dvec3()).as_vec3();
-    let normal = |normals: &[Vec3], v: usize| {
-        let to_normal = cofactors(DMat3::from_mat4(moves[v]), mirrored(v));
-        (to_normal * normals[v].as_dvec3()).normalize_or_zero().as_vec3()
-    };
+    let to_scene = |v| DMat4::from_translation(-center) * instance.matrix(primitive, v, DMat4::IDENTITY);
+    let moves: Vec<Move> = vertices.map(|v| Move::new(to_scene(v))).collect();
+    let position = |v: usize| moves[v].position(primitive.positions[v]);
     let of = |corners: [usize; 3]| {
         let normals = primitive.normals.as_deref();
-        (corners.map(position), normals.map(|normals| corners.map(|v| normal(normals, v))))
+        (corners.map(position), normals.map(|normals| corners.map(|v| moves[v].normal(normals[v]))))
     };
-    add_triangles(primitive, mirrored, of, placed);
+    add_triangles(primitive, |v| &moves[v], of, placed);
 }
 
 /// Adds the triangles of a primitive with non-zero area. `of` gives their corners' positions and
 /// normals.
-fn add_triangles(
+fn add_triangles<'m>(
     primitive: &MeshPrimitive,
-    mirrored: impl Fn(usize) -> bool,
+    moved: impl Fn(usize) -> &'m Move,
     of: impl Fn([usize; 3]) -> ([Vec3; 3], Option<[Vec3; 3]>),
     placed: &mut Placed,
 ) {
-    for &[a, b, c] in &primitive.corners {
+    for (i, corners) in primitive.corners.iter().enumerate() {
         // A mirroring transform reverses the winding; swapping two corners preserves the front
         // side.
-        let corners = if mirrored(a as usize) { [a, c, b] } else { [a, b, c] }.map(|corner| corner as usize);
+        let order = if moved(corners[0] as usize).mirrored { [0, 2, 1] } else { [0, 1, 2] };
+        let corners = order.map(|corner| corners[corner] as usize);
         let (positions, normals) = of(corners);
         let mut triangle = Triangle::new(positions, [Vec3::ZERO; 3], primitive.material);
         let flat = triangle.geometric_normal();
@@ -219,8 +251,12 @@ fn add_triangles(
         }
         let normals = normals.unwrap_or([Vec3::ZERO; 3]);
         triangle.normals = normals.map(|normal| if normal == Vec3::ZERO { flat } else { normal });
-        if let Some(attributes) = &primitive.attributes {
-            placed.attributes.push(attributes.of(corners));
+        if let Some(own) = &primitive.attributes {
+            let mut attributes = own.of(corners);
+            if let Some(tangents) = own.tangents(i, corners, order) {
+                attributes.tangents = [0, 1, 2].map(|k| moved(corners[k]).tangent(tangents[k], triangle.normals[k]));
+            }
+            placed.attributes.push(attributes);
             triangle.attributes = placed.attributes.len() as u32;
         }
         placed.triangles.push(triangle);

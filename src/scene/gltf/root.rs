@@ -18,9 +18,11 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
     let used = member::<Vec<String>>(&mut file, "extensionsUsed")?.unwrap_or_default();
     let required = member::<Vec<String>>(&mut file, "extensionsRequired")?.unwrap_or_default();
     extensions::check(&used, &required, ignored, notes)?;
-    let textures = file.get("textures").and_then(Value::as_array).map_or(0, Vec::len) as u64;
+    let images = elements(&mut file, "images")?;
+    let (textures, samplers): (Vec<json::Texture>, _) =
+        (elements(&mut file, "textures")?, elements(&mut file, "samplers")?);
     if let Some(materials) = file.get("materials") {
-        check_textures(materials, textures, false, &|| "materials".to_owned())?;
+        check_textures(materials, textures.len() as u64, false, &|| "materials".to_owned())?;
     }
     if !objects(&mut file, "animations")?.is_empty() {
         notes.add("animations are not read: nodes stand as in the file");
@@ -37,9 +39,9 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
         accessors: elements(&mut file, "accessors")?,
         buffer_views: elements(&mut file, "bufferViews")?,
         buffers: elements(&mut file, "buffers")?,
-        images: elements(&mut file, "images")?,
-        textures: elements(&mut file, "textures")?,
-        samplers: elements(&mut file, "samplers")?,
+        images,
+        textures,
+        samplers,
         extensions: member(&mut file, "extensions")?,
         extensions_used: used,
         extensions_required: required,
