@@ -71,7 +71,7 @@ fn of_metal(reader: &mut Reader<'_>) -> Read<Base> {
         metallic: reader.unit(pbr.metallic_factor.0, "metallic", &format!("{PBR}.metallicFactor"))?,
         roughness: reader.unit(pbr.roughness_factor.0, "roughness", &format!("{PBR}.roughnessFactor"))?,
         ior,
-        f0: Vec3::splat(((ior - 1.0) / (ior + 1.0)).powi(2)),
+        f0: Vec3::splat(normal_reflectance(ior)),
         specular: 1.0,
         transmission: 0.0,
         color_texture: reader.color_texture(pbr.base_color_texture.as_ref(), &format!("{PBR}.baseColorTexture"))?,
@@ -152,6 +152,12 @@ fn ior(reader: &Reader<'_>) -> Read<f32> {
             format!("{ior} is not an index of refraction from 1, nor 0"),
         )
     }
+}
+
+/// Reflectance along the normal of an index of refraction.
+pub(super) fn normal_reflectance(ior: f32) -> f32 {
+    let ior = f64::from(ior);
+    ((ior - 1.0) / (ior + 1.0)).powi(2) as f32
 }
 
 /// How much of the surface is there.

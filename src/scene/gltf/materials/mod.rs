@@ -115,8 +115,7 @@ impl Reader<'_> {
         if base.metallic > 0.0 {
             self.note(&format!("the metal of metallic {} does not show, since it transmits light", base.metallic));
         }
-        let plain = Vec3::splat(((base.ior - 1.0) / (base.ior + 1.0)).powi(2));
-        if base.specular != 1.0 || base.f0 != plain {
+        if base.specular != 1.0 || base.f0 != Vec3::splat(base::normal_reflectance(base.ior)) {
             self.note("KHR_materials_specular does not change the reflection of glass, which its ior decides");
         }
         let extensions = self.material.extensions.as_ref();
