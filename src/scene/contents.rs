@@ -21,7 +21,9 @@ pub struct Scene {
     pub file_name: String,
     /// Files that the file refers to: buffers and images, read or not.
     pub files: Vec<PathBuf>,
-    /// SHA-256 of the bytes of the file and its buffers, in hexadecimal.
+    /// Variants of the materials that the file names.
+    pub variants: Vec<String>,
+    /// SHA-256 of the bytes of the file, its buffers and the images in use, in hexadecimal.
     pub hash: String,
     /// Offset subtracted from all world coordinates of the file: the centre of its geometry.
     pub center: DVec3,

@@ -155,6 +155,45 @@ pub struct Textures {
     pub clearcoat: Option<Texture>,
     /// G: roughness of the clearcoat.
     pub clearcoat_roughness: Option<Texture>,
+    /// RGB, sRGB: colour of the sheen.
+    pub sheen_color: Option<Texture>,
+    /// A: roughness of the sheen.
+    pub sheen_roughness: Option<Texture>,
+    /// RG: direction of the anisotropy in the frame of the tangents, 0..1 for -1..1. B: strength.
+    pub anisotropy: Option<Texture>,
+    /// R: strength of the iridescence.
+    pub iridescence: Option<Texture>,
+    /// G: thickness of the film, from the smallest to the largest.
+    pub iridescence_thickness: Option<Texture>,
+    /// A: fraction of diffuse transmission.
+    pub diffuse_transmission: Option<Texture>,
+    /// RGB, sRGB: colour of diffuse transmission.
+    pub diffuse_transmission_color: Option<Texture>,
+}
+
+impl Textures {
+    /// All of them with the name of their property, in the order of the fields.
+    #[must_use]
+    pub fn named(&self) -> [(&'static str, Option<Texture>); 16] {
+        [
+            ("base colour", self.base_color),
+            ("metallic and roughness", self.metallic_roughness),
+            ("normal", self.normal),
+            ("emission", self.emission),
+            ("specular", self.specular),
+            ("specular colour", self.specular_color),
+            ("transmission", self.transmission),
+            ("clearcoat", self.clearcoat),
+            ("clearcoat roughness", self.clearcoat_roughness),
+            ("sheen colour", self.sheen_color),
+            ("sheen roughness", self.sheen_roughness),
+            ("anisotropy", self.anisotropy),
+            ("iridescence", self.iridescence),
+            ("iridescence thickness", self.iridescence_thickness),
+            ("diffuse transmission", self.diffuse_transmission),
+            ("diffuse transmission colour", self.diffuse_transmission_color),
+        ]
+    }
 }
 
 /// A named surface. Its factors are multiplied by its [`Textures`].
@@ -176,6 +215,30 @@ pub struct Material {
     pub clearcoat: f32,
     /// Roughness of the clear coat, 0 to 1.
     pub clearcoat_roughness: f32,
+    /// Colour of the sheen of fibres, each channel 0 to 1 (KHR_materials_sheen).
+    pub sheen_color: Vec3,
+    /// Roughness of the sheen, 0 to 1.
+    pub sheen_roughness: f32,
+    /// Strength of the anisotropy, 0 to 1 (KHR_materials_anisotropy).
+    pub anisotropy: f32,
+    /// Direction in which the lobe is stretched, radians from the tangent towards the bitangent.
+    pub anisotropy_rotation: f32,
+    /// Strength of the interference in a thin film, 0 to 1 (KHR_materials_iridescence).
+    pub iridescence: f32,
+    /// Index of refraction of the film, at least 1.
+    pub iridescence_ior: f32,
+    /// Thickness of the film where its texture is 0 and where it is 1 or missing, nanometres.
+    pub iridescence_thickness: [f32; 2],
+    /// Dispersion of a transmitting surface: 20 over its Abbe number, at least 0
+    /// (KHR_materials_dispersion).
+    pub dispersion: f32,
+    /// Fraction of the diffuse light that leaves on the other side, 0 to 1
+    /// (KHR_materials_diffuse_transmission).
+    pub diffuse_transmission: f32,
+    /// Colour of that light, each channel 0 to 1.
+    pub diffuse_transmission_color: Vec3,
+    /// The base colour is shown as it is, whatever light falls on it (KHR_materials_unlit).
+    pub unlit: bool,
     /// Emitted radiance, W/(m² sr) per channel, constant over all directions of the front side. The
     /// front side of a triangle is the one from which its corners run counterclockwise; that of a
     /// sphere is its outside.
@@ -215,6 +278,17 @@ impl Material {
             absorption: Vec3::ZERO,
             clearcoat: 0.0,
             clearcoat_roughness: 0.0,
+            sheen_color: Vec3::ZERO,
+            sheen_roughness: 0.0,
+            anisotropy: 0.0,
+            anisotropy_rotation: 0.0,
+            iridescence: 0.0,
+            iridescence_ior: 1.3,
+            iridescence_thickness: [100.0, 400.0],
+            dispersion: 0.0,
+            diffuse_transmission: 0.0,
+            diffuse_transmission_color: Vec3::ONE,
+            unlit: false,
             emission: Vec3::ZERO,
             double_sided: false,
             alpha: Alpha::Opaque,

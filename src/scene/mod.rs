@@ -4,6 +4,7 @@
 mod camera;
 mod contents;
 mod describe;
+mod describe_materials;
 mod environment;
 mod gltf;
 mod light;
@@ -17,7 +18,8 @@ mod words;
 
 pub use camera::{Camera, Projection};
 pub use contents::Scene;
-pub use describe::{CameraInfo, EmitterInfo, LightInfo, MaterialInfo, SceneInfo};
+pub use describe::{CameraInfo, EmitterInfo, LightInfo, SceneInfo};
+pub use describe_materials::{ImageInfo, MaterialInfo, TextureInfo};
 pub use environment::Environment;
 pub(crate) use light::spot_heights;
 pub use light::{LUMENS_PER_WATT, Light, LightKind};
