@@ -202,6 +202,8 @@ pub struct Attributes {
     pub pad: u32,
 }
 
+/// Entries of the table of albedos along each side.
+pub const ALBEDO_STEPS: u32 = 32;
 /// Texels of [`Attributes`].
 pub const ATTRIBUTE_TEXELS: u32 = 7;
 

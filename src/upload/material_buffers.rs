@@ -4,7 +4,7 @@ use glam::Vec4;
 
 use super::texels::Texels;
 use crate::{
-    emitters::light_table::emission_in,
+    emitters::{albedos::albedos, light_table::emission_in},
     error::{Error, Result},
     gpu::{Gpu, Table},
     layout::{
@@ -21,6 +21,7 @@ pub struct MaterialBuffers {
     materials: Table,
     attributes: Table,
     texels: Table,
+    albedos: Table,
     /// Some material has lobes beside one that is diffuse or perfectly specular.
     pub has_layers: bool,
     /// Some material has a rough lobe, which is lit at every vertex.
@@ -65,14 +66,15 @@ impl MaterialBuffers {
             has_alpha: materials().any(|m| m.alpha != Alpha::Opaque),
             materials: Table::new(gpu, "materials", &rows)?,
             attributes: Table::new(gpu, "attributes of triangles", &attributes)?,
+            albedos: Table::new(gpu, "albedos", &if materials().any(is_layered) { albedos() } else { Vec::new() })?,
             texels: Table::layered(gpu, "texels", &texels.into_words())?,
         })
     }
 
     /// The tables by name.
     #[must_use]
-    pub fn tables(&self) -> [(&'static str, &Table); 3] {
-        [("materials", &self.materials), ("attributes", &self.attributes), ("texels", &self.texels)]
+    pub fn tables(&self) -> [(&'static str, &Table); 4] {
+        [("materials", &self.materials), ("attributes", &self.attributes), ("texels", &self.texels), ("albedos", &self.albedos)]
     }
 }
 

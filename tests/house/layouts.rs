@@ -106,6 +106,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         LAYERED,
         MATERIAL_TEXELS,
         ATTRIBUTE_TEXELS,
+        ALBEDO_STEPS,
         DOUBLE_SIDED_BIT,
         MASK_BIT,
         BLEND_BIT,
