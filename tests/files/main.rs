@@ -5,6 +5,7 @@ mod gltf_compressed;
 mod gltf_files;
 mod loading;
 mod loading_geometry;
+mod loading_materials;
 mod loading_values;
 mod loading_views;
 mod outputs;
