@@ -6,6 +6,8 @@ mod gltf_files;
 mod loading;
 mod loading_geometry;
 mod loading_materials;
+mod loading_textures;
 mod loading_values;
 mod loading_views;
 mod outputs;
+mod pictures;
