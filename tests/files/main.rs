@@ -4,6 +4,7 @@ mod assets;
 mod gltf_compressed;
 mod gltf_files;
 mod loading;
+mod loading_attributes;
 mod loading_geometry;
 mod loading_materials;
 mod loading_textures;
