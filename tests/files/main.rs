@@ -1,6 +1,7 @@
 //! Files that are read and written: scenes, environment maps, pictures; good, bad and hostile ones.
 
 mod assets;
+mod exporters;
 mod gltf_compressed;
 mod gltf_files;
 mod loading;
