@@ -1,5 +1,5 @@
-//! One scene as two exporters write it: a textured quad of rough plastic with a normal map, beside a
-//! lamp and a camera. Their files differ in all that glTF leaves open.
+//! One scene as two exporters write it: a textured quad of rough plastic with a normal map, beside
+//! a lamp and a camera. Their files differ in all that glTF leaves open.
 
 use std::path::Path;
 
@@ -83,8 +83,8 @@ fn glb(gltf: &Value, bin: Vec<u8>) -> Vec<u8> {
     [b"glTF", &word(2)[..], &word(length), &word(text.len()), b"JSON", &text, &word(bin.len()), b"BIN\0", &bin].concat()
 }
 
-/// As three.js' exporter writes a glTF: data URIs, attributes interleaved in one view, indices of 32
-/// bits, matrices, all members of samplers and materials, and more objects in another order.
+/// As three.js' exporter writes a glTF: data URIs, attributes interleaved in one view, indices of
+/// 32 bits, matrices, all members of samplers and materials, and more objects in another order.
 fn three(change: impl FnOnce(&mut Value)) -> Vec<u8> {
     let vertex = |v: usize| [&POSITIONS[3 * v..][..3], &NORMALS[3 * v..][..3], &UVS[2 * v..][..2]].concat();
     let vertices: Vec<u8> = (0..4).flat_map(|v| floats(&vertex(v))).collect();
