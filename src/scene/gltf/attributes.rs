@@ -109,7 +109,8 @@ fn tangent(column: &Column<'_>, vertex: usize) -> Vec4 {
 }
 
 impl VertexAttributes {
-    /// Tangents along the image of a normal map as its transform places it, where the file has none.
+    /// Tangents along the image of a normal map as its transform places it, where the file has
+    /// none.
     fn generated(&self, map: &Texture, triangles: Triangles<'_>) -> Tangents {
         let [u, v] = map.transform.map(Vec3::from_array);
         let placed = |uv: &Vec2| Vec2::new(u.dot(uv.extend(1.0)), v.dot(uv.extend(1.0)));

@@ -1,5 +1,5 @@
-//! Materials in use: each is read once for all meshes that have the texture coordinates it asks for,
-//! and once more for those that lack the same of them.
+//! Materials in use: each is read once for all meshes that have the texture coordinates it asks
+//! for, and once more for those that lack the same of them.
 
 use std::collections::{BTreeMap, HashMap};
 

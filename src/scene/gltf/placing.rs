@@ -108,8 +108,8 @@ pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut N
 }
 
 impl Placed {
-    /// Leaves out meshes whose triangles all are those of an earlier one: the same lamp twice shines
-    /// once, and no ray has to visit thousands of copies in one place.
+    /// Leaves out meshes whose triangles all are those of an earlier one: the same lamp twice
+    /// shines once, and no ray has to visit thousands of copies in one place.
     fn without_copies(self, notes: &mut Notes) -> Self {
         let Self { triangles, attributes, meshes } = self;
         let corners = |triangle: &Triangle| triangle.positions.map(vertex_bits);
@@ -146,8 +146,8 @@ impl Placed {
     }
 }
 
-/// Lets normal maps of faces that were turned stand out to the other side: with the opposite normal,
-/// tangent and sign, the normal that the map gives is the opposite one.
+/// Lets normal maps of faces that were turned stand out to the other side: with the opposite
+/// normal, tangent and sign, the normal that the map gives is the opposite one.
 pub(super) fn turn_tangents(triangles: &[Triangle], attributes: &mut [Attributes]) {
     for triangle in triangles.iter().filter(|triangle| triangle.is_turned && triangle.attributes > 0) {
         let tangents = &mut attributes[triangle.attributes as usize - 1].tangents;

@@ -97,8 +97,8 @@ impl<'a> Checker<'a> {
         Ok(vertices.unwrap_or(0))
     }
 
-    /// Whether an attribute can have that format, and what it is in messages. Positions, normals and
-    /// attributes that are not read have any.
+    /// Whether an attribute can have that format, and what it is in messages. Positions, normals
+    /// and attributes that are not read have any.
     fn fits(&self, semantic: &Semantic, format: Format) -> (bool, &'static str) {
         let is_float = format.component == ComponentType::F32;
         let is_small = matches!(format.component, ComponentType::U8 | ComponentType::U16);

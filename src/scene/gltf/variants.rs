@@ -41,8 +41,8 @@ pub(super) fn choose(names: &[String], wanted: Option<&str>, file_name: &str) ->
     })
 }
 
-/// Sets the materials of all primitives to those of the chosen variant, where it has one, and checks
-/// all mappings.
+/// Sets the materials of all primitives to those of the chosen variant, where it has one, and
+/// checks all mappings.
 pub(super) fn apply(root: &mut json::Root, variants: usize, chosen: Option<usize>) -> Read<()> {
     let materials = root.materials.len();
     for (i, mesh) in root.meshes.iter_mut().enumerate() {

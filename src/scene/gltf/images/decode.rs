@@ -11,10 +11,10 @@ use crate::scene::LoadOptions;
 /// Largest side of an image, texels.
 const MAX_SIDE: u32 = LoadOptions::TEXTURE_SIZE.most();
 
-/// Texels that an image of few bytes may claim, and how many more for each byte. What is beyond is
-/// damaged, or made to fill the memory: a byte of a PNG inflates to 1032 at most, of eight texels.
-const FREE_TEXELS: u64 = 1 << 26;
-const TEXELS_PER_BYTE: u64 = 8 * 1032;
+/// Texels that all images together may claim, and how many more for each byte of them and of the
+/// buffers: what is beyond is made to fill the memory. A byte of a PNG inflates to 1032 at most.
+pub(super) const FREE_TEXELS: u64 = 1 << 23;
+pub(super) const TEXELS_PER_BYTE: u64 = 1032;
 
 /// Memory of a decoder besides the texels, bytes.
 const DECODER_BYTES: u64 = 64 << 20;
@@ -43,17 +43,26 @@ impl<'d> Encoded<'d> {
         };
         let mut encoded = Self { bytes, format, size: [0; 2], said: said.to_owned(), place };
         let (width, height) = encoded.reader().into_dimensions().or_else(|error| encoded.damaged(&error))?;
-        let texels = u64::from(width) * u64::from(height);
         if width.max(height) > MAX_SIDE {
             let problem = format!("{said} has {width} x {height} texels; sides of at most {MAX_SIDE} are read");
             return fault(encoded.place, problem);
         }
-        if texels == 0 || texels > FREE_TEXELS + TEXELS_PER_BYTE * encoded.bytes.len() as u64 {
-            let bytes = encoded.bytes.len();
-            return fault(encoded.place, format!("{said} claims {width} x {height} texels, but has {bytes} bytes"));
-        }
         encoded.size = [width, height];
         Ok(encoded)
+    }
+
+    /// Takes the texels from those that may still be claimed. Each byte allows for some more.
+    pub(super) fn claim(&self, left: &mut u64) -> Read<()> {
+        let ([width, height], bytes) = (self.size, self.bytes.len());
+        *left += TEXELS_PER_BYTE * bytes as u64;
+        match left.checked_sub(u64::from(width) * u64::from(height)) {
+            Some(rest) => *left = rest,
+            None => {
+                let problem = format!("{} claims {width} x {height} texels, but has {bytes} bytes", self.said);
+                return fault(&self.place, problem);
+            }
+        }
+        Ok(())
     }
 
     /// RGBA of all texels, row by row from the top. Grey counts for all three colours, 16 bits are
@@ -67,7 +76,8 @@ impl<'d> Encoded<'d> {
             DynamicImage::ImageRgba8(rgba) => rgba,
             other => other.into_rgba8(),
         };
-        Ok(rgba.as_chunks::<4>().0.to_vec())
+        let bytes = rgba.into_raw();
+        Ok(bytemuck::allocation::try_cast_vec(bytes).unwrap_or_else(|(_, bytes)| bytes.as_chunks::<4>().0.to_vec()))
     }
 
     fn reader(&self) -> ImageReader<Cursor<&[u8]>> {

@@ -16,7 +16,7 @@ use crate::scene::Image;
 mod decode;
 mod shrink;
 
-use decode::Encoded;
+use decode::{Encoded, FREE_TEXELS, TEXELS_PER_BYTE};
 use shrink::Curve;
 
 /// Largest image file, bytes.
@@ -64,8 +64,8 @@ impl ImageList {
         index as u32
     }
 
-    /// Decodes all images. `hash` takes the bytes of the files among them. Images with a side longer
-    /// than `longest` are made smaller.
+    /// Decodes all images. `hash` takes the bytes of the files among them. Images with a side
+    /// longer than `longest` are made smaller.
     pub(super) fn read(
         &self,
         document: &Document<'_>,
@@ -79,9 +79,12 @@ impl ImageList {
         files.sort_unstable();
         files.dedup();
         let mut encoded = Vec::with_capacity(files.len());
+        let mut left = FREE_TEXELS + TEXELS_PER_BYTE * document.held();
         for &i in &files {
             let bytes = bytes(document, resources, i, hash)?;
-            encoded.push(Encoded::new(bytes, &said(&root.images[i], i), format!("images[{i}]"))?);
+            let image = Encoded::new(bytes, &said(&root.images[i], i), format!("images[{i}]"))?;
+            image.claim(&mut left)?;
+            encoded.push(image);
         }
         let source = |content: Content| files.binary_search(&content.file()).unwrap_or_else(|_| unreachable!());
         let sizes: Vec<[u32; 2]> = self.wanted.iter().map(|(content, _)| encoded[source(*content)].size).collect();
@@ -89,10 +92,12 @@ impl ImageList {
         // Images that several contents show are decoded for each: a second one is rare.
         let images: Vec<Read<Image>> = (self.wanted.par_iter())
             .map(|(content, curve)| {
-                let (name, encoded) = (name(&root.images[content.file()], content.file()), &encoded[source(*content)]);
+                let (mut name, encoded) =
+                    (name(&root.images[content.file()], content.file()), &encoded[source(*content)]);
                 let mut texels = encoded.texels()?;
                 if let Content::Roughness { glossiness, .. } = content {
                     texels.iter_mut().for_each(|texel| *texel = rough(*texel, *glossiness));
+                    name += " as roughness";
                 }
                 let [width, height] = encoded.size;
                 let image = Image { name, width, height, texels };

@@ -30,8 +30,8 @@ impl Curve {
     }
 }
 
-/// The image with its sides halved, rounded down, until none is longer than `longest`. Each texel is
-/// the mean over its area of the values that the RGB stand for.
+/// The image with its sides halved, rounded down, until none is longer than `longest`. Each texel
+/// is the mean over its area of the values that the RGB stand for.
 pub(super) fn shrunk(image: Image, longest: u32, curve: Curve) -> Image {
     let mut halvings = 0;
     while image.width.max(image.height) >> halvings > longest {

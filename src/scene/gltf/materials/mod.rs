@@ -26,7 +26,8 @@ pub(super) struct ReadMaterial {
 }
 
 /// A material of the file, or the one of primitives that name none (glTF 2.0, 3.9.6). Textures of
-/// sets of texture coordinates that the mesh `lacks` are left out. `images` gets those of the others.
+/// sets of texture coordinates that the mesh `lacks` are left out. `images` gets those of the
+/// others.
 pub(super) fn read(
     root: &json::Root,
     index: Option<usize>,
@@ -149,7 +150,7 @@ impl Reader<'_> {
 /// Absorption coefficient by which white light has that colour after that distance, 1/m. The
 /// smallest number of f32 stands for black.
 fn absorption(color: Vec3, distance: f32) -> Vec3 {
-    let of = |channel: f32| (-channel.max(f32::MIN_POSITIVE).ln() / distance).clamp(0.0, f32::MAX);
+    let of = |channel: f32| (channel.max(f32::MIN_POSITIVE).recip().ln() / distance).clamp(0.0, f32::MAX);
     Vec3::from_array(color.to_array().map(of))
 }
 
