@@ -48,8 +48,8 @@ impl Wavefront {
     }
 
     /// Starts paths by `start` in that many invocations, then moves them on by `steps`, one after
-    /// the other over the same paths, until none is left or each has met the second number of surfaces; few are expected to meet more than the
-    /// first. At most `most_paths` live at once.
+    /// the other over the same paths, until none is left or each has met the second number of
+    /// surfaces; few are expected to meet more than the first. At most `most_paths` live at once.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -88,11 +88,7 @@ impl Wavefront {
     }
 
     /// Buffers by name.
-    fn bindings<'a>(
-        &'a self,
-        scene: &'a SceneBuffers,
-        others: &[(&'a str, &'a Buffer)],
-    ) -> Vec<(&'a str, &'a Buffer)> {
+    fn bindings<'a>(&'a self, scene: &'a SceneBuffers, others: &[(&'a str, &'a Buffer)]) -> Vec<(&'a str, &'a Buffer)> {
         let own = [
             ("paths", &self.paths),
             ("queues", &self.queues),

@@ -299,8 +299,8 @@ impl Material {
         }
     }
 
-    /// Whether what the surface reflects or transmits is sharp enough for caustics: mirrors, metals,
-    /// glass and panes up to [`CAUSTIC_ROUGHNESS`].
+    /// Whether what the surface reflects or transmits is sharp enough for caustics: mirrors,
+    /// metals, glass and panes up to [`CAUSTIC_ROUGHNESS`].
     #[must_use]
     pub fn casts_caustics(&self) -> bool {
         let is_clear = match self.surface {

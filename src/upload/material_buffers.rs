@@ -8,8 +8,8 @@ use crate::{
     error::{Error, Result},
     gpu::{Gpu, Table},
     layout::{
-        self, BLEND_BIT, CAUSTIC_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS, MaterialRecord,
-        SECOND_UV_BIT, SRGB_BIT, TextureRecord, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
+        self, BLEND_BIT, CAUSTIC_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS,
+        MaterialRecord, SECOND_UV_BIT, SRGB_BIT, TextureRecord, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
     },
     scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
     settings::LightUnit,
@@ -74,7 +74,12 @@ impl MaterialBuffers {
     /// The tables by name.
     #[must_use]
     pub fn tables(&self) -> [(&'static str, &Table); 4] {
-        [("materials", &self.materials), ("attributes", &self.attributes), ("texels", &self.texels), ("albedos", &self.albedos)]
+        [
+            ("materials", &self.materials),
+            ("attributes", &self.attributes),
+            ("texels", &self.texels),
+            ("albedos", &self.albedos),
+        ]
     }
 }
 
@@ -116,11 +121,7 @@ fn attributes(own: &Attributes) -> layout::Attributes {
 
 /// Row of the table of materials. `place` adds a texture, of colours or not, and returns where it
 /// lies.
-fn record(
-    material: &Material,
-    unit: LightUnit,
-    mut place: impl FnMut(&Texture, bool) -> u32,
-) -> MaterialRecord {
+fn record(material: &Material, unit: LightUnit, mut place: impl FnMut(&Texture, bool) -> u32) -> MaterialRecord {
     let surface = &material.surface;
     let (metallic, f0, specular) = match *surface {
         Surface::Layered { metallic, f0, specular, .. } => (metallic, f0.to_array(), specular),

@@ -62,7 +62,9 @@ impl<'a> Texels<'a> {
 /// An image of half the size: each texel is the mean of those that it covers, two by two, or three
 /// where the size is odd.
 fn halved(finer: &[[u8; 4]], (width, height): (u32, u32), is_color: bool) -> Vec<[u8; 4]> {
-    let linear: Vec<f32> = (0..=255_u8).map(|byte| if is_color { srgb_decode(f32::from(byte) / 255.0) } else { f32::from(byte) }).collect();
+    let linear: Vec<f32> = (0..=255_u8)
+        .map(|byte| if is_color { srgb_decode(f32::from(byte) / 255.0) } else { f32::from(byte) })
+        .collect();
     let (columns, rows) = ((width / 2).max(1), (height / 2).max(1));
     let covered = |i: u32, halves: u32, whole: u32| {
         let end = if i + 1 == halves { whole } else { 2 * i + 2 };
@@ -88,4 +90,3 @@ fn halved(finer: &[[u8; 4]], (width, height): (u32, u32), is_color: bool) -> Vec
     };
     (0..columns * rows).into_par_iter().map(texel).collect()
 }
-

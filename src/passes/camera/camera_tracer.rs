@@ -11,7 +11,10 @@ use crate::{
     bvh::Media,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{self, CameraTile, Counters, FirstHit, Gathered, LobeLight, LobePoint, MARGIN_CELL, MARGIN_SAMPLES, PixelSums, VisiblePoint},
+    layout::{
+        self, CameraTile, Counters, FirstHit, Gathered, LobeLight, LobePoint, MARGIN_CELL, MARGIN_SAMPLES, PixelSums,
+        VisiblePoint,
+    },
     passes::{
         estimate::SharedPoints,
         wavefront::{Step, Wavefront},
@@ -122,8 +125,7 @@ impl CameraTracer {
             radiance: gpu.storage::<[f32; 4]>("radiance", places)?,
             gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
             first_hits: gpu.storage::<FirstHit>("first hits", samples)?,
-            lobe_points: gpu
-                .storage::<LobePoint>("lit lobes", if scene.materials.has_rough { places } else { 1 })?,
+            lobe_points: gpu.storage::<LobePoint>("lit lobes", if scene.materials.has_rough { places } else { 1 })?,
             pixel_rows: gpu.storage::<PixelSums>("sums of pixels", TILE_POINTS / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
             view: CameraTile { margin, ..view },
@@ -220,18 +222,15 @@ impl CameraTracer {
     ) -> Result<StepCount> {
         let most_paths = (u64::from(invocations) * u64::from(self.view.branches))
             .min(TILE_POINTS + u64::from(self.view.margin * self.view.branches));
-        let tile = [
-            ("first_hits", &self.first_hits),
-            ("radiance", &self.radiance),
-            ("lobe_points", &self.lobe_points),
-        ];
+        let tile = [("first_hits", &self.first_hits), ("radiance", &self.radiance), ("lobe_points", &self.lobe_points)];
         let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
         let start = Step { kernel: start.kernel, buffers: &started };
-        let lighting = gpu.uniform("lights of lobes", &LobeLight {
-            light_count: scene.lights.table.lights.len() as u32,
-            ..Default::default()
-        });
-        let lit = [trace.buffers, &tile, &[("lighting", &lighting), ("choices", &scene.lights.photons.buffer)]].concat();
+        let lighting = gpu.uniform(
+            "lights of lobes",
+            &LobeLight { light_count: scene.lights.table.lights.len() as u32, ..Default::default() },
+        );
+        let lit =
+            [trace.buffers, &tile, &[("lighting", &lighting), ("choices", &scene.lights.photons.buffer)]].concat();
         let trace = Step { kernel: trace.kernel, buffers: &followed };
         let light = self.kernels.lobes.as_ref().filter(|_| sees_lights);
         let light = light.map(|kernel| Step { kernel, buffers: &lit });
