@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use crate::layout::ALBEDO_STEPS;
 
-/// Points along each side of the square over which each entry is averaged.
-const SAMPLES: u32 = 48;
+/// Points over which each entry is averaged.
+const SAMPLES: u32 = 4096;
 /// Least cosine and width, in place of 0.
 const LEAST: f64 = 1e-4;
 
@@ -28,10 +28,11 @@ pub fn albedos() -> Vec<[f32; 4]> {
     (0..steps).into_par_iter().flat_map_iter(|i| row(value(i))).collect()
 }
 
-/// Midpoints of the cells of the unit square.
-fn square(samples: u32) -> impl Iterator<Item = (f64, f64)> {
-    let at = move |i: u32| (f64::from(i) + 0.5) / f64::from(samples);
-    (0..samples * samples).map(move |i| (at(i % samples), at(i / samples)))
+/// Points spread evenly over the unit square: equal steps along one side, those of the golden ratio
+/// along the other.
+fn square() -> impl Iterator<Item = (f64, f64)> {
+    let at = |i: u32| f64::from(i) + 0.5;
+    (0..SAMPLES).map(move |i| ((at(i) * 0.618_033_988_749_895).fract(), at(i) / f64::from(SAMPLES)))
 }
 
 fn lambda(alpha: f64, cosine: f64) -> f64 {
@@ -44,7 +45,7 @@ fn reflected(cosine: f64, alpha: f64) -> (f64, f64) {
     let view = glam::dvec3((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
     let stretched = glam::dvec3(alpha * view.x, 0.0, view.z).normalize();
     let (mut all, mut grazing) = (0.0, 0.0);
-    for (u, v) in square(SAMPLES) {
+    for (u, v) in square() {
         let (sine, cos_phi) = (2.0 * PI * u).sin_cos();
         let z = (1.0 - v) * (1.0 + stretched.z) - stretched.z;
         let r = (1.0 - z * z).max(0.0).sqrt();
@@ -58,7 +59,7 @@ fn reflected(cosine: f64, alpha: f64) -> (f64, f64) {
             grazing += weight * (1.0 - view.dot(h)).max(0.0).powi(5);
         }
     }
-    let count = f64::from(SAMPLES * SAMPLES);
+    let count = f64::from(SAMPLES);
     (all / count, grazing / count)
 }
 
@@ -78,7 +79,7 @@ fn held_back(cosine: f64) -> f64 {
         let light = glam::dvec3(v.sqrt() * cos_phi, v.sqrt() * sine, (1.0 - v).sqrt());
         (1.0 - (0.5 + 0.5 * view.dot(light)).max(0.0).sqrt()).powi(5)
     };
-    square(SAMPLES).map(at).sum::<f64>() / f64::from(SAMPLES * SAMPLES)
+    square().map(at).sum::<f64>() / f64::from(SAMPLES)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use caustica::{
     bvh::Bvh,
-    layout::{CameraTile, Counters, FirstHit, NOTHING_LEFT, Path, VisiblePoint},
+    layout::{CameraTile, Counters, FirstHit, LobePoint, NOTHING_LEFT, Path, VisiblePoint},
     scene::Scene,
     settings::LightSettings,
     upload::SceneBuffers,
@@ -32,6 +32,7 @@ pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) ->
     let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
     let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
     let radiance = gpu.storage::<[f32; 4]>("radiance", count).expect("fits");
+    let lobe_points = gpu.storage::<LobePoint>("lit lobes", 1).expect("fits");
     let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..CameraTile::default() });
     let own = [
         ("tile", &tile),
@@ -41,6 +42,7 @@ pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) ->
         ("points", &points),
         ("first_hits", &first_hits),
         ("radiance", &radiance),
+        ("lobe_points", &lobe_points),
     ];
     let bindings = kernel.bind(gpu, &buffers.with(&own));
     let mut commands = gpu.encoder();
