@@ -90,7 +90,7 @@ impl MaterialInfo {
         let (metallic, coat) = match material.surface {
             Surface::Layered { metallic, f0, specular, .. } => (metallic, Some((f0.to_array(), specular))),
             Surface::Mirror { .. } => (1.0, None),
-            Surface::Diffuse { .. } | Surface::Glass { .. } | Surface::Pane { .. } => (0.0, None),
+            Surface::Diffuse { .. } | Surface::Glass { .. } | Surface::Pane { .. } => (material.metallic, None),
         };
         let (alpha, alpha_cutoff) = match material.alpha {
             Alpha::Opaque => ("opaque", None),

@@ -209,6 +209,9 @@ pub struct Material {
     /// Glass and panes: fraction of the light within the surface that is transmitted, 0 to 1; the
     /// rest is scattered by a diffuse base of the same colour.
     pub transmission: f32,
+    /// Glass and panes: fraction of the surface that is metal and transmits nothing, 0 to 1. A
+    /// layered surface has its own.
+    pub metallic: f32,
     /// Absorption coefficient inside of a solid, 1/m for each channel, at least 0.
     pub absorption: Vec3,
     /// Strength of a clear coat above everything else, 0 to 1.
@@ -275,6 +278,7 @@ impl Material {
             surface,
             roughness: 0.0,
             transmission: 1.0,
+            metallic: 0.0,
             absorption: Vec3::ZERO,
             clearcoat: 0.0,
             clearcoat_roughness: 0.0,

@@ -267,3 +267,58 @@ fn attributes_stay_with_their_triangles_when_others_are_left_out() {
     gltf["materials"][0]["emissiveFactor"] = json!([1, 1, 1]);
     assert_eq!(uvs(&gltf), [Vec2::ZERO]);
 }
+
+#[test]
+fn normal_maps_of_turned_glass_stand_out_to_the_other_side() {
+    // A tetrahedron whose faces look inwards, with a normal map.
+    let mut gltf = with_normal_map();
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0_f32]];
+    let inwards =
+        [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]].as_flattened().iter().map(|i| corners[*i]).collect::<Vec<_>>();
+    let uvs: Vec<f32> = [[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]; 4].as_flattened().to_vec();
+    let mut primitive = json!({ "attributes": {}, "material": 0 });
+    for (name, numbers, kind) in [("POSITION", inwards.as_flattened(), "VEC3"), ("TEXCOORD_0", &uvs, "VEC2")] {
+        primitive["attributes"][name] = add_accessor(&mut gltf, &floats(numbers), 5126, 12, kind).into();
+    }
+    gltf["meshes"][0]["primitives"] = json!([primitive]);
+    // The normal that the map gives at its corner, for a texel of (0.6, 0, 0.8).
+    let normals = |gltf: &Value| {
+        let scene = loaded(gltf);
+        let normal = |triangle: &caustica::scene::Triangle| {
+            let tangent = scene.attributes[triangle.attributes as usize - 1].tangents[0];
+            0.6 * tangent.truncate() + 0.8 * triangle.normals[0]
+        };
+        (
+            scene.triangles.iter().map(normal).collect::<Vec<_>>(),
+            scene.triangles.iter().all(|triangle| triangle.is_turned),
+        )
+    };
+    let (opaque, turned) = normals(&gltf);
+    assert!(!turned);
+    gltf["materials"][0]["extensions"] = json!({ "KHR_materials_transmission": { "transmissionFactor": 1 },
+        "KHR_materials_volume": { "thicknessFactor": 1 } });
+    let (glass, turned) = normals(&gltf);
+    assert!(turned && opaque.iter().zip(&glass).all(|(a, b)| (*a + *b).length() < 1e-5), "{opaque:?} {glass:?}");
+}
+
+#[test]
+fn morph_targets_move_tangents_with_their_surface() {
+    let mut gltf = with_normal_map();
+    let tangents = floats(&[0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0]);
+    set(&mut gltf, "TANGENT", (&tangents, 5126, "VEC4"), false);
+    // The second corner moves from +X to +Z, the third stays at +Y.
+    let moved = add_accessor(&mut gltf, &floats(&[0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0]), 5126, 3, "VEC3");
+    let turned =
+        add_accessor(&mut gltf, &floats(&[-1.0, 0.0, -1.0, -1.0, 0.0, -1.0, -1.0, 0.0, -1.0]), 5126, 3, "VEC3");
+    gltf["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": moved, "NORMAL": turned }]);
+    gltf["meshes"][0]["weights"] = json!([0]);
+    assert!(near(frame(&loaded(&gltf)), [Vec3::Y, -Vec3::X]), "of the file");
+    gltf["meshes"][0]["weights"] = json!([1]);
+    let scene = loaded(&gltf);
+    assert_eq!(scene.triangles[0].normals[0], -Vec3::X);
+    assert!(near(frame(&scene), [Vec3::Z, -Vec3::Y]), "made anew: {:?}", frame(&scene));
+    assert_eq!(scene.warnings, [""; 0]);
+    gltf["meshes"][0]["primitives"][0]["targets"][0]["TEXCOORD_0"] = 0.into();
+    let said = "morph targets of texture coordinates and colours are not read: these stay as in the mesh";
+    assert_eq!(loaded(&gltf).warnings, [said]);
+}

@@ -167,8 +167,11 @@ fn every_property_has_its_texture() {
     gltf["materials"][0] = material.clone();
     assert_eq!(message(load(&gltf)), "materials[0].normalTexture.scale: inf is not finite");
     material["normalTexture"]["scale"] = 1.into();
+    // All metal by its factor; the texture tells what of it transmits light.
+    material["pbrMetallicRoughness"]["metallicFactor"] = 1.into();
     gltf["materials"][0] = material;
     let scene = loaded(&gltf);
+    assert_eq!((scene.materials[0].metallic, scene.materials[0].surface.transmits()), (1.0, true));
     let transmission = scene.materials[0].textures.transmission.expect("a texture");
     assert_eq!(scene.images[transmission.image as usize].texels, [[3; 4]]);
 }

@@ -24,6 +24,9 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
     if let Some(materials) = file.get("materials") {
         check_textures(materials, textures.len() as u64, false, &|| "materials".to_owned())?;
     }
+    if file.get("meshes").is_some_and(morphs_more) {
+        notes.add("morph targets of texture coordinates and colours are not read: these stay as in the mesh");
+    }
     if !objects(&mut file, "animations")?.is_empty() {
         notes.add("animations are not read: nodes stand as in the file");
     }
@@ -66,6 +69,16 @@ fn check_textures(value: &Value, known: u64, is_texture: bool, place: &dyn Fn() 
         }
         _ => Ok(()),
     }
+}
+
+/// Whether morph targets of a list of meshes displace what the crate does not know.
+fn morphs_more(meshes: &Value) -> bool {
+    fn list(value: Option<&Value>) -> &[Value] {
+        value.and_then(Value::as_array).map_or(&[], Vec::as_slice)
+    }
+    let primitives = list(Some(meshes)).iter().flat_map(|mesh| list(mesh.get("primitives")));
+    let mut targets = primitives.flat_map(|primitive| list(primitive.get("targets"))).filter_map(Value::as_object);
+    targets.any(|target| target.keys().any(|name| name.starts_with("TEXCOORD_") || name.starts_with("COLOR_")))
 }
 
 /// Version of a file, checked before the rest, whose structure depends on it.

@@ -100,6 +100,7 @@ fn sound_material(material: &Material, images: usize) {
     let factors = [
         material.roughness,
         material.transmission,
+        material.metallic,
         material.clearcoat,
         material.clearcoat_roughness,
         material.opacity,

@@ -35,6 +35,18 @@ pub(super) struct Base {
     pub(super) specular_color: Option<Texture>,
 }
 
+impl Base {
+    /// Whether all of it is metal.
+    pub(super) fn is_metal(&self) -> bool {
+        self.metallic == 1.0 && self.metallic_roughness.is_none()
+    }
+
+    /// Whether some light passes through it.
+    pub(super) fn transmits(&self) -> bool {
+        self.transmission > 0.0 && !self.is_metal() && self.ior > 0.0
+    }
+}
+
 /// Reads the base of a material.
 pub(super) fn read(reader: &mut Reader<'_>) -> Read<Base> {
     match reader.extension::<SpecularGlossiness>(SPECULAR_GLOSSINESS)? {
@@ -100,9 +112,7 @@ fn of_metal(reader: &mut Reader<'_>) -> Read<Base> {
         let at = format!("{PBR}.metallicRoughnessTexture");
         base.metallic_roughness = reader.data_texture(pbr.metallic_roughness_texture.as_ref(), &at)?;
     }
-    let is_metal = base.metallic == 1.0 && base.metallic_roughness.is_none();
-    let transmits = base.transmission > 0.0 && base.metallic < 1.0;
-    if let Some(specular) = specular.filter(|_| base.specular > 0.0 && !is_metal && !transmits) {
+    if let Some(specular) = specular.filter(|_| base.specular > 0.0 && !base.is_metal() && !base.transmits()) {
         base.specular_texture = reader.data_texture(specular.specular_texture.as_ref(), &at("specularTexture"))?;
         base.specular_color =
             reader.color_texture(specular.specular_color_texture.as_ref(), &at("specularColorTexture"))?;

@@ -94,15 +94,14 @@ impl Reader<'_> {
 
     /// The surface that the base makes. Sets what the material has of transmission.
     fn surface(&mut self, base: &Base, material: &mut Material) -> Read<Surface> {
-        let is_smooth = base.roughness < SHARP_ROUGHNESS && base.metallic_roughness.is_none();
-        if base.transmission > 0.0 && base.metallic < 1.0 && base.ior > 0.0 {
+        if base.transmits() {
             return self.transmitting(base, material);
         }
         if base.transmission > 0.0 {
             let why = if base.ior == 0.0 { "ior 0 reflects all light" } else { "it is of metal" };
             self.note(&format!("transmits nothing, because {why}"));
         }
-        Ok(if base.metallic == 1.0 && is_smooth {
+        Ok(if base.is_metal() && base.roughness < SHARP_ROUGHNESS {
             Surface::Mirror { tint: base.color }
         } else if base.metallic == 0.0 && base.specular == 0.0 {
             Surface::Diffuse { albedo: base.color }
@@ -114,13 +113,13 @@ impl Reader<'_> {
     /// Glass or a thin pane, as the thickness says.
     fn transmitting(&mut self, base: &Base, material: &mut Material) -> Read<Surface> {
         if base.metallic > 0.0 {
-            self.note(&format!("the metal of metallic {} does not show, since it transmits light", base.metallic));
+            self.note("its metal is not rendered yet, because it transmits light: it is glass all over");
         }
         if base.specular != 1.0 || base.f0 != Vec3::splat(base::normal_reflectance(base.ior)) {
             self.note("KHR_materials_specular does not change the reflection of glass, which its ior decides");
         }
         let extensions = self.material.extensions.as_ref();
-        material.transmission = base.transmission;
+        (material.transmission, material.metallic) = (base.transmission, base.metallic);
         let texture = extensions.and_then(|e| e.transmission.as_ref()?.transmission_texture.as_ref());
         let at = "extensions.KHR_materials_transmission.transmissionTexture";
         material.textures.transmission = self.data_texture(texture, at)?;
