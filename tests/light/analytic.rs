@@ -17,7 +17,7 @@ use caustica::{
     passes::{PhotonTracer, TracedPhotons},
     progress::Silent,
     scene::Scene,
-    settings::{Mode, Sampler, Settings},
+    settings::{EstimateSettings, Mode, Sampler, Settings},
     upload::SceneBuffers,
 };
 use glam::{Vec3, vec3};
@@ -47,27 +47,27 @@ fn closed_sphere_has_the_radiance_of_the_series() {
     let (scene, direct) = closed_sphere();
     let right = direct * series(ALBEDO, BOUNCES);
     for mode in [Mode::Photons, Mode::Hybrid] {
-        let estimate = |neighbors, sampler, max_bounces| {
+        // Over 10 neighbours and over 100.
+        let estimates = |sampler, max_bounces| {
             let settings = settings(mode, 40_000, 32).with(|s| {
-                s.estimate.neighbors = neighbors;
                 s.photons.max_bounces = max_bounces;
                 s.photons.sampler = sampler;
             });
-            Estimate::over_seeds(6, |seed| {
-                mean(&render_scene(&scene, &settings.clone().with(|s| s.photons.seed = seed)))
-            })
+            let of = [10, 100].map(|neighbors| EstimateSettings { neighbors, ..settings.estimate.clone() });
+            Estimate::of_pictures(6, &scene, &settings, &of)
         };
-        let short = estimate(10, Sampler::Random, BOUNCES - 1);
+        let short = estimates(Sampler::Random, BOUNCES - 1)[0];
         assert!(short.z(right) > 4.0, "control: {mode:?}: {short:?} with a bounce less");
-        for neighbors in [10, 100] {
+        let (independent, spread) = (estimates(Sampler::Random, BOUNCES), estimates(Sampler::Sobol, BOUNCES));
+        for (i, neighbors) in [10, 100].into_iter().enumerate() {
             // Independent photons. Photons of a Sobol sequence keep a distance from each other,
             // which makes the squared distance of the (k+1)-th larger by up to 1/(2k).
-            let found = estimate(neighbors, Sampler::Random, BOUNCES);
+            let found = independent[i];
             assert!(found.z(right) < 4.0, "{mode:?}, k = {neighbors}: {found:?} instead of {right}");
             // The default sampler stays within this bias.
             let least = right * (1.0 - 0.5 / f64::from(neighbors));
             let fits = |mean: f64| mean > 0.995 * least && mean < 1.005 * right;
-            let spread = estimate(neighbors, Sampler::Sobol, BOUNCES).mean;
+            let spread = spread[i].mean;
             assert!(fits(spread), "{mode:?}, k = {neighbors}: {spread} is not from {least} to {right}");
             assert!(!fits(short.mean), "control: {mode:?}, k = {neighbors}: a bounce less fits");
         }
@@ -152,8 +152,8 @@ fn floor_under_light(height: f32) -> Scene {
 
 #[test]
 fn light_falls_with_the_square_of_the_distance() {
-    const SEEDS: u32 = 8;
-    for (mode, tolerance) in [(Mode::DirectRays, 0.005), (Mode::DirectPhotons, 0.03)] {
+    // Rays to a point have no noise.
+    for (mode, seeds, tolerance) in [(Mode::DirectRays, 1, 0.005), (Mode::DirectPhotons, 8, 0.03)] {
         let measured = |height| {
             let one = |seed| {
                 let settings = settings(mode, 200_000, 16).with(|s| {
@@ -162,7 +162,7 @@ fn light_falls_with_the_square_of_the_distance() {
                 });
                 mean(&render_scene(&floor_under_light(height), &settings))
             };
-            (0..SEEDS).map(one).sum::<f64>() / f64::from(SEEDS)
+            (0..seeds).map(one).sum::<f64>() / f64::from(seeds)
         };
         let right = |height: f64| 0.5 / PI * 7.0 / (height * height);
         let (near, far) = (measured(1.0), measured(2.0));

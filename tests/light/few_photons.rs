@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use caustica::{
     density::DensityKernel,
     scene::{Scene, Surface},
-    settings::{Mode, Sampler, Settings},
+    settings::{EstimateSettings, Mode, Sampler, Settings},
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -43,46 +43,53 @@ fn right(scene: &Scene, size: u32, heights: &[f64]) -> f64 {
     sum / f64::from(cells * cells)
 }
 
-fn asked(neighbors: u32, kernel: DensityKernel, sampler: Sampler) -> Settings {
+fn asked(sampler: Sampler) -> Settings {
     settings(Mode::Photons, 100_000, 48).with(|s| {
-        s.estimate.neighbors = neighbors;
-        s.estimate.kernel = kernel;
         s.photons.sampler = sampler;
         s.picture.spp = 2;
     })
 }
 
-fn mean_over_seeds(scene: &Scene, settings: &Settings, seeds: u32) -> Estimate {
-    Estimate::over_seeds(seeds, |seed| mean(&render_scene(scene, &settings.clone().with(|s| s.photons.seed = seed))))
+fn estimate(kernel: DensityKernel, neighbors: u32) -> EstimateSettings {
+    EstimateSettings { kernel, neighbors, ..EstimateSettings::default() }
+}
+
+fn constant(neighbors: u32) -> EstimateSettings {
+    estimate(DensityKernel::Constant, neighbors)
 }
 
 #[test]
 fn few_photons_are_as_bright_as_many() {
     let scene = floor();
     let right = right(&scene, 48, &[1.0]);
-    let constant = [1, 3, 10, 30, 100].map(|k| (DensityKernel::Constant, k));
     let others = [(DensityKernel::Cone, 3), (DensityKernel::Gaussian, 20), (DensityKernel::Silverman, 5)];
-    for (kernel, k) in constant.into_iter().chain(others) {
-        let found = mean_over_seeds(&scene, &asked(k, kernel, Sampler::Sobol), 2).mean;
-        assert!(within(found, right, 0.01), "{kernel:?}, k = {k}: {found:.4}, right {right:.4}");
+    let corrected = [1, 3, 10, 30, 100].map(constant).into_iter().chain(others.map(|(kernel, k)| estimate(kernel, k)));
+    let mut estimates: Vec<_> = corrected.collect();
+    estimates.push(EstimateSettings { raw: true, ..constant(10) });
+    let found = Estimate::of_pictures(2, &scene, &asked(Sampler::Sobol), &estimates);
+    let (raw, found) = found.split_last().expect("the raw estimate");
+    for (EstimateSettings { kernel, neighbors: k, .. }, Estimate { mean, .. }) in estimates.iter().zip(found) {
+        assert!(within(*mean, right, 0.01), "{kernel:?}, k = {k}: {mean:.4}, right {right:.4}");
     }
-    let random = mean_over_seeds(&scene, &asked(3, DensityKernel::Constant, Sampler::Random), 8);
+    let [random] = Estimate::of_pictures(8, &scene, &asked(Sampler::Random), &[constant(3)])[..] else {
+        unreachable!("one estimate")
+    };
     assert!(random.z(right) < 4.0 && random.error < 0.01 * right, "random: {random:?}, right {right:.4}");
-    let raw = asked(10, DensityKernel::Constant, Sampler::Sobol).with(|s| s.estimate.raw = true);
-    let raw = mean_over_seeds(&scene, &raw, 2).mean;
+    let raw = raw.mean;
     assert!(!within(raw, right, 0.02), "control: the raw estimate of 10 photons: {raw:.4}, right {right:.4}");
 }
 
 #[test]
 fn few_photons_of_a_caustic_are_as_bright_as_many() {
     let mut scene = floor();
-    let alone = mean_over_seeds(&scene, &asked(10, DensityKernel::Constant, Sampler::Sobol), 2).mean;
+    let alone = Estimate::of_pictures(2, &scene, &asked(Sampler::Sobol), &[constant(10)])[0].mean;
     // Two metres above the floor; it faces down. The image of the lamp lies three metres above.
     add_quad(&mut scene, vec3(-6.0, 2.0, -6.0), Vec3::X * 12.0, Vec3::Z * 12.0, 1);
     let right = right(&scene, 48, &[1.0, 3.0]);
-    for k in [1, 3, 10, 30] {
-        let settings = asked(k, DensityKernel::Constant, Sampler::Sobol).with(|s| s.photons.max_bounces = 1);
-        let found = mean_over_seeds(&scene, &settings, 2).mean;
+    let settings = asked(Sampler::Sobol).with(|s| s.photons.max_bounces = 1);
+    let counts = [1, 3, 10, 30];
+    for (k, found) in counts.into_iter().zip(Estimate::of_pictures(2, &scene, &settings, &counts.map(constant))) {
+        let found = found.mean;
         assert!(within(found, right, 0.01), "k = {k}: {found:.4}, right {right:.4}");
     }
     assert!(!within(alone, right, 0.05), "control: without the mirror {alone:.4}, right {right:.4}");
@@ -95,9 +102,10 @@ fn few_photons_of_several_bounces_are_as_bright_as_many() {
     scene.lights.push(point_light(Vec3::ZERO, 5.0));
     scene.cameras.push(camera(vec3(0.5, 0.0, 0.0), vec3(-1.0, 0.2, 0.3), 100.0));
     let bounces = |count: i32| 0.6 / PI * 5.0 / 4.0 * (1.0 - 0.6_f64.powi(count)) / 0.4;
-    for k in [1, 3, 10, 30] {
-        let settings = asked(k, DensityKernel::Constant, Sampler::Sobol).with(|s| s.photons.max_bounces = 3);
-        let found = mean_over_seeds(&scene, &settings, 3).mean;
+    let settings = asked(Sampler::Sobol).with(|s| s.photons.max_bounces = 3);
+    let counts = [1, 3, 10, 30];
+    for (k, found) in counts.into_iter().zip(Estimate::of_pictures(3, &scene, &settings, &counts.map(constant))) {
+        let found = found.mean;
         assert!(within(found, bounces(3), 0.01), "k = {k}: {found:.4}, right {:.4}", bounces(3));
         assert!(!within(found, bounces(2), 0.05), "control: k = {k}: a bounce less: {:.4}", bounces(2));
     }

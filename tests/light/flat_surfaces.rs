@@ -37,7 +37,7 @@ fn where_solids_touch_few_photons_are_as_bright_as_many() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/diffuse.gltf");
     let scene = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
     let asked = |photons, neighbors, seed| {
-        settings(Mode::IndirectPhotons, photons, 128).with(|s| {
+        settings(Mode::IndirectPhotons, photons, 64).with(|s| {
             s.estimate.neighbors = neighbors;
             s.photons.seed = seed;
         })

@@ -152,7 +152,10 @@ fn rays_of_final_gathering_start_in_what_is_around_them() {
     scene.lights.push(point_light(vec3(1.5, 0.0, 0.0), 10.0));
     scene.cameras.push(camera(vec3(0.0, 0.4, 0.001), vec3(0.0, -0.4, 0.0), 40.0));
     let of = |scene: &Scene, final_gather: u32| {
-        let settings = settings(Mode::IndirectPhotons, 200_000, 6).with(|s| s.photons.final_gather = final_gather);
+        let settings = settings(Mode::IndirectPhotons, 200_000, 6).with(|s| {
+            s.photons.final_gather = final_gather;
+            s.photons.caustic = 40_000;
+        });
         mean(&render_scene(scene, &settings))
     };
     let (estimated, gathered) = (of(&scene, 0), of(&scene, 32));

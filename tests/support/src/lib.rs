@@ -15,9 +15,9 @@ use std::sync::OnceLock;
 use caustica::{
     gpu::Gpu,
     progress::Silent,
-    renderer::{Render, render},
+    renderer::{Render, Session, render},
     scene::{Camera, Light, LightKind, Material, Projection, Scene, Sphere, Surface, Triangle},
-    settings::{Mode, Settings},
+    settings::{EstimateSettings, Mode, Settings},
 };
 use glam::Vec3;
 
@@ -114,6 +114,14 @@ pub fn render_scene(scene: &Scene, settings: &Settings) -> Render {
     render(gpu(), scene, settings, &Silent).expect("the scene renders")
 }
 
+/// Renders of the same photons, one for each estimate; of the bits of [`render_scene`].
+pub fn render_estimates(scene: &Scene, settings: &Settings, estimates: &[EstimateSettings]) -> Vec<Render> {
+    let session = Session::open(gpu(), scene, &settings.lights, &Silent).expect("the scene fits");
+    let maps = session.photon_maps(&settings.photons, &Silent).expect("photons");
+    let picture = |estimate| session.picture(&maps, estimate, &settings.picture, &Silent).expect("a picture");
+    estimates.iter().map(picture).collect()
+}
+
 /// Mean of all pixels and channels.
 pub fn mean(render: &Render) -> f64 {
     let sum: f64 = render.frame.radiance().iter().flatten().map(|&x| f64::from(x)).sum();
@@ -130,11 +138,27 @@ pub struct Estimate {
 impl Estimate {
     /// Estimate over the seeds 0..`seeds`.
     pub fn over_seeds(seeds: u32, of_seed: impl Fn(u32) -> f64) -> Self {
-        let values: Vec<f64> = (0..seeds).map(of_seed).collect();
-        let count = f64::from(seeds);
+        Self::of(&(0..seeds).map(of_seed).collect::<Vec<_>>())
+    }
+
+    fn of(values: &[f64]) -> Self {
+        let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
         Self { mean, error: (squares / (count * (count - 1.0))).sqrt() }
+    }
+
+    /// Estimates over the seeds 0..`seeds` of the means of pictures. Those of one seed share
+    /// photons.
+    pub fn of_pictures(seeds: u32, scene: &Scene, settings: &Settings, estimates: &[EstimateSettings]) -> Vec<Self> {
+        let of_seed = |seed| {
+            render_estimates(scene, &settings.clone().with(|s| s.photons.seed = seed), estimates)
+                .iter()
+                .map(mean)
+                .collect()
+        };
+        let means: Vec<Vec<f64>> = (0..seeds).map(of_seed).collect();
+        (0..estimates.len()).map(|i| Self::of(&means.iter().map(|of_seed| of_seed[i]).collect::<Vec<_>>())).collect()
     }
 
     /// Distance from the expected value, in standard errors.
