@@ -202,6 +202,9 @@ fn disagreements(wgsl: &str) -> Vec<String> {
 /// Structs that kernels decode from the texels of tables.
 const IN_TABLES: [&str; 2] = ["Medium", "Normals"];
 
+/// Records of tables of which kernels read single texels, so that no struct of theirs is one.
+const READ_BY_ROWS: [&str; 3] = ["MaterialRecord", "TextureRecord", "Attributes"];
+
 /// Structs in storage or uniform buffers, nested ones included, and structs in tables.
 fn bound_structs(module: &Module) -> Vec<Handle<Type>> {
     let in_buffer = |space| matches!(space, AddressSpace::Storage { .. } | AddressSpace::Uniform);
@@ -340,7 +343,8 @@ fn names_value(wgsl: &str, name: &str) -> bool {
 #[test]
 fn every_struct_of_the_host_lies_in_some_kernels_buffer() {
     let bound: Vec<String> = SHADERS.iter().flat_map(|s| bound_names(s.wgsl)).collect();
-    let unused: Vec<_> = twins().into_iter().map(|t| t.name).filter(|name| !bound.iter().any(|b| b == name)).collect();
+    let is_unused = |name: &&str| !READ_BY_ROWS.contains(name) && !bound.iter().any(|b| b == name);
+    let unused: Vec<_> = twins().into_iter().map(|t| t.name).filter(is_unused).collect();
     assert!(unused.is_empty(), "no kernel binds {unused:?}");
     assert_eq!(bound_names(GOOD), ["Path", "Photon"]);
 }
