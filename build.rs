@@ -63,7 +63,10 @@ fn shader_entry(stem: &str, wgsl: &str) -> String {
         }
         let kind = match var.space {
             naga::AddressSpace::Uniform => "Uniform",
-            naga::AddressSpace::Handle => "Table",
+            naga::AddressSpace::Handle => match module.types[var.ty].inner {
+                naga::TypeInner::Image { arrayed: true, .. } => "LayeredTable",
+                _ => "Table",
+            },
             naga::AddressSpace::Storage { access } if access.contains(naga::StorageAccess::STORE) => "ReadWrite",
             _ => "ReadOnly",
         };

@@ -117,21 +117,12 @@ fn rays() -> Vec<Ray> {
 /// Closed room whose floor is a height field of `side` x `side` quads.
 fn room(side: i32) -> Scene {
     let surface = Surface::Diffuse { albedo: Vec3::splat(0.5) };
-    let mut scene = Scene {
-        materials: vec![Material {
-            name: String::new(),
-            surface,
-            emission: Vec3::ZERO,
-            double_sided: false,
-            priority: 0,
-        }],
-        ..Scene::default()
-    };
+    let mut scene = Scene { materials: vec![Material::new("", surface)], ..Scene::default() };
     let mut quad = |corners: [Vec3; 4]| {
         for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
             let positions = [corners[a], corners[b], corners[c]];
             let normal = (positions[1] - positions[0]).cross(positions[2] - positions[0]).normalize();
-            scene.triangles.push(Triangle { positions, normals: [normal; 3], material: 0 });
+            scene.triangles.push(Triangle::new(positions, [normal; 3], 0));
         }
     };
     let at = |i: i32, j: i32| {

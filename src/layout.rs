@@ -57,8 +57,10 @@ pub const CONTACT_BIT: u32 = 0x2000_0000;
 /// [`crate::scene::NO_SLOT`] if it bounds none.
 pub const SLOT_SHIFT: u32 = 22;
 pub const SLOT_MASK: u32 = 127;
+/// Set there when parts of the surface are not there: rays ask for its opacity.
+pub const ALPHA_BIT: u32 = 1 << 21;
 /// Mask there of the index into the materials.
-pub const MATERIAL_MASK: u32 = (1 << SLOT_SHIFT) - 1;
+pub const MATERIAL_MASK: u32 = ALPHA_BIT - 1;
 /// In place of the primitive that a path has left: none.
 pub const NOTHING_LEFT: u32 = (1 << BVH_INDEX_BITS) - 1;
 /// Surfaces that a path of light through mirrors and glass may meet beyond its diffuse bounces.
@@ -91,9 +93,10 @@ pub struct Normals {
     pub n0: u32,
     pub n1: u32,
     pub n2: u32,
-    /// 1 if the corners' normals all equal the geometric one: the surface is flat and the rest need
-    /// not be read.
-    pub flat_shaded: u32,
+    /// Lowest bit: the corners' normals all equal the geometric one, so that the surface is flat
+    /// and the rest need not be read. Other bits: index of the triangle's [`Attributes`] plus one,
+    /// 0 for none.
+    pub attributes: u32,
 }
 
 /// Texels in a row of a table (`gpu::Table`): the maximum width of a texture that every device
@@ -108,25 +111,101 @@ pub const GLASS: u32 = 2;
 /// Thin pane: light goes straight through.
 pub const PANE: u32 = 3;
 
-/// Scattering and emission of a surface.
+/// Diffuse base under a dielectric coat, or metal.
+pub const LAYERED: u32 = 4;
+
+/// Texels of a [`MaterialRecord`].
+pub const MATERIAL_TEXELS: u32 = 9;
+
+/// Bits of [`MaterialRecord::flags`]: the back emits as much as the front; the surface is there
+/// where its opacity reaches the cutoff; its opacity is its coverage.
+pub const DOUBLE_SIDED_BIT: u32 = 1;
+pub const MASK_BIT: u32 = 2;
+pub const BLEND_BIT: u32 = 4;
+/// Photons that the lobes beside the diffuse one scatter are caustic photons.
+pub const CAUSTIC_BIT: u32 = 8;
+
+/// Factors of a material, and where its textures are.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Material {
-    /// Diffuse: albedo. Mirror: tint of the reflection. Glass, pane: tint of the transmitted light.
-    /// Each 0..1.
+pub struct MaterialRecord {
+    /// Base colour: albedo of the diffuse lobe, reflectance of metal, tint of glass. Each 0..1.
     pub color: [f32; 3],
-    /// One of [`DIFFUSE`], [`MIRROR`], [`GLASS`], [`PANE`].
+    /// One of [`DIFFUSE`] … [`LAYERED`].
     pub kind: u32,
     /// Radiance that the front side emits, W/(m² sr).
     pub emission: [f32; 3],
-    /// Index of refraction of panes.
+    /// Index of refraction of glass and panes.
     pub ior: f32,
-    /// 1 if the back emits as much.
-    pub double_sided: u32,
-    pub pad0: u32,
-    pub pad1: u32,
-    pub pad2: u32,
+    /// 0: perfectly specular lobes.
+    pub roughness: f32,
+    pub metallic: f32,
+    /// Fraction of the light within glass that is transmitted.
+    pub transmission: f32,
+    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`CAUSTIC_BIT`].
+    pub flags: u32,
+    /// Reflectance of the coat along the normal, without its strength.
+    pub f0: [f32; 3],
+    /// Strength of the coat.
+    pub specular: f32,
+    pub clearcoat: f32,
+    pub clearcoat_roughness: f32,
+    pub normal_scale: f32,
+    pub opacity: f32,
+    /// Opacity from which on a masked surface is there.
+    pub cutoff: f32,
+    pub pad: [u32; 3],
+    /// Texels of the table of materials where the [`TextureRecord`]s begin, 0 for none: base
+    /// colour, metallic and roughness, normal, emission, specular, specular colour, transmission,
+    /// clearcoat, roughness of the clearcoat.
+    pub textures: [[u32; 4]; 3],
 }
+
+/// A texture of a material.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct TextureRecord {
+    /// First texel of the image.
+    pub first: u32,
+    /// Width, and height shifted by 16 bits.
+    pub size: u32,
+    /// Two bits each for what lies beyond the borders of u and v ([`WRAP_REPEAT`] …), then
+    /// [`LINEAR_BIT`], [`SRGB_BIT`], [`SECOND_UV_BIT`].
+    pub flags: u32,
+    /// The image, and smaller versions of it that follow.
+    pub levels: u32,
+    /// Rows of the transform of texture coordinates.
+    pub transform: [[f32; 4]; 2],
+}
+
+/// What lies beyond the border of an image: the image again, mirrored, or the border's texels.
+pub const WRAP_REPEAT: u32 = 0;
+pub const WRAP_MIRROR: u32 = 1;
+pub const WRAP_CLAMP: u32 = 2;
+/// Texels are interpolated.
+pub const LINEAR_BIT: u32 = 16;
+/// Colours are stored by the sRGB curve.
+pub const SRGB_BIT: u32 = 32;
+/// The second set of texture coordinates is read.
+pub const SECOND_UV_BIT: u32 = 64;
+
+/// Values at the corners of a triangle.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Attributes {
+    /// Texture coordinates, both sets of each corner.
+    pub uvs: [[f32; 4]; 3],
+    /// Factors on base colour and opacity.
+    pub colors: [[f32; 4]; 3],
+    /// Tangents, octahedral; the lowest bit is set where the bitangent is turned.
+    pub tangents: [u32; 3],
+    pub pad: u32,
+}
+
+/// Entries of the table of albedos along each side.
+pub const ALBEDO_STEPS: u32 = 32;
+/// Texels of [`Attributes`].
+pub const ATTRIBUTE_TEXELS: u32 = 7;
 
 /// The medium inside a solid.
 #[repr(C)]
@@ -136,6 +215,9 @@ pub struct Medium {
     pub tint: [f32; 3],
     /// Index of refraction.
     pub ior: f32,
+    /// Absorption coefficient, 1/m.
+    pub absorption: [f32; 3],
+    pub pad: u32,
 }
 
 /// Kinds of [`Light`]. First the punctual lights.
@@ -269,6 +351,48 @@ pub struct VisiblePoint {
     /// Interpolated normal, unit, on the viewer's side of the geometric one.
     pub ns: [f32; 3],
     pub media_high: u32,
+    /// Unit, to the viewer.
+    pub view: [f32; 3],
+    /// Coat above the diffuse base: reflectance along the normal and at grazing angles, two halves;
+    /// 0 for none.
+    pub coat: u32,
+}
+
+/// Lights of [`LobePoint`]s.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LobeLight {
+    pub light_count: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
+}
+
+/// Vertex of a camera path at which a rough lobe is lit.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LobePoint {
+    /// Metres.
+    pub position: [f32; 3],
+    /// As in [`VisiblePoint`].
+    pub offset: f32,
+    /// Weight of the path before the lobe.
+    pub beta: [f32; 3],
+    /// Width of GGX.
+    pub alpha: f32,
+    /// Reflectance along the normal and at grazing angles; of rough glass `f0` is the tint of what
+    /// is transmitted.
+    pub f0: [f32; 3],
+    /// n_b/n_a of rough glass, −1 of a rough pane; 0 of a lobe that reflects.
+    pub eta: f32,
+    pub f90: [f32; 3],
+    /// Geometric and interpolated normal, and direction to the viewer, octahedral.
+    pub ng: u32,
+    /// Factor of compensated multiple scattering.
+    pub compensation: [f32; 3],
+    pub ns: u32,
+    pub view: u32,
+    pub pad: [u32; 3],
 }
 
 /// Counters of a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^18 paths
@@ -300,6 +424,8 @@ pub struct Counters {
     pub lost_high: u32,
     /// Shadow rays of one pass of direct light over a tile's points.
     pub shadow_rays: u32,
+    /// Half of the queues that the current bounce reads: 0 or 1. It writes the other one.
+    pub reads: u32,
 }
 
 impl Counters {

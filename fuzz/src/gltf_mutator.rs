@@ -69,17 +69,18 @@ fn mutate_bytes(bytes: &mut Vec<u8>) {
     bytes.truncate(size);
 }
 
-/// Mutates the bytes in the data URI of a buffer.
+/// Mutates the bytes in the data URI of a buffer or an image.
 fn mutate_uri(root: &mut Value, dice: &mut Dice) {
-    let Some(buffers) = root.get_mut("buffers").and_then(Value::as_array_mut).filter(|list| !list.is_empty()) else {
+    let list = if dice.one_in(2) { "images" } else { "buffers" };
+    let Some(items) = root.get_mut(list).and_then(Value::as_array_mut).filter(|list| !list.is_empty()) else {
         return;
     };
-    let index = dice.below(buffers.len());
-    let Some(Value::String(uri)) = buffers[index].get_mut("uri") else { return };
+    let index = dice.below(items.len());
+    let Some(Value::String(uri)) = items[index].get_mut("uri") else { return };
     let Some(mut bytes) = uri.split_once(";base64,").and_then(|(_, data)| STANDARD.decode(data).ok()) else { return };
     mutate_bytes(&mut bytes);
     *uri = format!("data:application/octet-stream;base64,{}", STANDARD.encode(&bytes));
-    if !dice.one_in(8) {
+    if list == "buffers" && !dice.one_in(8) {
         set_length(root, index, bytes.len());
     }
 }

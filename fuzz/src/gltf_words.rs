@@ -16,5 +16,13 @@
     "KHR_mesh_quantization", "KHR_texture_transform", "KHR_implicit_shapes", "shapes", "shape", "sphere", "radius",
     "EXT_mesh_gpu_instancing", "TRANSLATION", "ROTATION", "SCALE", "EXT_meshopt_compression", "KHR_meshopt_compression",
     "filter", "ATTRIBUTES", "TRIANGLES", "INDICES", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "KHR_draco_mesh_compression",
+    "TEXCOORD_1", "TEXCOORD_2", "COLOR_1", "KHR_materials_clearcoat", "clearcoatFactor", "clearcoatTexture",
+    "clearcoatRoughnessTexture", "clearcoatNormalTexture", "KHR_materials_sheen", "sheenColorFactor", "sheenColorTexture",
+    "KHR_materials_anisotropy", "anisotropyStrength", "anisotropyTexture", "KHR_materials_iridescence", "iridescenceFactor",
+    "iridescenceThicknessTexture", "KHR_materials_dispersion", "dispersion", "KHR_materials_diffuse_transmission",
+    "diffuseTransmissionFactor", "diffuseTransmissionTexture", "KHR_materials_pbrSpecularGlossiness", "diffuseTexture",
+    "specularGlossinessTexture", "glossinessFactor", "KHR_materials_variants", "variants", "mappings", "specularTexture",
+    "specularColorTexture", "transmissionTexture", "metallicRoughnessTexture", "wrapS", "wrapT", "magFilter", "minFilter",
+    "offset", "EXT_texture_webp", "KHR_texture_basisu", "image/jpeg", "image/webp",
     "KHR_node_visibility", "visible", "MSFT_lod", "data:application/octet-stream;base64,AAAA", "data:,", "a.bin", "../a.bin", "/etc/hostname", "file:///a",
 ]

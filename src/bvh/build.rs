@@ -105,8 +105,8 @@ const FLAT_TOLERANCE: f32 = 1e-4;
 fn corner_normals(triangle: &Triangle) -> Normals {
     let flat = triangle.geometric_normal();
     let [n0, n1, n2] = triangle.normals.map(octahedral);
-    let flat_shaded = u32::from(triangle.normals.iter().all(|normal| (*normal - flat).length() < FLAT_TOLERANCE));
-    Normals { n0, n1, n2, flat_shaded }
+    let is_flat = triangle.normals.iter().all(|normal| (*normal - flat).length() < FLAT_TOLERANCE);
+    Normals { n0, n1, n2, attributes: (triangle.attributes << 1) | u32::from(is_flat) }
 }
 
 /// Builds the tree before conversion. Runs on one thread: the parallel sorts do not promise an

@@ -145,13 +145,8 @@ mod tests {
     /// diffuse.
     fn found(triangles: &[([Vec3; 3], u32)], spheres: &[(f32, u32)]) -> Vec<bool> {
         let surfaces = [Surface::Glass { ior: 1.5, tint: Vec3::ONE }, Surface::Diffuse { albedo: Vec3::ONE }];
-        let material =
-            |surface| Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false, priority: 0 };
-        let triangle = |(positions, material): &([Vec3; 3], u32)| Triangle {
-            positions: *positions,
-            normals: [Vec3::Y; 3],
-            material: *material,
-        };
+        let material = |surface| Material::new("", surface);
+        let triangle = |(positions, material): &([Vec3; 3], u32)| Triangle::new(*positions, [Vec3::Y; 3], *material);
         let sphere =
             |(radius, material): &(f32, u32)| Sphere { center: Vec3::ONE, radius: *radius, material: *material };
         let scene = Scene {

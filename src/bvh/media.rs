@@ -190,13 +190,7 @@ mod tests {
     use crate::scene::{Material, Sphere, Surface, Triangle};
 
     fn scene(surfaces: usize) -> Scene {
-        let material = |i: usize| Material {
-            name: String::new(),
-            surface: Surface::Glass { ior: 1.0 + i as f32, tint: Vec3::ONE },
-            emission: Vec3::ZERO,
-            double_sided: false,
-            priority: 0,
-        };
+        let material = |i: usize| Material::new("", Surface::Glass { ior: 1.0 + i as f32, tint: Vec3::ONE });
         Scene { materials: (0..surfaces).map(material).collect(), ..Scene::default() }
     }
 
@@ -212,7 +206,7 @@ mod tests {
             let (axis, side) = (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 });
             let at = |u, v| corner(u, v * side, axis, side);
             for positions in [[at(-1., -1.), at(1., -1.), at(1., 1.)], [at(-1., -1.), at(1., 1.), at(-1., 1.)]] {
-                scene.triangles.push(Triangle { positions, normals: [Vec3::X; 3], material });
+                scene.triangles.push(Triangle::new(positions, [Vec3::X; 3], material));
             }
         }
     }

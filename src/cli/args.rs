@@ -46,6 +46,10 @@ pub enum Command {
 
         #[command(flatten)]
         loading: LoadingOptions,
+
+        /// Print JSON, for scripts
+        #[arg(long)]
+        json: bool,
     },
 }
 

@@ -4,7 +4,7 @@
 type Row = (&'static str, &'static str);
 
 /// Inputs that an error or a warning of the library can name.
-const FLAGS: [Row; 24] = [
+const FLAGS: [Row; 26] = [
     ("device", "--device"),
     ("estimate.cone_constant", "--cone-constant"),
     ("estimate.max_radius", "--max-radius"),
@@ -16,6 +16,8 @@ const FLAGS: [Row; 24] = [
     ("load.allow_outside", "--allow-outside"),
     ("load.ignore_required", "--ignore-required"),
     ("load.scene", "--scene"),
+    ("load.texture_size", "--texture-size"),
+    ("load.variant", "--variant"),
     ("photons.caustic", "--caustic-photons"),
     ("photons.final_gather", "--final-gather"),
     ("photons.global", "--photons"),

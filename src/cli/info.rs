@@ -9,11 +9,12 @@ use caustica::{
 
 use super::say::print;
 
-/// Prints the contents of a scene and how they are read.
-pub fn info(path: &Path, options: &LoadOptions) -> Result<()> {
+/// Prints the contents of a scene and how they are read, as text or as JSON.
+pub fn info(path: &Path, options: &LoadOptions, json: bool) -> Result<()> {
     let mut scene = Scene::load_with(path, options)?;
     scene.add_default_light();
-    let text = scene.describe().to_string();
+    let info = scene.describe();
+    let text = if json { serde_json::to_string_pretty(&info).expect("plain values") } else { info.to_string() };
     print(&format!("{}\n", text.trim_end()));
     Ok(())
 }

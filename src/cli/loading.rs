@@ -2,6 +2,8 @@
 
 use caustica::scene::LoadOptions;
 
+use super::values::whole;
+
 /// Which of the file's scenes is read, and what is allowed to it.
 #[derive(Debug, clap::Args)]
 pub struct LoadingOptions {
@@ -9,7 +11,15 @@ pub struct LoadingOptions {
     #[arg(id = "scene_of_file", long = "scene", value_name = "NAME|INDEX", help_heading = "Scene")]
     pub scene: Option<String>,
 
-    /// Read buffers from anywhere, not only from the scene's folder and below it
+    /// Variant of the file's materials, by name [default: none]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
+    pub variant: Option<String>,
+
+    /// Longest side of a texture's image: larger images are halved until they fit
+    #[arg(long, value_name = "N", value_parser = whole(LoadOptions::TEXTURE_SIZE), help_heading = "Scene")]
+    pub texture_size: Option<u32>,
+
+    /// Read buffers and images from anywhere, not only from the scene's folder and below it
     #[arg(long, help_heading = "Scene")]
     pub allow_outside: bool,
 
@@ -24,6 +34,8 @@ impl LoadingOptions {
     pub fn options(&self) -> LoadOptions {
         LoadOptions {
             scene: self.scene.clone(),
+            variant: self.variant.clone(),
+            texture_size: self.texture_size,
             allow_outside: self.allow_outside,
             ignore_required: self.ignore_required.clone(),
         }

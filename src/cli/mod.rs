@@ -53,6 +53,6 @@ fn work(command: Command) -> Result<()> {
         Command::Compare(args) => compare::run(&args),
         Command::Study(args) => study::run(&args),
         Command::Devices => devices::devices(),
-        Command::Info { scene, loading } => info::info(&scene, &loading.options()),
+        Command::Info { scene, loading, json } => info::info(&scene, &loading.options(), json),
     }
 }

@@ -92,7 +92,8 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
     let settings = options.settings();
     if args.preset == Some(PresetArg::Report) {
         if options.loading.options() != LoadOptions::default() {
-            let problem = "has scenes of its own, which --scene, --allow-outside and --ignore-required do not change";
+            let problem = "has scenes of its own, which --scene, --variant, --texture-size, --allow-outside and \
+                           --ignore-required do not change";
             return Err(Error::Setting { name: "--preset", value: "report".to_owned(), problem: problem.to_owned() });
         }
         let folder = args.scene.clone().unwrap_or_else(|| PathBuf::from(SCENES));

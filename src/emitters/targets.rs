@@ -85,7 +85,7 @@ pub fn scene_target(scene: &Scene) -> Target {
 /// smaller than that of the whole cluster.
 #[must_use]
 pub fn specular_targets(scene: &Scene) -> Vec<Target> {
-    let specular = items(scene, |material| scene.materials[material as usize].surface.is_specular());
+    let specular = items(scene, |material| scene.materials[material as usize].casts_caustics());
     if specular.is_empty() {
         return Vec::new();
     }
@@ -148,8 +148,7 @@ mod tests {
 
     fn scene(centers: &[Vec3], radius: f32) -> Scene {
         let surface = Surface::Mirror { tint: Vec3::ONE };
-        let material =
-            Material { name: String::new(), surface, emission: Vec3::ZERO, double_sided: false, priority: 0 };
+        let material = Material::new("", surface);
         let spheres = centers.iter().map(|&center| Sphere { center, radius, material: 0 }).collect();
         Scene { materials: vec![material], spheres, ..Scene::default() }
     }

@@ -102,6 +102,12 @@ impl Gpu {
         u64::from(TABLE_COLUMNS.min(side)) * u64::from(side)
     }
 
+    /// Maximum number of texels of a [`super::Table`] with layers.
+    #[must_use]
+    pub fn max_layered_texels(&self) -> u64 {
+        u64::from(TABLE_COLUMNS).pow(2) * u64::from(self.limits.max_texture_array_layers)
+    }
+
     /// A zeroed storage buffer of `count` elements of `T` (at least one: a binding cannot be
     /// empty), which can be copied from and to and hold indirect arguments.
     ///

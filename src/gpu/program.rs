@@ -85,15 +85,17 @@ fn group_layout(device: &wgpu::Device, shader: &Shader, group: u32) -> Option<wg
 
 fn layout_entry(binding: u32, kind: BindingKind) -> wgpu::BindGroupLayoutEntry {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let texture = |view_dimension| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Uint,
+        view_dimension,
+        multisampled: false,
+    };
     let ty = match kind {
         BindingKind::Uniform => buffer(wgpu::BufferBindingType::Uniform),
         BindingKind::ReadOnly => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
         BindingKind::ReadWrite => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-        BindingKind::Table => wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Uint,
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        },
+        BindingKind::Table => texture(wgpu::TextureViewDimension::D2),
+        BindingKind::LayeredTable => texture(wgpu::TextureViewDimension::D2Array),
     };
     wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
 }

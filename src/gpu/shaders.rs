@@ -11,6 +11,8 @@ pub enum BindingKind {
     ReadWrite,
     /// A texture that is read texel by texel.
     Table,
+    /// The same with layers.
+    LayeredTable,
 }
 
 /// One buffer or table that a kernel uses.
@@ -62,7 +64,7 @@ pub fn needs() -> wgpu::Limits {
         max_bind_groups: most(&groups),
         max_storage_buffers_per_shader_stage: most(&|s| s.bound(&[BindingKind::ReadOnly, BindingKind::ReadWrite])),
         max_uniform_buffers_per_shader_stage: most(&|s| s.bound(&[BindingKind::Uniform])),
-        max_sampled_textures_per_shader_stage: most(&|s| s.bound(&[BindingKind::Table])),
+        max_sampled_textures_per_shader_stage: most(&|s| s.bound(&[BindingKind::Table, BindingKind::LayeredTable])),
         max_compute_invocations_per_workgroup: most(&|s| s.workgroup_size),
         ..wgpu::Limits::default()
     }
@@ -87,7 +89,7 @@ mod tests {
             let counts = [
                 ("storage buffers", s.bound(&[BindingKind::ReadOnly, BindingKind::ReadWrite]), 10),
                 ("uniform buffers", s.bound(&[BindingKind::Uniform]), 4),
-                ("textures", s.bound(&[BindingKind::Table]), 16),
+                ("textures", s.bound(&[BindingKind::Table, BindingKind::LayeredTable]), 16),
                 ("invocations", s.workgroup_size, 256),
             ];
             let over = counts.into_iter().filter(|(_, has, most)| has > most);
@@ -108,7 +110,7 @@ mod tests {
         };
         assert_eq!(more(BindingKind::ReadOnly, 1), ["trace_camera: 11 storage buffers, at most 10"]);
         assert_eq!(more(BindingKind::Uniform, 2), ["trace_camera: 5 uniform buffers, at most 4"]);
-        assert_eq!(more(BindingKind::Table, 11), ["trace_camera: 17 textures, at most 16"]);
+        assert_eq!(more(BindingKind::Table, 8), ["trace_camera: 17 textures, at most 16"]);
         let large = Shader { workgroup_size: 512, ..most };
         assert_eq!(not_portable(&[large]), ["trace_camera: 512 invocations, at most 256"]);
     }

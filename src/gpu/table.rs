@@ -40,18 +40,7 @@ impl Table {
         assert_eq!(size_of::<T>() % texel, 0, "{label}: elements of a table fill texels");
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let texels = (bytes.len() / texel) as u64;
-        let max_texels = gpu.max_table_texels();
-        if texels > max_texels {
-            return Err(Error::Limit {
-                what: label.to_string(),
-                needed: texels,
-                unit: "texels",
-                limit: "maxImageDimension2D",
-                adapter: gpu.name.clone(),
-                allowed: max_texels,
-                advice: "ask for less or use another `device`".to_string(),
-            });
-        }
+        check(gpu, label, texels, gpu.max_table_texels(), "maxImageDimension2D")?;
         let columns = (texels as u32).clamp(1, TABLE_COLUMNS);
         let size = wgpu::Extent3d {
             width: columns,
@@ -59,20 +48,35 @@ impl Table {
             depth_or_array_layers: 1,
         };
         let allotted = u64::from(size.width) * u64::from(size.height) * texel as u64;
-        let texture = gpu.allot(label, allotted, || {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size,
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-                view_formats: &[],
-            })
-        })?;
-        write(gpu, &texture, bytes, columns, texel as u32);
+        let texture = gpu.allot(label, allotted, || create(gpu, label, size, format))?;
+        write(gpu, &texture, 0, bytes, columns, texel as u32);
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Ok(Self(Arc::new(Texture { view, bytes: allotted, memory: Arc::clone(&gpu.memory) })))
+    }
+
+    /// A table of one texel a word with layers of `TABLE_COLUMNS` rows: it holds more than one
+    /// texture.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn layered(gpu: &Gpu, label: &str, data: &[u32]) -> Result<Self> {
+        let layer = TABLE_COLUMNS as usize * TABLE_COLUMNS as usize;
+        check(gpu, label, data.len() as u64, gpu.max_layered_texels(), "maxImageArrayLayers")?;
+        let columns = if data.is_empty() { 1 } else { TABLE_COLUMNS };
+        let size = wgpu::Extent3d {
+            width: columns,
+            height: (data.len() as u32).div_ceil(columns).clamp(1, TABLE_COLUMNS),
+            depth_or_array_layers: data.len().div_ceil(layer).max(1) as u32,
+        };
+        let allotted = 4 * u64::from(columns) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
+        let texture = gpu.allot(label, allotted, || create(gpu, label, size, wgpu::TextureFormat::R32Uint))?;
+        for (z, data) in data.chunks(layer).enumerate() {
+            write(gpu, &texture, z as u32, bytemuck::cast_slice(data), columns, 4);
+        }
+        let view = texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
         Ok(Self(Arc::new(Texture { view, bytes: allotted, memory: Arc::clone(&gpu.memory) })))
     }
 
@@ -81,8 +85,36 @@ impl Table {
     }
 }
 
-/// Writes the full rows, then the rest of the data to the last row.
-fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8], columns: u32, texel: u32) {
+fn check(gpu: &Gpu, label: &str, texels: u64, max_texels: u64, limit: &'static str) -> Result<()> {
+    if texels <= max_texels {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        what: label.to_string(),
+        needed: texels,
+        unit: "texels",
+        limit,
+        adapter: gpu.name.clone(),
+        allowed: max_texels,
+        advice: "ask for less or use another `device`".to_string(),
+    })
+}
+
+fn create(gpu: &Gpu, label: &str, size: wgpu::Extent3d, format: wgpu::TextureFormat) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size,
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    })
+}
+
+/// Writes the full rows of a layer, then the rest of the data to the last row.
+fn write(gpu: &Gpu, texture: &wgpu::Texture, z: u32, bytes: &[u8], columns: u32, texel: u32) {
     let row = (columns * texel) as usize;
     let (whole, rest) = bytes.split_at(bytes.len() / row * row);
     let rows = (whole.len() / row) as u32;
@@ -90,7 +122,7 @@ fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8], columns: u32, texel: 
         if data.is_empty() {
             continue;
         }
-        let target = wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x: 0, y, z: 0 }, ..texture.as_image_copy() };
+        let target = wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x: 0, y, z }, ..texture.as_image_copy() };
         let layout =
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(width * texel), rows_per_image: None };
         gpu.queue.write_texture(target, data, layout, wgpu::Extent3d { width, height, depth_or_array_layers: 1 });

@@ -22,4 +22,4 @@ pub use film::Film;
 pub use frame::{DataWindow, Frame};
 pub use png::{encode_png, write_png};
 pub(crate) use radiance::{decode_radiance, read_radiance_bytes};
-pub use tonemap::{Tonemap, srgb_encode};
+pub use tonemap::{Tonemap, srgb_decode, srgb_encode};

@@ -76,6 +76,12 @@ fn aces(color: [f32; 3]) -> [f32; 3] {
     times(&ACES_OUTPUT, times(&ACES_INPUT, color).map(fit))
 }
 
+/// Linear value of one encoded by the sRGB transfer function, 0 to 1 (IEC 61966-2-1).
+#[must_use]
+pub fn srgb_decode(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
 /// sRGB transfer function (IEC 61966-2-1): linear [0, 1] to encoded [0, 1].
 #[must_use]
 pub fn srgb_encode(linear: f32) -> f32 {

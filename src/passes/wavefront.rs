@@ -18,8 +18,8 @@ pub struct Wavefront {
     advance: Kernel,
     /// [`Path`] per slot.
     pub paths: Buffer,
-    /// Slots of living paths. A step reads one queue and fills the other.
-    queues: [Buffer; 2],
+    /// Slots of living paths, two queues in one buffer. A step reads one and fills the other.
+    queues: Buffer,
     /// One [`Counters`], cleared by each run.
     pub counters: Buffer,
     dispatch_arguments: Buffer,
@@ -38,19 +38,18 @@ impl Wavefront {
     /// # Errors
     /// Limits of the adapter.
     pub fn new(gpu: &Gpu, name: &str, slots: u64) -> Result<Self> {
-        let queue = || gpu.storage::<u32>(&format!("{name} queue"), slots);
         Ok(Self {
             advance: Kernel::new(gpu, "advance_queue", &[]),
             paths: gpu.storage::<Path>(&format!("{name} paths"), slots)?,
-            queues: [queue()?, queue()?],
+            queues: gpu.storage::<u32>(&format!("{name} queues"), 2 * slots)?,
             counters: gpu.storage::<Counters>(&format!("{name} counters"), 1)?,
             dispatch_arguments: gpu.storage::<[u32; 3]>(&format!("{name} dispatch arguments"), 1)?,
         })
     }
 
-    /// Starts paths by `start` in that many invocations, then moves them on by `step` until none is
-    /// left or each has met the second number of surfaces; few are expected to meet more than the
-    /// first. At most `most_paths` live at once.
+    /// Starts paths by `start` in that many invocations, then moves them on by `steps`, one after
+    /// the other over the same paths, until none is left or each has met the second number of
+    /// surfaces; few are expected to meet more than the first. At most `most_paths` live at once.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -59,23 +58,24 @@ impl Wavefront {
         gpu: &Gpu,
         scene: &SceneBuffers,
         (start, invocations): (&Step, u64),
-        step: &Step,
+        steps: &[Step],
         most_paths: u64,
         (expected_surfaces, most_surfaces): (u32, u32),
     ) -> Result<Counters> {
-        let bind = |bound: &Step, input: usize| bound.kernel.bind(gpu, &self.bindings(scene, bound.buffers, input));
-        let advance = self.advance.bind(gpu, &self.bindings(scene, &[], 0));
-        let steps = [0, 1].map(|input| bind(step, input));
+        let bind = |bound: &Step| bound.kernel.bind(gpu, &self.bindings(scene, bound.buffers));
+        let advance = self.advance.bind(gpu, &self.bindings(scene, &[]));
+        let bound: Vec<_> = steps.iter().map(|step| (step.kernel, bind(step))).collect();
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
-        start.kernel.dispatch(&mut encoder, &bind(start, 1), invocations);
+        start.kernel.dispatch(&mut encoder, &bind(start), invocations);
         let mut surfaces = 0;
         loop {
             let until = if surfaces < expected_surfaces { expected_surfaces } else { most_surfaces };
             for _ in 0..SURFACES_PER_SUBMISSION.min(until - surfaces) {
                 self.advance.dispatch(&mut encoder, &advance, 1);
-                let bindings = &steps[(surfaces % 2) as usize];
-                step.kernel.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most_paths);
+                for (kernel, bindings) in &bound {
+                    kernel.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most_paths);
+                }
                 surfaces += 1;
             }
             gpu.submit(encoder);
@@ -87,17 +87,11 @@ impl Wavefront {
         }
     }
 
-    /// Buffers by name; the queue with the index `input` is read.
-    fn bindings<'a>(
-        &'a self,
-        scene: &'a SceneBuffers,
-        others: &[(&'a str, &'a Buffer)],
-        input: usize,
-    ) -> Vec<(&'a str, &'a Buffer)> {
+    /// Buffers by name.
+    fn bindings<'a>(&'a self, scene: &'a SceneBuffers, others: &[(&'a str, &'a Buffer)]) -> Vec<(&'a str, &'a Buffer)> {
         let own = [
             ("paths", &self.paths),
-            ("queue_in", &self.queues[input]),
-            ("queue_out", &self.queues[1 - input]),
+            ("queues", &self.queues),
             ("counters", &self.counters),
             ("dispatch_arguments", &self.dispatch_arguments),
         ];

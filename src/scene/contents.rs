@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
 
-use super::{Bounds, Camera, Environment, Light, Material, Sphere, Triangle};
+use super::{Attributes, Bounds, Camera, Environment, Image, Light, Material, Sphere, Surface, Triangle};
 use crate::{
     Error, Result,
     image::{EnvironmentProvenance, Provenance},
@@ -21,12 +21,18 @@ pub struct Scene {
     pub file_name: String,
     /// Files that the file refers to: buffers and images, read or not.
     pub files: Vec<PathBuf>,
-    /// SHA-256 of the bytes of the file and its buffers, in hexadecimal.
+    /// Variants of the materials that the file names.
+    pub variants: Vec<String>,
+    /// SHA-256 of the bytes of the file, its buffers and the images in use, in hexadecimal.
     pub hash: String,
     /// Offset subtracted from all world coordinates of the file: the centre of its geometry.
     pub center: DVec3,
     /// Triangles of all meshes.
     pub triangles: Vec<Triangle>,
+    /// What the corners of triangles with textures or colours carry.
+    pub attributes: Vec<Attributes>,
+    /// Images of the materials' textures.
+    pub images: Vec<Image>,
     /// Index of the solid of glass that each triangle bounds, `u32::MAX` for none; empty where no
     /// file says which triangles belong together.
     pub shells: Vec<u32>,
@@ -71,10 +77,16 @@ impl Scene {
         (center, corners.chain(balls).fold(0.0, f32::max))
     }
 
-    /// Whether a surface has a specular BSDF, so that there can be caustics.
+    /// Whether a surface is sharp enough for caustics.
     #[must_use]
     pub fn has_specular(&self) -> bool {
-        self.uses_material(|material| material.surface.is_specular())
+        self.uses_material(Material::casts_caustics)
+    }
+
+    /// Whether a surface has another lobe than a diffuse one.
+    #[must_use]
+    pub fn has_lobes(&self) -> bool {
+        self.uses_material(|m| !matches!(m.surface, Surface::Diffuse { .. }) || m.clearcoat > 0.0)
     }
 
     /// Whether a surface emits light.

@@ -4,7 +4,11 @@ use std::{f64::consts::PI, fmt};
 
 use serde::Serialize;
 
-use super::{LightKind, Projection, Scene, words::one_line};
+use super::{
+    LightKind, Projection, Scene,
+    describe_materials::{self, ImageInfo, MaterialInfo},
+    words::one_line,
+};
 
 /// Summary of a scene. Coordinates are those of the file: world space, metres. Angles are in
 /// radians.
@@ -30,6 +34,10 @@ pub struct SceneInfo {
     pub cameras: Vec<CameraInfo>,
     /// Materials.
     pub materials: Vec<MaterialInfo>,
+    /// Images of the materials' textures.
+    pub images: Vec<ImageInfo>,
+    /// Variants of the materials that the file names.
+    pub variants: Vec<String>,
     /// Features that are ignored or approximated.
     pub notes: Vec<String>,
 }
@@ -83,15 +91,6 @@ pub struct CameraInfo {
     pub aspect: Option<f32>,
 }
 
-/// A material.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MaterialInfo {
-    /// Name of the material.
-    pub name: String,
-    /// Surface type that the material is read as.
-    pub read_as: String,
-}
-
 impl Scene {
     /// Summarizes the scene.
     #[must_use]
@@ -123,9 +122,9 @@ impl Scene {
                     aspect: camera.aspect,
                 })
                 .collect(),
-            materials: (self.materials.iter())
-                .map(|material| MaterialInfo { name: material.name.clone(), read_as: material.surface.to_string() })
-                .collect(),
+            materials: self.materials.iter().map(|material| MaterialInfo::new(material, &self.images)).collect(),
+            images: describe_materials::images(self),
+            variants: self.variants.clone(),
             notes: self.warnings.clone(),
         }
     }
@@ -197,7 +196,17 @@ impl fmt::Display for SceneInfo {
             };
             format!("{}  at {}  {view}{aspect}", camera.name, triple(camera.position))
         })?;
-        section(f, "materials", self.materials.iter(), |material| format!("{}  {}", material.name, material.read_as))?;
+        writeln!(f, "  materials ({})", self.materials.len())?;
+        for (i, material) in self.materials.iter().enumerate() {
+            writeln!(f, "    {i}  {material}")?;
+            material.textures.iter().try_for_each(|texture| writeln!(f, "         {texture}"))?;
+        }
+        if !self.images.is_empty() {
+            section(f, "images", self.images.iter(), ToString::to_string)?;
+        }
+        if !self.variants.is_empty() {
+            section(f, "variants", self.variants.iter(), Clone::clone)?;
+        }
         section(f, "notes", self.notes.iter(), Clone::clone)
     }
 }

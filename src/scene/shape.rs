@@ -14,9 +14,19 @@ pub struct Triangle {
     pub normals: [Vec3; 3],
     /// Index into [`Scene::materials`](super::Scene::materials).
     pub material: u32,
+    /// Index into [`Scene::attributes`](super::Scene::attributes) plus one; 0 for none.
+    pub attributes: u32,
+    /// The second and the third corner were exchanged after the attributes were read.
+    pub is_turned: bool,
 }
 
 impl Triangle {
+    /// A triangle without attributes.
+    #[must_use]
+    pub fn new(positions: [Vec3; 3], normals: [Vec3; 3], material: u32) -> Self {
+        Self { positions, normals, material, attributes: 0, is_turned: false }
+    }
+
     /// Unit normal of the plane, towards the outside; zero for a degenerate triangle.
     #[must_use]
     pub fn geometric_normal(&self) -> Vec3 {

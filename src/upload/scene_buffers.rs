@@ -1,19 +1,20 @@
 //! Bind group 0: the scene on the device. Owner of `shaders/bindings/scene.wesl`.
 
 use bytemuck::Pod;
+use glam::Vec3;
 
-use super::light_buffers::LightBuffers;
+use super::{light_buffers::LightBuffers, material_buffers::MaterialBuffers};
 use crate::{
     bvh::{Bvh, MediaProbe, contacts},
-    emitters::light_table::{LightTable, emission_in},
-    error::{Error, Result},
+    emitters::light_table::LightTable,
+    error::Result,
     gpu::{
         Buffer, Gpu, Kernel, Table,
         shaders::{Shader, shader},
     },
-    layout::{self, CONTACT_BIT, MATERIAL_MASK, Primitive, SLOT_SHIFT, SPECULAR_BIT, SPHERE_BIT},
-    scene::{Material, Medium, Scene, Solids, Surface},
-    settings::{LightSettings, LightUnit, Sampler},
+    layout::{self, ALPHA_BIT, CONTACT_BIT, Primitive, SLOT_SHIFT, SPECULAR_BIT, SPHERE_BIT},
+    scene::{Alpha, Medium, Scene, Solids},
+    settings::{LightSettings, Sampler},
 };
 
 /// The scene's buffers.
@@ -22,17 +23,20 @@ pub struct SceneBuffers {
     nodes: Buffer,
     primitives: Windows,
     normals: Table,
-    materials: Table,
+    pub materials: MaterialBuffers,
     media: Table,
     has_spheres: bool,
     /// Maximum number of deferred children in a traversal.
     stack: usize,
     /// Surfaces lie in each other.
     has_contacts: bool,
-    /// Some surface scatters specularly.
-    pub has_specular: bool,
-    /// Some surface both reflects and transmits.
-    pub has_dielectrics: bool,
+    /// Some solid absorbs light.
+    has_absorption: bool,
+    /// Some surface has another lobe than a diffuse one.
+    pub has_lobes: bool,
+    /// Some surface sends light on in two ways: it reflects and transmits, or has a coat above its
+    /// diffuse base.
+    pub splits: bool,
     pub lights: LightBuffers,
     /// Which surfaces bound which solids.
     pub solids: Solids,
@@ -65,12 +69,12 @@ impl SceneBuffers {
     /// materials or media a table; as [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         let solids = Solids::new(scene);
-        if scene.materials.len() > MATERIAL_MASK as usize {
-            let problem = format!("{} materials in use; at most {MATERIAL_MASK}", scene.materials.len());
-            return Err(Error::Scene { path: scene.path.clone(), place: "materials".to_owned(), problem });
-        }
-        let materials: Vec<_> = scene.materials.iter().map(|m| material(m, settings.unit)).collect();
-        let row = |m: &Medium| layout::Medium { tint: m.tint.to_array(), ior: m.ior };
+        let row = |m: &Medium| layout::Medium {
+            tint: m.tint.to_array(),
+            ior: m.ior,
+            absorption: m.absorption.to_array(),
+            pad: 0,
+        };
         let media: Vec<_> = solids.media.iter().map(row).collect();
         let lights = LightBuffers::new(gpu, scene, &MediaProbe::new(scene, bvh, &solids), settings)?;
         let contacts = contacts(scene, bvh);
@@ -82,11 +86,12 @@ impl SceneBuffers {
                 &marked(&bvh.primitives, scene, &solids, &contacts, &lights.table),
             )?,
             normals: Table::new(gpu, "normals", &bvh.normals)?,
-            materials: Table::new(gpu, "materials", &materials)?,
+            materials: MaterialBuffers::new(gpu, scene, settings.unit)?,
+            has_absorption: solids.media.iter().any(|m| m.absorption != Vec3::ZERO),
             media: Table::new(gpu, "media", &media)?,
             has_contacts: contacts.contains(&true),
-            has_specular: scene.has_specular(),
-            has_dielectrics: scene.materials.iter().any(|m| m.surface.ior().is_some()),
+            has_lobes: scene.has_lobes(),
+            splits: scene.materials.iter().any(|m| m.surface.ior().is_some() || m.surface.is_coated()),
             has_spheres: !scene.spheres.is_empty(),
             // Rounded up to multiples of 16, so that few variants of a kernel are compiled.
             stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
@@ -115,14 +120,18 @@ impl SceneBuffers {
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
             ("HAS_CONTACTS", f64::from(u8::from(self.has_contacts))),
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
+            ("HAS_LAYERS", f64::from(u8::from(self.materials.has_layers))),
+            ("HAS_TEXTURES", f64::from(u8::from(self.materials.has_textures))),
+            ("HAS_ALPHA", f64::from(u8::from(self.materials.has_alpha))),
+            ("HAS_ABSORPTION", f64::from(u8::from(self.has_absorption))),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
             ("SPLIT", f64::from(u8::from(self.primitives.window > 0))),
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
         ];
         overrides.extend_from_slice(others);
         let [pixels, cells, rows] = self.lights.tables();
-        let own = [("normals", &self.normals), ("materials", &self.materials), ("media_table", &self.media)];
-        let tables = [&own[..], &[pixels, cells, rows]].concat();
+        let own = [("normals", &self.normals), ("media_table", &self.media), pixels, cells, rows];
+        let tables = [&own[..], &self.materials.tables()].concat();
         Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }
 
@@ -162,29 +171,13 @@ fn marked(
     lights: &LightTable,
 ) -> Vec<Primitive> {
     let is_specular: Vec<bool> = scene.materials.iter().map(|m| m.surface.is_specular()).collect();
+    let has_alpha: Vec<bool> = scene.materials.iter().map(|m| m.alpha != Alpha::Opaque).collect();
     let mark = |(p, contact): (&Primitive, &bool)| {
-        let specular = is_specular.get((p.material & !SPHERE_BIT) as usize) == Some(&true);
-        let bits = if specular { SPECULAR_BIT } else { 0 } | if *contact { CONTACT_BIT } else { 0 };
+        let of = |marks: &[bool]| marks.get((p.material & !SPHERE_BIT) as usize) == Some(&true);
+        let alpha = if of(&has_alpha) { ALPHA_BIT } else { 0 };
+        let bits = alpha | if of(&is_specular) { SPECULAR_BIT } else { 0 } | if *contact { CONTACT_BIT } else { 0 };
         let material = p.material | bits | (solids.slot(p.id) << SLOT_SHIFT);
         Primitive { emitter: lights.emitter(p.id), material, ..*p }
     };
     primitives.iter().zip(contacts).map(mark).collect()
-}
-
-/// Row of the material table.
-fn material(material: &Material, unit: LightUnit) -> layout::Material {
-    let surface = &material.surface;
-    layout::Material {
-        color: surface.color().to_array(),
-        kind: match surface {
-            Surface::Diffuse { .. } => layout::DIFFUSE,
-            Surface::Mirror { .. } => layout::MIRROR,
-            Surface::Glass { .. } => layout::GLASS,
-            Surface::Pane { .. } => layout::PANE,
-        },
-        emission: emission_in(material.emission, unit).to_array(),
-        ior: surface.ior().unwrap_or(1.0),
-        double_sided: u32::from(material.double_sided),
-        ..Default::default()
-    }
 }

@@ -80,7 +80,7 @@ fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampl
     let batch = batch.starting_at(first);
     let uniform = gpu.uniform("batch", &batch);
     let paths = gpu.storage::<layout::Path>("paths", u64::from(count)).expect("fits");
-    let queue = gpu.storage::<u32>("queue", u64::from(count)).expect("fits");
+    let queue = gpu.storage::<u32>("queues", 2 * u64::from(count)).expect("fits");
     let counts = gpu.storage::<u32>("counts", u64::from(count * layout::MAP_KINDS)).expect("fits");
     let counters = gpu.storage::<Counters>("counters", 1).expect("fits");
     let bindings = emit.bind(
@@ -89,7 +89,7 @@ fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampl
             ("batch", &uniform),
             ("choices", &buffers.lights.photons.buffer),
             ("paths", &paths),
-            ("queue_out", &queue),
+            ("queues", &queue),
             ("counts", &counts),
             ("counters", &counters),
         ]),

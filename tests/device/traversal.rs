@@ -39,7 +39,7 @@ fn shapes(triangles: usize, spheres: usize, size: f32, middle: Vec3) -> Scene {
     for _ in 0..triangles {
         let at = middle + random.point();
         let positions = [at, at + random.point() * size, at + random.point() * size];
-        scene.triangles.push(Triangle { positions, normals: [Vec3::X; 3], material: 0 });
+        scene.triangles.push(Triangle::new(positions, [Vec3::X; 3], 0));
     }
     for _ in 0..spheres {
         let sphere = Sphere { center: middle + random.point(), radius: (random.next() + 0.1) * size, material: 0 };

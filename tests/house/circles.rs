@@ -235,7 +235,10 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "accessor",
             "draco", //
             // What it holds.
+            "textures",
+            "images",
             "materials",
+            "variants",
             "nodes",
             "cameras",
             "lights",
@@ -243,6 +246,9 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "instances",
             "primitives",
             "skins",
+            "material_table",
+            "tangents",
+            "attributes",
             "meshes", //
             // The scene.
             "mesh_cache",

@@ -129,7 +129,7 @@ fn coarse_ball(smooth: bool) -> Scene {
             let normal = (positions[1] - positions[0]).cross(positions[2] - positions[0]);
             if normal.length() > 1e-6 {
                 let normals = if smooth { positions } else { [normal.normalize(); 3] };
-                scene.triangles.push(Triangle { positions, normals, material: 0 });
+                scene.triangles.push(Triangle::new(positions, normals, 0));
             }
         }
     }

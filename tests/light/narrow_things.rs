@@ -37,7 +37,7 @@ fn add_grid(scene: &mut Scene, (nu, nv): (u32, u32), at: impl Fn(f32, f32) -> (V
             let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
             for [p, q, r] in [[a, b, c], [a, c, d]] {
                 let (positions, normals) = ([p.0, q.0, r.0], [p.1, q.1, r.1]);
-                scene.triangles.push(Triangle { positions, normals, material: 0 });
+                scene.triangles.push(Triangle::new(positions, normals, 0));
             }
         }
     }

@@ -11,7 +11,10 @@ use crate::{
     bvh::Media,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{self, CameraTile, Counters, FirstHit, Gathered, MARGIN_CELL, MARGIN_SAMPLES, PixelSums, VisiblePoint},
+    layout::{
+        self, CameraTile, Counters, FirstHit, Gathered, LobeLight, LobePoint, MARGIN_CELL, MARGIN_SAMPLES, PixelSums,
+        VisiblePoint,
+    },
     passes::{
         estimate::SharedPoints,
         wavefront::{Step, Wavefront},
@@ -41,6 +44,8 @@ const MIN_TILE_PIXELS: u32 = 64;
 pub struct CameraKernels {
     start: Kernel,
     trace: Kernel,
+    /// Direct light at rough lobes; `None` if there are none, or the picture shows no emitters.
+    lobes: Option<Kernel>,
     direct: DirectLighting,
     resolve: Kernel,
 }
@@ -49,10 +54,13 @@ impl CameraKernels {
     #[must_use]
     pub fn new(gpu: &Gpu, scene: &SceneBuffers, photons: &PhotonSettings, light_samples: u32) -> Self {
         let sampler = sampler_constant(photons.sampler);
-        let sees_lights = ("SEES_LIGHTS", f64::from(u8::from(photons.mode.sees_lights())));
+        let shows = photons.mode.sees_lights();
+        let sees_lights = ("SEES_LIGHTS", f64::from(u8::from(shows)));
+        let lobes = (scene.materials.has_rough && shows).then(|| scene.kernel_with(gpu, "light_lobes", &[sampler]));
         Self {
             start: scene.kernel_with(gpu, "start_camera", &[sampler]),
             trace: scene.kernel_with(gpu, "trace_camera", &[sampler, sees_lights]),
+            lobes,
             direct: DirectLighting::new(gpu, scene, photons.sampler, light_samples),
             resolve: Kernel::new(gpu, "resolve", &[]),
         }
@@ -76,6 +84,8 @@ pub struct CameraTracer {
     /// Result of the last gather at each visible point, [`Gathered`].
     pub gathered: Buffer,
     first_hits: Buffer,
+    /// A [`LobePoint`] per path slot, if the scene has rough lobes.
+    lobe_points: Buffer,
     /// Sums over the samples of each pixel, [`LAYER_ROWS`] + 1 rows a pixel.
     pixel_rows: Buffer,
     filter_table: Buffer,
@@ -97,7 +107,7 @@ impl CameraTracer {
         picture: &PictureSettings,
         shares: bool,
     ) -> Result<Self> {
-        let branches = if scene.has_dielectrics { BRANCHES } else { 1 };
+        let branches = if scene.splits { BRANCHES } else { 1 };
         let offsets = picture.pixel_filter_offsets();
         let view = CameraTile {
             branches,
@@ -115,6 +125,7 @@ impl CameraTracer {
             radiance: gpu.storage::<[f32; 4]>("radiance", places)?,
             gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
             first_hits: gpu.storage::<FirstHit>("first hits", samples)?,
+            lobe_points: gpu.storage::<LobePoint>("lit lobes", if scene.materials.has_rough { places } else { 1 })?,
             pixel_rows: gpu.storage::<PixelSums>("sums of pixels", TILE_POINTS / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
             view: CameraTile { margin, ..view },
@@ -196,7 +207,7 @@ impl CameraTracer {
         let own = [("tile", &uniform), ("points", &self.points), ("filter_table", &self.filter_table)];
         let start = Step { kernel: &self.kernels.start, buffers: &own };
         let trace = Step { kernel: &self.kernels.trace, buffers: &own };
-        self.follow(gpu, scene, (&start, tile.pixels * tile.samples + self.view.margin), &trace)
+        self.follow(gpu, scene, (&start, tile.pixels * tile.samples + self.view.margin), &trace, true)
     }
 
     /// Starts paths by `start` in that many invocations and traces them by `trace`. Both steps have
@@ -207,21 +218,31 @@ impl CameraTracer {
         scene: &SceneBuffers,
         (start, invocations): (&Step, u32),
         trace: &Step,
+        sees_lights: bool,
     ) -> Result<StepCount> {
         let most_paths = (u64::from(invocations) * u64::from(self.view.branches))
             .min(TILE_POINTS + u64::from(self.view.margin * self.view.branches));
-        let tile = [("first_hits", &self.first_hits), ("radiance", &self.radiance)];
+        let tile = [("first_hits", &self.first_hits), ("radiance", &self.radiance), ("lobe_points", &self.lobe_points)];
         let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
         let start = Step { kernel: start.kernel, buffers: &started };
+        let lighting = gpu.uniform(
+            "lights of lobes",
+            &LobeLight { light_count: scene.lights.table.lights.len() as u32, ..Default::default() },
+        );
+        let lit =
+            [trace.buffers, &tile, &[("lighting", &lighting), ("choices", &scene.lights.photons.buffer)]].concat();
         let trace = Step { kernel: trace.kernel, buffers: &followed };
+        let light = self.kernels.lobes.as_ref().filter(|_| sees_lights);
+        let light = light.map(|kernel| Step { kernel, buffers: &lit });
+        let steps: Vec<Step> = light.into_iter().chain([trace]).collect();
         // Without mirrors and glass, the first surface that the camera sees ends every path.
-        let surfaces = if scene.has_specular { layout::CHAIN_LIMIT } else { 1 };
+        let surfaces = if scene.has_lobes { layout::CHAIN_LIMIT } else { 1 };
         let most_surfaces = surfaces + if self.view.near_depth == UNCLIPPED { 0 } else { MAX_UNSEEN };
         let counters = self.wavefront.run(
             gpu,
             scene,
             (&start, invocations.into()),
-            &trace,
+            &steps,
             most_paths,
             (surfaces, most_surfaces),
         )?;

@@ -81,6 +81,6 @@ impl FinalGather {
         let started = [("tile", &camera), ("final_step", &step), ("points", &tracer.points), ("seen", &self.seen)];
         let followed = [("tile", &own), ("points", &self.seen)];
         let start = Step { kernel: &self.start, buffers: &started };
-        tracer.follow(gpu, scene, (&start, points), &Step { kernel: &self.trace, buffers: &followed })
+        tracer.follow(gpu, scene, (&start, points), &Step { kernel: &self.trace, buffers: &followed }, true)
     }
 }

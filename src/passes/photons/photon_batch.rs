@@ -76,7 +76,7 @@ impl PhotonKernels {
         let emit = Step { kernel: &self.emit, buffers: &own };
         let bounce = Step { kernel: &self.bounce, buffers: &own };
         let surfaces = (batch.max_surfaces, batch.max_surfaces);
-        let counters = buffers.wavefront.run(gpu, scene, (&emit, paths), &bounce, paths, surfaces)?;
+        let counters = buffers.wavefront.run(gpu, scene, (&emit, paths), &[bounce], paths, surfaces)?;
         Ok(BatchResult { counters, counts: gpu.read(&buffers.counts, 0, paths * u64::from(MAP_KINDS))? })
     }
 

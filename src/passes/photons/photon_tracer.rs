@@ -213,7 +213,7 @@ impl EmissionPlan<'_> {
             light_count: scene.lights.table.lights.len() as u32,
             strata: self.choices.strata,
             max_bounces: settings.bounce_limit(),
-            max_surfaces: match scene.has_specular {
+            max_surfaces: match scene.has_lobes {
                 true => MAX_BOUNCES.min(settings.bounce_limit() + layout::CHAIN_LIMIT),
                 false => settings.bounce_limit(),
             },

@@ -70,7 +70,7 @@ pub(super) fn slice<'b>(
 }
 
 /// Bytes of a data URI (RFC 2397), base64 or percent-encoded.
-fn decode_data_uri(uri: &str, place: &str) -> Read<Vec<u8>> {
+pub(super) fn decode_data_uri(uri: &str, place: &str) -> Read<Vec<u8>> {
     let place = format!("{place}.uri");
     let Some((header, data)) = uri.split_once(',') else {
         return fault(place, "data URI without a comma");

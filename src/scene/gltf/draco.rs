@@ -16,7 +16,7 @@ use super::format::{Format, MAX_ZEROS, Unpacked};
 const NAME: &str = "KHR_draco_mesh_compression";
 
 /// Prefixes of the names of attributes that are read.
-const READ: [&str; 4] = ["POSITION", "NORMAL", "JOINTS_", "WEIGHTS_"];
+const READ: [&str; 7] = ["POSITION", "NORMAL", "TANGENT", "TEXCOORD_", "COLOR_0", "JOINTS_", "WEIGHTS_"];
 
 /// Maximum size of a vertex's attributes, bytes; those of glTF take less than 200.
 const BYTES_PER_VERTEX: u64 = 1024;

@@ -11,22 +11,42 @@ pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
 /// Nodes that are not there, nor what is below them.
 pub(super) const NODE_VISIBILITY: &str = "KHR_node_visibility";
 
-/// Extensions that are read, or that do not affect what is read.
-const SUPPORTED: [&str; 14] = [
+/// Textures in KTX2.
+pub(super) const BASISU: &str = "KHR_texture_basisu";
+/// Textures in WebP.
+pub(super) const WEBP: &str = "EXT_texture_webp";
+/// Transforms of texture coordinates.
+pub(super) const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
+/// Sets of materials of which one is chosen.
+pub(super) const VARIANTS: &str = "KHR_materials_variants";
+
+/// Extensions that are read, or that do not affect what is read. Materials whose extension is read
+/// but not rendered have a note of their own.
+const SUPPORTED: [&str; 24] = [
     "EXT_mesh_gpu_instancing",
     MESHOPT,
+    WEBP,
     "KHR_draco_mesh_compression",
     "KHR_implicit_shapes",
     "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    VARIANTS,
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     NODE_VISIBILITY,
-    "KHR_texture_transform",
+    BASISU,
+    TEXTURE_TRANSFORM,
 ];
 
 /// Refuses required unsupported extensions by name, unless they are among the `ignored`, and notes

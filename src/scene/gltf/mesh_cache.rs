@@ -1,12 +1,16 @@
-//! Meshes shown by nodes: each is read once for all nodes with the same deformation.
+//! Meshes shown by nodes: each is read once for all nodes with the same deformation. First it is
+//! settled which meshes are shown, then what has which material, then they are read.
 
 use std::collections::{HashMap, hash_map::Entry::Vacant};
 
 use glam::DMat4;
+use gltf::json::mesh::Primitive;
 
 use super::accessor::Document;
+use super::attributes;
 use super::fault::{Notes, Read};
 use super::instances::{self, Instances};
+use super::material_table::{MaterialTable, Owner, Use};
 use super::memory;
 use super::meshes::{self, Deformation, MeshPrimitive};
 use super::nodes::PlacedNode;
@@ -47,6 +51,8 @@ impl MeshInstance<'_> {
 #[derive(Debug, Default)]
 pub(super) struct MeshCache<'d> {
     entries: Vec<Entry<'d>>,
+    keys: Vec<MeshKey>,
+    /// In the order of the keys.
     meshes: Vec<Vec<MeshPrimitive>>,
     poses: HashMap<usize, Vec<DMat4>>,
 }
@@ -60,23 +66,28 @@ struct Entry<'d> {
     skin: Option<usize>,
 }
 
+impl Entry<'_> {
+    /// Number of copies of the mesh.
+    fn copies(&self) -> usize {
+        self.instances.as_ref().map_or(1, |instances| instances.count)
+    }
+}
+
 /// Key of a mesh: its index, the node whose own weights it has, and the number of joints of its
 /// skin.
 type MeshKey = (usize, Option<usize>, Option<usize>);
 
 impl<'d> MeshCache<'d> {
-    /// Reads the meshes of the nodes. Needs [`meshes::check`], whose `shapes` these are, and
-    /// [`skins::check`].
-    pub(super) fn read(
+    /// Which meshes the nodes show, none of them read yet. Needs [`meshes::check`], whose `shapes`
+    /// these are, and [`skins::check`].
+    pub(super) fn new(
         document: &'d Document<'_>,
         placed: &[PlacedNode],
         shapes: &[Vec<Option<Shape>>],
-        worlds: &[DMat4],
         notes: &mut Notes,
     ) -> Read<Self> {
         let mut cache = Self::default();
         let mut known: HashMap<MeshKey, usize> = HashMap::new();
-        let mut keys: Vec<MeshKey> = Vec::new();
         let mut triangles = 0_usize;
         for placed in placed {
             let node = &document.root.nodes[placed.node];
@@ -98,26 +109,74 @@ impl<'d> MeshCache<'d> {
             let joints = skin.map(|skin| document.root.skins[skin].joints.len());
             let key = (mesh, node.weights.as_ref().map(|_| placed.node), joints);
             let mesh = *known.entry(key).or_insert_with(|| {
-                keys.push(key);
-                keys.len() - 1
+                cache.keys.push(key);
+                cache.keys.len() - 1
             });
             cache.entries.push(Entry { placed: *placed, mesh, instances, skin });
         }
-        memory::check(triangles)?;
-        for (mesh, weighted, joints) in keys {
+        memory::check(triangles, 0)?;
+        Ok(cache)
+    }
+
+    /// The materials of the meshes.
+    pub(super) fn uses(&self, document: &Document<'_>, shapes: &[Vec<Option<Shape>>]) -> Vec<Use> {
+        let mut uses = Vec::new();
+        for &(mesh, ..) in &self.keys {
+            for (primitive, _) in shown(document, mesh, shapes) {
+                let material = primitive.material.map(|material| material.value());
+                uses.push(Use { owner: Owner::Mesh(mesh), material, sets: attributes::sets(primitive) });
+            }
+        }
+        uses
+    }
+
+    /// Refuses more triangles than there is memory for, once it is known which have attributes.
+    pub(super) fn check_memory(
+        &self,
+        document: &Document<'_>,
+        shapes: &[Vec<Option<Shape>>],
+        materials: &MaterialTable,
+    ) -> Read<()> {
+        let needs = |(primitive, _): &(&Primitive, Shape)| {
+            let slot =
+                materials.slot(primitive.material.map(|material| material.value()), &attributes::sets(primitive));
+            attributes::are_needed(primitive, slot)
+        };
+        let of_mesh: Vec<[usize; 2]> = (self.keys.iter())
+            .map(|(mesh, ..)| {
+                let all = shown(document, *mesh, shapes).map(|(_, shape)| shape.triangles).sum();
+                [all, shown(document, *mesh, shapes).filter(needs).map(|(_, shape)| shape.triangles).sum()]
+            })
+            .collect();
+        let of_entries =
+            self.entries.iter().map(|entry| of_mesh[entry.mesh].map(|count| count.saturating_mul(entry.copies())));
+        let [triangles, attributes] =
+            of_entries.fold([0_usize; 2], |[a, b], [c, d]| [a.saturating_add(c), b.saturating_add(d)]);
+        memory::check(triangles, attributes)
+    }
+
+    /// Reads the meshes.
+    pub(super) fn read(
+        &mut self,
+        document: &'d Document<'_>,
+        shapes: &[Vec<Option<Shape>>],
+        worlds: &[DMat4],
+        materials: &MaterialTable,
+    ) -> Read<()> {
+        for &(mesh, weighted, joints) in &self.keys {
             let weights = match weighted {
                 Some(node) => document.root.nodes[node].weights.as_deref(),
                 None => document.root.meshes[mesh].weights.as_deref(),
             };
             let deformation = Deformation { weights: weights.unwrap_or_default(), joints };
-            cache.meshes.push(meshes::read(document, mesh, &shapes[mesh], deformation)?);
+            self.meshes.push(meshes::read(document, mesh, &shapes[mesh], deformation, materials)?);
         }
-        for skin in cache.entries.iter().filter_map(|entry| entry.skin) {
-            if let Vacant(place) = cache.poses.entry(skin) {
+        for skin in self.entries.iter().filter_map(|entry| entry.skin) {
+            if let Vacant(place) = self.poses.entry(skin) {
                 place.insert(skins::pose(document, skin, worlds)?);
             }
         }
-        Ok(cache)
+        Ok(())
     }
 
     /// All mesh instances, in the order of the nodes.
@@ -131,4 +190,14 @@ impl<'d> MeshCache<'d> {
         });
         instances.collect()
     }
+}
+
+/// Primitives of a mesh that have triangles.
+fn shown<'r>(
+    document: &Document<'r>,
+    mesh: usize,
+    shapes: &[Vec<Option<Shape>>],
+) -> impl Iterator<Item = (&'r Primitive, Shape)> {
+    let primitives = document.root.meshes[mesh].primitives.iter();
+    primitives.zip(&shapes[mesh]).filter_map(|(primitive, shape)| Some((primitive, (*shape)?)))
 }

@@ -5,7 +5,9 @@ use gltf::json;
 use json::mesh::{Primitive, Semantic};
 
 use super::accessor::{Column, Document};
+use super::attributes::{self, Triangles, VertexAttributes};
 use super::fault::{Notes, Read, fault};
+use super::material_table::MaterialTable;
 use super::primitives::{Checker, Shape, attribute, joint_sets};
 use super::topology::corners;
 
@@ -21,8 +23,10 @@ pub(super) struct MeshPrimitive {
     /// Number of triangles in the file, including those left out because two of their corners
     /// coincide.
     pub(super) claimed: usize,
-    /// Valid index into the file's materials; `None` for the default material.
-    pub(super) material: Option<usize>,
+    /// Index into the scene's materials.
+    pub(super) material: u32,
+    /// What textures and colours need of each position.
+    pub(super) attributes: Option<VertexAttributes>,
     /// Joint influences per position; empty without a skin.
     pub(super) influences: Vec<Vec<Influence>>,
 }
@@ -79,6 +83,7 @@ pub(super) fn read(
     mesh: usize,
     shapes: &[Option<Shape>],
     deformation: Deformation<'_>,
+    materials: &MaterialTable,
 ) -> Read<Vec<MeshPrimitive>> {
     let mut primitives = Vec::new();
     for (j, (primitive, shape)) in document.root.meshes[mesh].primitives.iter().zip(shapes).enumerate() {
@@ -88,6 +93,7 @@ pub(super) fn read(
                 primitive,
                 *shape,
                 deformation,
+                materials,
                 &format!("meshes[{mesh}].primitives[{j}]"),
             )?);
         }
@@ -100,11 +106,12 @@ fn read_part(
     primitive: &Primitive,
     shape: Shape,
     deformation: Deformation<'_>,
+    materials: &MaterialTable,
     place: &str,
 ) -> Read<MeshPrimitive> {
     let column = |accessor: Option<usize>| accessor.map(|accessor| document.column(accessor, place)).transpose();
-    let material = primitive.material.map(|material| material.value());
-    let nothing = MeshPrimitive { claimed: shape.triangles, material, ..MeshPrimitive::default() };
+    let slot = materials.slot(primitive.material.map(|material| material.value()), &attributes::sets(primitive));
+    let nothing = MeshPrimitive { claimed: shape.triangles, material: slot.index, ..MeshPrimitive::default() };
     let Some(positions) = column(attribute(primitive, Semantic::Positions))? else { return Ok(nothing) };
     let morphs = morphs(document, primitive, deformation.weights, place)?;
     let indices = column(primitive.indices.map(|indices| indices.value()))?;
@@ -132,6 +139,14 @@ fn read_part(
         let normal = |vertex: &u32| morphed(&normals, &morphs, *vertex, |morph| morph.normals.as_ref());
         vertices.used.iter().map(normal).collect()
     });
+    let triangles = Triangles {
+        vertices: &vertices.used,
+        positions: &part.positions,
+        normals: part.normals.as_deref(),
+        corners: &part.corners,
+        is_morphed: !morphs.is_empty(),
+    };
+    part.attributes = attributes::read(document, primitive, slot, triangles, place)?;
     if let Some(joints) = deformation.joints {
         part.influences = influences(document, primitive, &vertices.used, joints, place)?;
     }

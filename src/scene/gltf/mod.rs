@@ -17,6 +17,7 @@ use super::{
 use crate::{Error, Result};
 
 mod accessor;
+mod attributes;
 mod buffers;
 mod cameras;
 mod container;
@@ -26,8 +27,10 @@ mod extensions;
 mod fault;
 mod files;
 mod format;
+mod images;
 mod instances;
 mod lights;
+mod material_table;
 mod materials;
 mod memory;
 mod mesh_cache;
@@ -40,14 +43,18 @@ mod root;
 mod skins;
 mod spheres;
 mod strict_json;
+mod tangents;
+mod textures;
 mod topology;
+mod variants;
 
 use accessor::Document;
 use fault::{Notes, Read, fault};
 use files::Resources;
 use lights::PlacedLight;
-use mesh_cache::{MeshCache, MeshInstance};
-use placing::{TOO_FAR, WorldBounds};
+use material_table::{MaterialTable, Owner, Use, mesh_name};
+use mesh_cache::MeshCache;
+use placing::{Placed, TOO_FAR, WorldBounds};
 use spheres::PlacedSphere;
 
 /// Reads a file into a scene.
@@ -59,20 +66,31 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
 
 /// Reads the bytes of the file at `path`.
 pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene> {
+    options.texture_size.map_or(Ok(()), |size| LoadOptions::TEXTURE_SIZE.check("load.texture_size", size))?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let file_name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
     let mut notes = Notes::default();
     let root = parse(bytes, options, &mut notes);
-    let (root, bin) = root.map_err(|fault| fault.of(path))?;
+    let (mut root, bin) = root.map_err(|fault| fault.of(path))?;
     let chosen = nodes::choose_scene(&root, options.scene.as_deref(), &file_name)?;
+    let variants = variants::names(&root).map_err(|fault| fault.of(path))?;
+    let variant = variants::choose(&variants, options.variant.as_deref(), &file_name)?;
+    variants::apply(&mut root, variants.len(), variant).map_err(|fault| fault.of(path))?;
     let mut hash = Sha256::new();
     hash.update(bytes);
     if options.scene.is_some() {
         hash.update(format!("scene {chosen}"));
     }
+    if let Some(variant) = variant {
+        hash.update(format!("variant {variant}"));
+    }
+    if let Some(size) = options.texture_size {
+        hash.update(format!("texture size {size}"));
+    }
     let resources = Resources { bin, folder, allow_outside: options.allow_outside };
-    let scene = assemble(&root, chosen, &resources, hash, notes).map_err(|fault| fault.of(path))?;
-    Ok(Scene { path: path.to_owned(), file_name, files: resources.named(&root), ..scene })
+    let scene =
+        assemble(&root, chosen, &resources, options.texture_size, hash, notes).map_err(|fault| fault.of(path))?;
+    Ok(Scene { path: path.to_owned(), file_name, files: resources.named(&root), variants, ..scene })
 }
 
 /// The JSON part, with its graph of nodes checked, and the binary chunk.
@@ -80,6 +98,7 @@ fn parse<'a>(bytes: &'a [u8], options: &LoadOptions, notes: &mut Notes) -> Read<
     let (text, bin) = container::split(bytes)?;
     let root = root::read(text, &options.ignore_required, notes)?;
     nodes::check(&root)?;
+    textures::check(&root)?;
     Ok((root, bin))
 }
 
@@ -88,6 +107,7 @@ fn assemble(
     root: &json::Root,
     chosen: usize,
     resources: &Resources<'_>,
+    texture_size: Option<u32>,
     mut hash: Sha256,
     mut notes: Notes,
 ) -> Read<Scene> {
@@ -98,9 +118,13 @@ fn assemble(
 
     let worlds = nodes::worlds(root)?;
     let placed = nodes::flatten(root, chosen, &worlds, &mut notes)?;
-    let cache = MeshCache::read(&document, &placed.shown, &shapes, &worlds, &mut notes)?;
-    let instances = cache.instances();
+    let mut cache = MeshCache::new(&document, &placed.shown, &shapes, &mut notes)?;
     let contents = NodeContents::read(root, &placed, &mut notes)?;
+    let uses = [cache.uses(&document, &shapes), contents.uses()].concat();
+    let materials = MaterialTable::read(root, &uses, &mut notes)?;
+    cache.check_memory(&document, &shapes, &materials)?;
+    cache.read(&document, &shapes, &worlds, &materials)?;
+    let instances = cache.instances();
     let mut bounds = WorldBounds::EMPTY;
     placing::measure(&instances, &mut bounds)?;
     contents.spheres.iter().for_each(|sphere| bounds.add(sphere.center, sphere.radius));
@@ -117,15 +141,20 @@ fn assemble(
     }
 
     let mut scene = Scene { center, mesh_count: root.meshes.len(), ..Scene::default() };
-    let slots = read_materials(root, &instances, &contents.spheres, &mut scene, &mut notes)?;
-    let slot = |material: Option<usize>| slots[material.unwrap_or(root.materials.len())];
-    let (mut triangles, placed_meshes) = placing::place(&instances, center, slot, &mut notes)?;
-    let ranges: Vec<MeshRange> = placed_meshes.into_iter().map(|placed| mesh_range(root, placed)).collect();
+    let Placed { mut triangles, attributes, meshes } = placing::place(&instances, center, &mut notes)?;
+    drop(instances);
+    scene.images = materials.images.read(&document, resources, texture_size, &mut hash, &mut notes)?;
+    let slot = |material: Option<usize>| materials.slot(material, &[]).index;
+    scene.spheres = contents.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
+    scene.names_dark_light = materials.names_dark_light;
+    scene.materials = materials.materials;
+    let ranges: Vec<MeshRange> = meshes.into_iter().map(|placed| mesh_range(root, placed)).collect();
     let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges);
     warnings.into_iter().for_each(|warning| notes.add(warning));
-    (scene.triangles, scene.shells) = (triangles, shells);
+    (scene.triangles, scene.attributes, scene.shells) = (triangles, attributes, shells);
     doubled_lamps::remove(&mut scene, &mut notes);
-    scene.spheres = contents.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
+    placing::turn_tangents(&scene.triangles, &mut scene.attributes);
+    placing::keep_attributes_in_use(&mut scene.triangles, &mut scene.attributes);
     contents.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     scene.warnings = notes.into_lines();
@@ -135,39 +164,7 @@ fn assemble(
 /// A copy of a mesh with its name in messages.
 fn mesh_range(root: &json::Root, (triangles, node): placing::PlacedMesh) -> MeshRange {
     let mesh = root.nodes[node].mesh.map_or(0, |mesh| mesh.value());
-    let name = match root.meshes.get(mesh).and_then(|mesh| mesh.name.as_deref()) {
-        Some(name) if !name.is_empty() => format!("mesh {name:?}"),
-        _ => format!("meshes[{mesh}]"),
-    };
-    MeshRange { triangles, name }
-}
-
-/// Reads the materials in use. Returns the index in the scene for each of the file's materials,
-/// followed by that of the default material.
-fn read_materials(
-    root: &json::Root,
-    instances: &[MeshInstance<'_>],
-    spheres: &[PlacedSphere],
-    scene: &mut Scene,
-    notes: &mut Notes,
-) -> Read<Vec<u32>> {
-    let default = root.materials.len();
-    let mut used = vec![false; default + 1];
-    let of_meshes = instances.iter().flat_map(|instance| instance.primitives).map(|primitive| primitive.material);
-    of_meshes.chain(spheres.iter().map(|sphere| sphere.material)).for_each(|i| used[i.unwrap_or(default)] = true);
-    let mut slots = vec![0; default + 1];
-    for (i, _) in used.iter().enumerate().filter(|(_, used)| **used) {
-        slots[i] = scene.materials.len() as u32;
-        if i == default {
-            scene.materials.push(materials::default_material(notes)?);
-            continue;
-        }
-        let material = materials::read(root, i, notes)?;
-        let emits = root.materials[i].emissive_factor.0 != [0.0; 3];
-        scene.names_dark_light |= emits && material.emission == Vec3::ZERO;
-        scene.materials.push(material);
-    }
-    Ok(slots)
+    MeshRange { triangles, name: mesh_name(root, mesh) }
 }
 
 /// Lights, cameras and spheres of the nodes, in world space.
@@ -195,6 +192,16 @@ impl NodeContents {
         }
         contents.cameras.sort_by_key(|(index, ..)| *index);
         Ok(contents)
+    }
+
+    /// The materials of the spheres.
+    fn uses(&self) -> Vec<Use> {
+        let of = |sphere: &PlacedSphere| Use {
+            owner: Owner::Sphere(sphere.node),
+            material: sphere.material,
+            sets: Vec::new(),
+        };
+        self.spheres.iter().map(of).collect()
     }
 
     /// Moves lights and cameras into the scene; without a camera, adds one that frames the scene.

@@ -2,12 +2,12 @@
 
 use std::{collections::HashMap, ops::Range};
 
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3, Vec4};
 
 use super::fault::{Notes, Read, fault};
 use super::mesh_cache::MeshInstance;
 use super::meshes::MeshPrimitive;
-use crate::scene::{Triangle, vertex_bits};
+use crate::scene::{Attributes, Triangle, vertex_bits};
 
 /// Maximum size of a scene, metres.
 pub(super) const MAX_EXTENT: f64 = 1e18;
@@ -67,147 +67,199 @@ pub(super) fn measure(instances: &[MeshInstance<'_>], bounds: &mut WorldBounds) 
 /// The triangles of a copy of a mesh, with the node that shows it.
 pub(super) type PlacedMesh = (Range<usize>, usize);
 
-/// All shown triangles relative to `center`, and which copies of meshes they are of. `material`
-/// maps the file's materials to the scene's.
-pub(super) fn place(
-    instances: &[MeshInstance<'_>],
-    center: DVec3,
-    material: impl Fn(Option<usize>) -> u32,
-    notes: &mut Notes,
-) -> Read<(Vec<Triangle>, Vec<PlacedMesh>)> {
-    let claimed: usize = instances
-        .iter()
-        .map(|instance| instance.copies() * total(instance.primitives, |primitive| primitive.claimed))
-        .sum();
-    let kept = instances
-        .iter()
-        .map(|instance| instance.copies() * total(instance.primitives, |primitive| primitive.corners.len()))
-        .sum();
-    let mut triangles = Vec::with_capacity(kept);
-    let mut meshes = Vec::new();
+/// Triangles relative to the scene's centre.
+#[derive(Debug, Default)]
+pub(super) struct Placed {
+    pub(super) triangles: Vec<Triangle>,
+    /// What the triangles refer to by index plus one.
+    pub(super) attributes: Vec<Attributes>,
+    /// Which copies of meshes the triangles are of, in their order.
+    pub(super) meshes: Vec<PlacedMesh>,
+}
+
+/// All shown triangles relative to `center`.
+pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut Notes) -> Read<Placed> {
+    let sum = |of: fn(&MeshPrimitive) -> usize| -> usize {
+        instances.iter().map(|instance| instance.copies() * total(instance.primitives, of)).sum()
+    };
+    let claimed = sum(|primitive| primitive.claimed);
+    let mut placed = Placed::default();
+    placed.triangles.reserve_exact(sum(|primitive| primitive.corners.len()));
+    placed.attributes.reserve_exact(sum(|p| if p.attributes.is_some() { p.corners.len() } else { 0 }));
     for instance in instances {
         for i in 0..instance.copies() {
             let to_scene = DMat4::from_translation(-center) * instance.world(i)?;
-            let first = triangles.len();
+            let first = placed.triangles.len();
             for primitive in instance.primitives {
-                let material = material(primitive.material);
                 if primitive.influences.is_empty() {
-                    place_rigid(primitive, to_scene, material, &mut triangles);
+                    place_rigid(primitive, to_scene, &mut placed);
                 } else {
-                    place_skinned(instance, primitive, center, material, &mut triangles);
+                    place_skinned(instance, primitive, center, &mut placed);
                 }
             }
-            meshes.push((first..triangles.len(), instance.node));
+            placed.meshes.push((first..placed.triangles.len(), instance.node));
         }
     }
-    let dropped = claimed - triangles.len();
+    let dropped = claimed - placed.triangles.len();
     if dropped > 0 {
         notes.add(format!("{dropped} of {claimed} triangles have no area and are not drawn"));
     }
-    Ok(without_copies(triangles, meshes, notes))
+    Ok(placed.without_copies(notes))
 }
 
-/// Leaves out meshes whose triangles all are those of an earlier one: the same lamp twice shines
-/// once, and no ray has to visit thousands of copies in one place.
-fn without_copies(
-    triangles: Vec<Triangle>,
-    meshes: Vec<PlacedMesh>,
-    notes: &mut Notes,
-) -> (Vec<Triangle>, Vec<PlacedMesh>) {
-    let corners = |triangle: &Triangle| triangle.positions.map(vertex_bits);
-    let mut known: HashMap<_, Vec<Range<usize>>> = HashMap::new();
-    let mut is_copy = |range: &Range<usize>| {
-        let own = &triangles[range.clone()];
-        let Some((first, last)) = own.first().zip(own.last()) else { return false };
-        let alike = known.entry((own.len(), corners(first), corners(last))).or_default();
-        let found = alike.iter().any(|other| triangles[other.clone()] == *own);
-        if !found {
-            alike.push(range.clone());
+impl Placed {
+    /// Leaves out meshes whose triangles all are those of an earlier one: the same lamp twice
+    /// shines once, and no ray has to visit thousands of copies in one place.
+    fn without_copies(self, notes: &mut Notes) -> Self {
+        let Self { triangles, attributes, meshes } = self;
+        let corners = |triangle: &Triangle| triangle.positions.map(vertex_bits);
+        // Each triangle has attributes of its own: equal ones have different indices.
+        let values = |triangle: &Triangle| {
+            let own = attributes.get((triangle.attributes as usize).wrapping_sub(1));
+            (Triangle { attributes: 0, ..*triangle }, own)
+        };
+        let alike = |a: &[Triangle], b: &[Triangle]| a.iter().map(values).eq(b.iter().map(values));
+        let mut known: HashMap<_, Vec<Range<usize>>> = HashMap::new();
+        let mut is_copy = |range: &Range<usize>| {
+            let own = &triangles[range.clone()];
+            let Some((first, last)) = own.first().zip(own.last()) else { return false };
+            let others = known.entry((own.len(), corners(first), corners(last))).or_default();
+            let found = others.iter().any(|other| alike(&triangles[other.clone()], own));
+            if !found {
+                others.push(range.clone());
+            }
+            found
+        };
+        let copies: Vec<bool> = meshes.iter().map(|(range, _)| is_copy(range)).collect();
+        let count = copies.iter().filter(|copy| **copy).count();
+        if count == 0 {
+            return Self { triangles, attributes, meshes };
         }
-        found
-    };
-    let copies: Vec<bool> = meshes.iter().map(|(range, _)| is_copy(range)).collect();
-    let count = copies.iter().filter(|copy| **copy).count();
-    if count == 0 {
-        return (triangles, meshes);
+        notes.add(format!("{count} copies of meshes lie exactly where others do and are not drawn"));
+        let (mut kept, mut ranges) = (Vec::new(), Vec::new());
+        for ((range, node), _) in meshes.into_iter().zip(copies).filter(|(_, copy)| !*copy) {
+            let first = kept.len();
+            kept.extend_from_slice(&triangles[range]);
+            ranges.push((first..kept.len(), node));
+        }
+        Self { triangles: kept, attributes, meshes: ranges }
     }
-    notes.add(format!("{count} copies of meshes lie exactly where others do and are not drawn"));
-    let (mut kept, mut ranges) = (Vec::new(), Vec::new());
-    for ((range, node), _) in meshes.into_iter().zip(copies).filter(|(_, copy)| !*copy) {
-        let first = kept.len();
-        kept.extend_from_slice(&triangles[range]);
-        ranges.push((first..kept.len(), node));
+}
+
+/// Lets normal maps of faces that were turned stand out to the other side: with the opposite
+/// normal, tangent and sign, the normal that the map gives is the opposite one.
+pub(super) fn turn_tangents(triangles: &[Triangle], attributes: &mut [Attributes]) {
+    for triangle in triangles.iter().filter(|triangle| triangle.is_turned && triangle.attributes > 0) {
+        let tangents = &mut attributes[triangle.attributes as usize - 1].tangents;
+        *tangents = tangents.map(|tangent| -tangent);
     }
-    (kept, ranges)
+}
+
+/// Leaves out the attributes of triangles that are no longer there.
+pub(super) fn keep_attributes_in_use(triangles: &mut [Triangle], attributes: &mut Vec<Attributes>) {
+    let used = triangles.iter().filter(|triangle| triangle.attributes > 0).count();
+    if used == attributes.len() {
+        return;
+    }
+    let mut kept = Vec::with_capacity(used);
+    for triangle in triangles.iter_mut().filter(|triangle| triangle.attributes > 0) {
+        kept.push(attributes[triangle.attributes as usize - 1]);
+        triangle.attributes = kept.len() as u32;
+    }
+    *attributes = kept;
 }
 
 fn total(primitives: &[MeshPrimitive], of: impl Fn(&MeshPrimitive) -> usize) -> usize {
     primitives.iter().map(of).sum()
 }
 
+/// How a vertex of a primitive moves to the scene.
+struct Move {
+    to_scene: DMat4,
+    to_normal: DMat3,
+    mirrored: bool,
+}
+
+impl Move {
+    fn new(to_scene: DMat4) -> Self {
+        let linear = DMat3::from_mat4(to_scene);
+        let mirrored = linear.determinant() < 0.0;
+        Self { to_scene, to_normal: cofactors(linear, mirrored), mirrored }
+    }
+
+    fn position(&self, position: Vec3) -> Vec3 {
+        self.to_scene.transform_point3(position.as_dvec3()).as_vec3()
+    }
+
+    fn normal(&self, normal: Vec3) -> Vec3 {
+        (self.to_normal * normal.as_dvec3()).normalize_or_zero().as_vec3()
+    }
+
+    /// Unit tangent at a unit normal. A mirrored bitangent is on the other side of both.
+    fn tangent(&self, tangent: Vec4, normal: Vec3) -> Vec4 {
+        let moved = self.to_scene.transform_vector3(tangent.truncate().as_dvec3()).normalize_or_zero().as_vec3();
+        let sign = if (tangent.w < 0.0) == self.mirrored { 1.0 } else { -1.0 };
+        let along = if moved == Vec3::ZERO { normal.any_orthonormal_vector() } else { moved };
+        along.extend(sign)
+    }
+}
+
 /// Triangles of one primitive with non-zero area.
-fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, material: u32, triangles: &mut Vec<Triangle>) {
-    let linear = DMat3::from_mat4(to_scene);
-    let mirrored = linear.determinant() < 0.0;
-    let to_normal = cofactors(linear, mirrored);
-    let positions: Vec<Vec3> =
-        primitive.positions.iter().map(|position| to_scene.transform_point3(position.as_dvec3()).as_vec3()).collect();
-    let normals: Option<Vec<Vec3>> = primitive.normals.as_ref().map(|normals| {
-        normals.iter().map(|normal| (to_normal * normal.as_dvec3()).normalize_or_zero().as_vec3()).collect()
-    });
+fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, placed: &mut Placed) {
+    let all = Move::new(to_scene);
+    let positions: Vec<Vec3> = primitive.positions.iter().map(|position| all.position(*position)).collect();
+    let normals: Option<Vec<Vec3>> =
+        primitive.normals.as_ref().map(|normals| normals.iter().map(|normal| all.normal(*normal)).collect());
     let of = |corners: [usize; 3]| {
         let normals = normals.as_ref();
         (corners.map(|corner| positions[corner]), normals.map(|normals| corners.map(|corner| normals[corner])))
     };
-    add_triangles(primitive, |_| mirrored, of, material, triangles);
+    add_triangles(primitive, |_| &all, of, placed);
 }
 
 /// The same for a skin, whose joints transform each vertex separately.
-fn place_skinned(
-    instance: &MeshInstance<'_>,
-    primitive: &MeshPrimitive,
-    center: DVec3,
-    material: u32,
-    triangles: &mut Vec<Triangle>,
-) {
+fn place_skinned(instance: &MeshInstance<'_>, primitive: &MeshPrimitive, center: DVec3, placed: &mut Placed) {
     let vertices = 0..primitive.positions.len();
-    let moves: Vec<DMat4> =
-        vertices.map(|v| DMat4::from_translation(-center) * instance.matrix(primitive, v, DMat4::IDENTITY)).collect();
-    let mirrored = |v: usize| DMat3::from_mat4(moves[v]).determinant() < 0.0;
-    let position = |v: usize| moves[v].transform_point3(primitive.positions[v].as_dvec3()).as_vec3();
-    let normal = |normals: &[Vec3], v: usize| {
-        let to_normal = cofactors(DMat3::from_mat4(moves[v]), mirrored(v));
-        (to_normal * normals[v].as_dvec3()).normalize_or_zero().as_vec3()
-    };
+    let to_scene = |v| DMat4::from_translation(-center) * instance.matrix(primitive, v, DMat4::IDENTITY);
+    let moves: Vec<Move> = vertices.map(|v| Move::new(to_scene(v))).collect();
+    let position = |v: usize| moves[v].position(primitive.positions[v]);
     let of = |corners: [usize; 3]| {
         let normals = primitive.normals.as_deref();
-        (corners.map(position), normals.map(|normals| corners.map(|v| normal(normals, v))))
+        (corners.map(position), normals.map(|normals| corners.map(|v| moves[v].normal(normals[v]))))
     };
-    add_triangles(primitive, mirrored, of, material, triangles);
+    add_triangles(primitive, |v| &moves[v], of, placed);
 }
 
 /// Adds the triangles of a primitive with non-zero area. `of` gives their corners' positions and
 /// normals.
-fn add_triangles(
+fn add_triangles<'m>(
     primitive: &MeshPrimitive,
-    mirrored: impl Fn(usize) -> bool,
+    moved: impl Fn(usize) -> &'m Move,
     of: impl Fn([usize; 3]) -> ([Vec3; 3], Option<[Vec3; 3]>),
-    material: u32,
-    triangles: &mut Vec<Triangle>,
+    placed: &mut Placed,
 ) {
-    for &[a, b, c] in &primitive.corners {
+    for (i, corners) in primitive.corners.iter().enumerate() {
         // A mirroring transform reverses the winding; swapping two corners preserves the front
         // side.
-        let corners = if mirrored(a as usize) { [a, c, b] } else { [a, b, c] }.map(|corner| corner as usize);
+        let order = if moved(corners[0] as usize).mirrored { [0, 2, 1] } else { [0, 1, 2] };
+        let corners = order.map(|corner| corners[corner] as usize);
         let (positions, normals) = of(corners);
-        let mut triangle = Triangle { positions, normals: [Vec3::ZERO; 3], material };
+        let mut triangle = Triangle::new(positions, [Vec3::ZERO; 3], primitive.material);
         let flat = triangle.geometric_normal();
         if flat == Vec3::ZERO {
             continue;
         }
         let normals = normals.unwrap_or([Vec3::ZERO; 3]);
         triangle.normals = normals.map(|normal| if normal == Vec3::ZERO { flat } else { normal });
-        triangles.push(triangle);
+        if let Some(own) = &primitive.attributes {
+            let mut attributes = own.of(corners);
+            if let Some(tangents) = own.tangents(i, corners, order) {
+                attributes.tangents = [0, 1, 2].map(|k| moved(corners[k]).tangent(tangents[k], triangle.normals[k]));
+            }
+            placed.attributes.push(attributes);
+            triangle.attributes = placed.attributes.len() as u32;
+        }
+        placed.triangles.push(triangle);
     }
 }
 

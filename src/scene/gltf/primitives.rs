@@ -46,9 +46,6 @@ impl<'a> Checker<'a> {
         let Checked::Valid(mode) = primitive.mode else {
             return fault(format!("{place}.mode"), "is not one of glTF's");
         };
-        if primitive.attributes.keys().any(|semantic| matches!(semantic, Checked::Valid(Semantic::Colors(_)))) {
-            notes.add("vertex colours are not read yet");
-        }
         let vertices = self.check_attributes(primitive, place)?;
         for (t, target) in primitive.targets.iter().flatten().enumerate() {
             self.check_target(target, vertices, &format!("{place}.targets[{t}]"))?;
@@ -87,20 +84,42 @@ impl<'a> Checker<'a> {
                 let expected = vertices.unwrap_or_default();
                 return fault(at, format!("has {count} elements, other attributes have {expected}"));
             }
-            let small = matches!(format.component, ComponentType::U8 | ComponentType::U16);
-            let fits = match semantic {
-                Semantic::Joints(set) if *set >= MAX_JOINT_SETS => {
-                    return fault(at, format!("is one of more than {MAX_JOINT_SETS} sets of joints"));
-                }
-                Semantic::Joints(_) => small && !format.normalized,
-                Semantic::Weights(_) => (small && format.normalized) || format.component == ComponentType::F32,
-                _ => continue,
-            };
-            if !fits || format.kind != Type::Vec4 {
-                return fault(at, format!("is {format}, which joints and their weights cannot be"));
+            if let Semantic::Joints(set) = semantic
+                && *set >= MAX_JOINT_SETS
+            {
+                return fault(at, format!("is one of more than {MAX_JOINT_SETS} sets of joints"));
+            }
+            let (fits, what) = self.fits(semantic, format);
+            if !fits {
+                return fault(at, format!("is {format}, which {what} cannot be"));
             }
         }
         Ok(vertices.unwrap_or(0))
+    }
+
+    /// Whether an attribute can have that format, and what it is in messages. Positions, normals
+    /// and attributes that are not read have any.
+    fn fits(&self, semantic: &Semantic, format: Format) -> (bool, &'static str) {
+        let is_float = format.component == ComponentType::F32;
+        let is_small = matches!(format.component, ComponentType::U8 | ComponentType::U16);
+        let is_signed = matches!(format.component, ComponentType::I8 | ComponentType::I16);
+        let normal = is_float || (is_small && format.normalized);
+        match semantic {
+            Semantic::Joints(_) => {
+                (is_small && !format.normalized && format.kind == Type::Vec4, "joints and their weights")
+            }
+            Semantic::Weights(_) => (normal && format.kind == Type::Vec4, "joints and their weights"),
+            Semantic::TexCoords(_) => {
+                let fits = normal || (self.quantized && (is_small || is_signed));
+                (fits && format.kind == Type::Vec2, "texture coordinates")
+            }
+            Semantic::Colors(0) => (normal && matches!(format.kind, Type::Vec3 | Type::Vec4), "colours"),
+            Semantic::Tangents => {
+                let fits = is_float || (self.quantized && is_signed && format.normalized);
+                (fits && format.kind == Type::Vec4, "tangents")
+            }
+            _ => (true, ""),
+        }
     }
 
     fn check_target(&self, target: &MorphTarget, vertices: usize, place: &str) -> Read<()> {

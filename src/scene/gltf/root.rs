@@ -10,17 +10,22 @@ use super::strict_json::{elements, member, objects, parse, read_element};
 /// Maximum number of materials in a file.
 const MAX_MATERIALS: usize = 1 << 16;
 
-/// Parses the JSON text. Unsupported versions and required extensions are refused by name. Unused
-/// parts are left out: textures, samplers, animations, and of images all but the file names.
+/// Parses the JSON text. Unsupported versions and required extensions are refused by name.
+/// Animations are left out. All references of materials to textures are checked.
 pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<json::Root> {
     let Value::Object(mut file) = parse(text)? else { return fault("JSON", "is not an object") };
     let asset = read_asset(&mut file)?;
     let used = member::<Vec<String>>(&mut file, "extensionsUsed")?.unwrap_or_default();
     let required = member::<Vec<String>>(&mut file, "extensionsRequired")?.unwrap_or_default();
     extensions::check(&used, &required, ignored, notes)?;
-    let images = objects(&mut file, "images")?;
-    for unused in ["textures", "samplers"] {
-        objects(&mut file, unused)?;
+    let images = elements(&mut file, "images")?;
+    let (textures, samplers): (Vec<json::Texture>, _) =
+        (elements(&mut file, "textures")?, elements(&mut file, "samplers")?);
+    if let Some(materials) = file.get("materials") {
+        check_textures(materials, textures.len() as u64, false, &|| "materials".to_owned())?;
+    }
+    if file.get("meshes").is_some_and(morphs_more) {
+        notes.add("morph targets of texture coordinates and colours are not read: these stay as in the mesh");
     }
     if !objects(&mut file, "animations")?.is_empty() {
         notes.add("animations are not read: nodes stand as in the file");
@@ -37,7 +42,9 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
         accessors: elements(&mut file, "accessors")?,
         buffer_views: elements(&mut file, "bufferViews")?,
         buffers: elements(&mut file, "buffers")?,
-        images: images.iter().map(named_image).collect(),
+        images,
+        textures,
+        samplers,
         extensions: member(&mut file, "extensions")?,
         extensions_used: used,
         extensions_required: required,
@@ -45,16 +52,33 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
     })
 }
 
-/// An image of which only the file name is read.
-fn named_image(image: &Value) -> json::Image {
-    json::Image {
-        buffer_view: None,
-        mime_type: None,
-        name: None,
-        uri: image.get("uri").and_then(Value::as_str).map(str::to_owned),
-        extensions: None,
-        extras: None,
+/// Checks the indices of textures in all materials, used or not, extensions included: those of
+/// objects that are called a texture.
+fn check_textures(value: &Value, known: u64, is_texture: bool, place: &dyn Fn() -> String) -> Read<()> {
+    match value {
+        Value::Array(list) => (list.iter().enumerate())
+            .try_for_each(|(i, value)| check_textures(value, known, false, &|| format!("{}[{i}]", place()))),
+        Value::Object(object) => {
+            let index = object.get("index").and_then(Value::as_u64).filter(|index| is_texture && *index >= known);
+            if let Some(index) = index {
+                return fault(format!("{}.index", place()), format!("{index} of {known}"));
+            }
+            (object.iter()).try_for_each(|(name, value)| {
+                check_textures(value, known, name.ends_with("Texture"), &|| format!("{}.{name}", place()))
+            })
+        }
+        _ => Ok(()),
     }
+}
+
+/// Whether morph targets of a list of meshes displace what the crate does not know.
+fn morphs_more(meshes: &Value) -> bool {
+    fn list(value: Option<&Value>) -> &[Value] {
+        value.and_then(Value::as_array).map_or(&[], Vec::as_slice)
+    }
+    let primitives = list(Some(meshes)).iter().flat_map(|mesh| list(mesh.get("primitives")));
+    let mut targets = primitives.flat_map(|primitive| list(primitive.get("targets"))).filter_map(Value::as_object);
+    targets.any(|target| target.keys().any(|name| name.starts_with("TEXCOORD_") || name.starts_with("COLOR_")))
 }
 
 /// Version of a file, checked before the rest, whose structure depends on it.

@@ -14,6 +14,8 @@ const UNIFORM: f64 = 1e-4;
 /// A sphere in the world.
 #[derive(Debug)]
 pub(super) struct PlacedSphere {
+    /// Index into the file's nodes.
+    pub(super) node: usize,
     pub(super) center: DVec3,
     pub(super) radius: f64,
     /// Valid index into the file's materials; `None` for the default material.
@@ -90,7 +92,7 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
     if let Some(material) = material.filter(|material| *material >= root.materials.len()) {
         return fault(format!("{at}.extras.material"), format!("{material} of {}", root.materials.len()));
     }
-    Ok(Some(PlacedSphere { center: placed.world.w_axis.truncate(), radius, material }))
+    Ok(Some(PlacedSphere { center: placed.world.w_axis.truncate(), radius, material, node: placed.node }))
 }
 
 /// Scale factor of a uniform transform, mirrored or not.

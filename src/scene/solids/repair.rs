@@ -123,7 +123,7 @@ fn ends_at_opaque(shell: &Shell, triangles: &[Triangle], materials: &[Material])
     let reach = RIM_GAP * shell.bounds.diagonal();
     let near = |point: Vec3, triangle: &Triangle| {
         let bounds = Bounds::from(triangle);
-        let is_opaque = matches!(materials[triangle.material as usize].surface, Surface::Diffuse { .. });
+        let is_opaque = !materials[triangle.material as usize].surface.transmits();
         is_opaque
             && point.cmpge(bounds.min - reach).all()
             && point.cmple(bounds.max + reach).all()
@@ -215,6 +215,7 @@ fn pane_of(materials: &mut Vec<Material>, solid: u32) -> u32 {
 fn turn(triangle: &mut Triangle) {
     triangle.positions.swap(1, 2);
     triangle.normals.swap(1, 2);
+    triangle.is_turned = !triangle.is_turned;
     triangle.normals = triangle.normals.map(|normal| -normal);
 }
 

@@ -76,7 +76,7 @@ impl Solids {
             NONE => NO_SLOT as u8,
             _ => slot_of[(solid & !COVER_BIT) as usize],
         };
-        let media = materials.iter().filter_map(|material| scene.materials[*material as usize].surface.medium());
+        let media = materials.iter().filter_map(|material| scene.materials[*material as usize].medium());
         Self { slots: of_surface.into_iter().map(slot).collect(), media: media.collect(), without_slot }
     }
 

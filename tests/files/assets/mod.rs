@@ -3,7 +3,7 @@
 mod corpus;
 mod folder;
 mod hostile;
-mod memory;
+pub mod memory;
 
 use std::{fs, path::Path, process::Command};
 

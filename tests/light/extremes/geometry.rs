@@ -33,7 +33,7 @@ fn dented_sphere() -> Scene {
             let corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
             for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
                 let positions = [corners[a], corners[b], corners[c]];
-                scene.triangles.push(Triangle { positions, normals: [Vec3::X; 3], material: 0 });
+                scene.triangles.push(Triangle::new(positions, [Vec3::X; 3], 0));
             }
         }
     }
@@ -109,7 +109,7 @@ fn degenerate_triangles_leave_no_trace() {
         for shape in shapes {
             let positions = shape.map(|p| turn * p);
             for material in [0, 1] {
-                scene.triangles.push(Triangle { positions, normals: [Vec3::Y; 3], material });
+                scene.triangles.push(Triangle::new(positions, [Vec3::Y; 3], material));
             }
         }
         let render = render_scene(&scene, &quick(mode));

@@ -128,7 +128,7 @@ fn add_shining_ball(scene: &mut Scene, center: Vec3, radius: f32) {
         };
         for normals in halves {
             let positions = normals.map(|n| center + radius * n);
-            scene.triangles.push(Triangle { positions, normals, material: 1 });
+            scene.triangles.push(Triangle::new(positions, normals, 1));
         }
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use caustica::{
     bvh::Bvh,
-    scene::{Camera, LoadOptions, Projection, Scene, Surface},
+    scene::{Alpha, Camera, LoadOptions, Material, Projection, Scene, Surface, UV_SETS},
 };
 
 /// Maximum number of triangles for which the BVH is built too.
@@ -35,7 +35,13 @@ fn sound(scene: &Scene) {
         assert!(triangle.positions.iter().all(|p| p.is_finite()), "triangle {i}: {:?}", triangle.positions);
         let unit = |n: &glam::Vec3| (n.length() - 1.0).abs() < 1e-3;
         assert!(triangle.normals.iter().all(unit), "triangle {i}: normals {:?}", triangle.normals);
+        let attributes = triangle.attributes as usize;
+        assert!(attributes <= scene.attributes.len(), "triangle {i}: attributes {attributes}");
+        let maps = scene.materials[triangle.material as usize].textures.normal.is_some();
+        let has_tangents = attributes > 0 && scene.attributes[attributes - 1].tangents[0].w != 0.0;
+        assert!(!maps || has_tangents, "triangle {i}: no tangents for its normal map");
     }
+    sound_attributes(scene);
     for (i, sphere) in scene.spheres.iter().enumerate() {
         assert!(sphere.material < materials, "sphere {i}: material {} of {materials}", sphere.material);
         let good = sphere.center.is_finite() && sphere.radius.is_finite() && sphere.radius > 0.0;
@@ -45,12 +51,17 @@ fn sound(scene: &Scene) {
         let emission = material.emission;
         assert!(emission.is_finite() && emission.min_element() >= 0.0, "material {i}: emission {emission}");
         let (color, ior) = match material.surface {
-            Surface::Diffuse { albedo } => (albedo, 1.0),
+            Surface::Diffuse { albedo } | Surface::Layered { base: albedo, .. } => (albedo, 1.0),
             Surface::Mirror { tint } => (tint, 1.0),
             Surface::Glass { ior, tint } | Surface::Pane { ior, tint } => (tint, ior),
         };
         assert!(color.min_element() >= 0.0 && color.max_element() <= 1.0, "material {i}: colour {color}");
         assert!(ior >= 1.0 && ior.is_finite(), "material {i}: index of refraction {ior}");
+        sound_material(material, scene.images.len());
+    }
+    for image in &scene.images {
+        let texels = image.width as usize * image.height as usize;
+        assert!(texels > 0 && image.texels.len() == texels, "image {}: {} of {texels}", image.name, image.texels.len());
     }
     for (i, light) in scene.lights.iter().enumerate() {
         let good = light.position.is_finite() && (light.direction.length() - 1.0).abs() < 1e-3;
@@ -68,6 +79,57 @@ fn sound(scene: &Scene) {
     let _ = scene.check_renderable();
     if scene.triangles.len() <= MAX_BUILT && scene.spheres.len() <= MAX_BUILT {
         let _ = Bvh::build(scene).max_stack_depth();
+    }
+}
+
+fn sound_attributes(scene: &Scene) {
+    let used = scene.triangles.iter().filter(|triangle| triangle.attributes > 0).count();
+    assert_eq!(used, scene.attributes.len(), "each triangle has attributes of its own, and none are left over");
+    for (i, attributes) in scene.attributes.iter().enumerate() {
+        assert!(attributes.uvs.as_flattened().iter().all(|uv| uv.is_finite()), "attributes {i}: {:?}", attributes.uvs);
+        let color = |color: &glam::Vec4| color.min_element() >= 0.0 && color.max_element() <= 1.0;
+        assert!(attributes.colors.iter().all(color), "attributes {i}: {:?}", attributes.colors);
+        let none = attributes.tangents == [glam::Vec4::ZERO; 3];
+        let unit = |t: &glam::Vec4| t.w.abs() == 1.0 && (t.truncate().length() - 1.0).abs() < 1e-3;
+        assert!(none || attributes.tangents.iter().all(unit), "attributes {i}: {:?}", attributes.tangents);
+    }
+}
+
+fn sound_material(material: &Material, images: usize) {
+    let Material { name, .. } = material;
+    let factors = [
+        material.roughness,
+        material.transmission,
+        material.metallic,
+        material.clearcoat,
+        material.clearcoat_roughness,
+        material.opacity,
+        material.sheen_roughness,
+        material.anisotropy,
+        material.iridescence,
+        material.diffuse_transmission,
+    ];
+    assert!(factors.iter().all(|factor| (0.0..=1.0).contains(factor)), "material {name}: {factors:?}");
+    for color in [material.sheen_color, material.diffuse_transmission_color] {
+        assert!(color.min_element() >= 0.0 && color.max_element() <= 1.0, "material {name}: {color}");
+    }
+    let (absorption, [thin, thick]) = (material.absorption, material.iridescence_thickness);
+    let numbers =
+        [absorption.x, absorption.y, absorption.z, material.dispersion, material.iridescence_ior, thin, thick];
+    assert!(numbers.iter().all(|x| *x >= 0.0 && x.is_finite()), "material {name}: {numbers:?}");
+    assert!(material.normal_scale.is_finite() && material.anisotropy_rotation.is_finite(), "material {name}");
+    if let Surface::Layered { metallic, f0, specular, .. } = material.surface {
+        let good = (0.0..=1.0).contains(&metallic) && (0.0..=1.0).contains(&specular);
+        assert!(good && f0.is_finite() && f0.min_element() >= 0.0, "material {name}: {metallic} {f0} {specular}");
+    }
+    if let Alpha::Mask { cutoff } = material.alpha {
+        assert!(cutoff >= 0.0 && cutoff.is_finite(), "material {name}: cutoff {cutoff}");
+    }
+    for (property, texture) in material.textures.named() {
+        let Some(texture) = texture else { continue };
+        let good = (texture.image as usize) < images && (texture.uv_set as usize) < UV_SETS;
+        let finite = texture.transform.as_flattened().iter().all(|x| x.is_finite());
+        assert!(good && finite, "material {name}: {property} {texture:?}");
     }
 }
 

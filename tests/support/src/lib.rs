@@ -36,16 +36,7 @@ pub fn glass() -> Surface {
 }
 
 pub fn scene(surfaces: &[Surface]) -> Scene {
-    let materials = surfaces
-        .iter()
-        .map(|&surface| Material {
-            name: String::new(),
-            surface,
-            emission: Vec3::ZERO,
-            double_sided: false,
-            priority: 0,
-        })
-        .collect();
+    let materials = surfaces.iter().map(|&surface| Material::new("", surface)).collect();
     Scene { materials, ..Scene::default() }
 }
 
@@ -61,13 +52,7 @@ pub fn point_light(position: Vec3, intensity: f32) -> Light {
 
 /// An emissive diffuse material.
 pub fn emissive(name: &str, albedo: f32, emission: f32, double_sided: bool) -> Material {
-    Material {
-        name: name.to_owned(),
-        surface: diffuse(albedo),
-        emission: Vec3::splat(emission),
-        double_sided,
-        priority: 0,
-    }
+    Material { emission: Vec3::splat(emission), double_sided, ..Material::new(name, diffuse(albedo)) }
 }
 
 /// A camera at `position` that looks at `target`; full vertical angle in degrees.
@@ -98,7 +83,7 @@ pub fn sphere(center: Vec3, radius: f32, material: u32) -> Sphere {
 pub fn add_quad(scene: &mut Scene, corner: Vec3, a: Vec3, b: Vec3, material: u32) {
     let normals = [a.cross(b).normalize(); 3];
     for positions in [[corner, corner + a, corner + a + b], [corner, corner + a + b, corner + b]] {
-        scene.triangles.push(Triangle { positions, normals, material });
+        scene.triangles.push(Triangle::new(positions, normals, material));
     }
 }
 

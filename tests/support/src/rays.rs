@@ -2,7 +2,7 @@
 
 use caustica::{
     bvh::Bvh,
-    layout::{CameraTile, Counters, FirstHit, NOTHING_LEFT, Path, VisiblePoint},
+    layout::{CameraTile, Counters, FirstHit, LobePoint, NOTHING_LEFT, Path, VisiblePoint},
     scene::Scene,
     settings::LightSettings,
     upload::SceneBuffers,
@@ -25,23 +25,24 @@ pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) ->
         ..Path::default()
     };
     let paths = gpu.storage_with("paths", &rays.iter().map(path).collect::<Vec<_>>()).expect("fits");
-    let queue = gpu.storage_with("queue", &(0..rays.len() as u32).collect::<Vec<_>>()).expect("fits");
-    let queue_out = gpu.storage::<u32>("queue out", count).expect("fits");
+    let (all, none) = (0..rays.len() as u32, vec![0; rays.len()]);
+    let queues = gpu.storage_with("queues", &all.chain(none).collect::<Vec<_>>()).expect("fits");
     let start = Counters { current: rays.len() as u32, ..Counters::default() };
     let counters = gpu.storage_with("counters", &[start]).expect("fits");
     let points = gpu.storage::<VisiblePoint>("points", count).expect("fits");
     let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
     let radiance = gpu.storage::<[f32; 4]>("radiance", count).expect("fits");
+    let lobe_points = gpu.storage::<LobePoint>("lit lobes", 1).expect("fits");
     let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..CameraTile::default() });
     let own = [
         ("tile", &tile),
         ("paths", &paths),
-        ("queue_in", &queue),
-        ("queue_out", &queue_out),
+        ("queues", &queues),
         ("counters", &counters),
         ("points", &points),
         ("first_hits", &first_hits),
         ("radiance", &radiance),
+        ("lobe_points", &lobe_points),
     ];
     let bindings = kernel.bind(gpu, &buffers.with(&own));
     let mut commands = gpu.encoder();

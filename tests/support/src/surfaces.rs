@@ -94,13 +94,7 @@ pub fn bias(place: &Place, estimates: &[f64]) -> f64 {
 }
 
 fn room(light: Vec3) -> Scene {
-    let material = Material {
-        name: String::new(),
-        surface: Surface::Diffuse { albedo: Vec3::splat(0.5) },
-        emission: Vec3::ZERO,
-        double_sided: false,
-        priority: 0,
-    };
+    let material = Material::new("", Surface::Diffuse { albedo: Vec3::splat(0.5) });
     Scene {
         materials: vec![material],
         lights: vec![Light {
@@ -129,7 +123,7 @@ fn room(light: Vec3) -> Scene {
 fn quad(scene: &mut Scene, corner: Vec3, a: Vec3, b: Vec3) {
     let normals = [a.cross(b).normalize(); 3];
     for positions in [[corner, corner + a, corner + a + b], [corner, corner + a + b, corner + b]] {
-        scene.triangles.push(Triangle { positions, normals, material: 0 });
+        scene.triangles.push(Triangle::new(positions, normals, 0));
     }
 }
 

@@ -1,0 +1,115 @@
+//! Smaller versions of images.
+
+use crate::scene::Image;
+
+/// How the RGB of an image stand for light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Curve {
+    Linear,
+    /// IEC 61966-2-1.
+    Srgb,
+}
+
+impl Curve {
+    fn linear(self, value: u8) -> f32 {
+        let x = f32::from(value) / 255.0;
+        match self {
+            Curve::Srgb if x <= 0.040_45 => x / 12.92,
+            Curve::Srgb => ((x + 0.055) / 1.055).powf(2.4),
+            Curve::Linear => x,
+        }
+    }
+
+    fn stored(self, x: f32) -> u8 {
+        let value = match self {
+            Curve::Srgb if x <= 0.003_130_8 => 12.92 * x,
+            Curve::Srgb => 1.055 * x.powf(1.0 / 2.4) - 0.055,
+            Curve::Linear => x,
+        };
+        (255.0 * value).round() as u8
+    }
+}
+
+/// The image with its sides halved, rounded down, until none is longer than `longest`. Each texel
+/// is the mean over its area of the values that the RGB stand for.
+pub(super) fn shrunk(image: Image, longest: u32, curve: Curve) -> Image {
+    let mut halvings = 0;
+    while image.width.max(image.height) >> halvings > longest {
+        halvings += 1;
+    }
+    if halvings == 0 {
+        return image;
+    }
+    let (width, height) = ((image.width >> halvings).max(1), (image.height >> halvings).max(1));
+    let table: [[f32; 256]; 2] =
+        [curve, Curve::Linear].map(|curve| std::array::from_fn(|value| curve.linear(value as u8)));
+    let (columns, rows) = (spans(image.width, width), spans(image.height, height));
+    let mut texels = Vec::with_capacity(width as usize * height as usize);
+    for (first_row, row_weights) in &rows {
+        // Sums over the rows of the span, for each column of the image.
+        let mut sums = vec![[0.0_f32; 4]; image.width as usize];
+        for (row, weight) in image.texels.chunks_exact(image.width as usize).skip(*first_row).zip(row_weights) {
+            for (sum, texel) in sums.iter_mut().zip(row) {
+                (0..4).for_each(|c| sum[c] += weight * table[usize::from(c == 3)][usize::from(texel[c])]);
+            }
+        }
+        for (first, weights) in &columns {
+            let mut mean = [0.0_f32; 4];
+            for (sum, weight) in sums[*first..].iter().zip(weights) {
+                (0..4).for_each(|c| mean[c] += weight * sum[c]);
+            }
+            let [r, g, b] = [0, 1, 2].map(|c| curve.stored(mean[c]));
+            texels.push([r, g, b, Curve::Linear.stored(mean[3])]);
+        }
+    }
+    Image { width, height, texels, ..image }
+}
+
+/// For each of `to` equal parts of `from` texels the first that it covers, and the fraction of the
+/// part that each of them is.
+fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f32>)> {
+    let size = f64::from(from) / f64::from(to);
+    let span = |part: u32| {
+        let (start, end) = (f64::from(part) * size, (f64::from(part + 1) * size).min(f64::from(from)));
+        let covered = start.floor() as usize..end.ceil() as usize;
+        let weight = |i: usize| ((end.min(i as f64 + 1.0) - start.max(i as f64)) / size) as f32;
+        (covered.start, covered.map(weight).collect())
+    };
+    (0..to).map(span).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Image {
+        let texels = (0..width * height).map(|i| texel(i % width, i / width)).collect();
+        Image { name: String::new(), width, height, texels }
+    }
+
+    #[test]
+    fn a_checker_becomes_the_grey_of_half_its_light() {
+        let checker = image(8, 4, |x, y| [255 * ((x + y) % 2) as u8; 4]);
+        let size = |image: &Image| (image.width, image.height);
+        let color = shrunk(checker.clone(), 4, Curve::Srgb);
+        assert_eq!((size(&color), &color.texels[..]), ((4, 2), &[[188, 188, 188, 128]; 8][..]));
+        let data = shrunk(checker.clone(), 1, Curve::Linear);
+        assert_eq!((size(&data), &data.texels[..]), ((1, 1), &[[128; 4]][..]));
+        assert_eq!(shrunk(checker.clone(), 8, Curve::Srgb), checker, "small enough");
+    }
+
+    #[test]
+    fn odd_sides_keep_the_mean() {
+        let ramp = image(5, 1, |x, _| [50 * x as u8, 100, 200, 255]);
+        let small = shrunk(ramp, 2, Curve::Linear);
+        // Two parts of 2.5 texels: (0 + 50 + 100/2) / 2.5 and (100/2 + 150 + 200) / 2.5.
+        assert_eq!(small.texels, [[40, 100, 200, 255], [160, 100, 200, 255]]);
+        let all = image(7, 3, |x, y| [(x * y) as u8, 0, 0, 0]);
+        assert_eq!(shrunk(all, 1, Curve::Linear).texels, [[3, 0, 0, 0]]);
+    }
+
+    #[test]
+    fn the_curve_is_its_own_inverse() {
+        assert!((0..=255).all(|value| Curve::Srgb.stored(Curve::Srgb.linear(value)) == value));
+    }
+}

@@ -1,0 +1,135 @@
+//! Reading of numbers and textures of one material.
+
+use gltf::json;
+use serde::de::DeserializeOwned;
+
+use super::super::fault::{Notes, Read, fault};
+use super::super::images::{Content, ImageList};
+use super::super::textures::{self, Reference};
+use crate::scene::{Texture, UV_SETS};
+use glam::Vec3;
+
+/// Reader of one material of the file, as a mesh without some sets of texture coordinates shows it.
+pub(super) struct Reader<'a> {
+    pub(super) root: &'a json::Root,
+    pub(super) material: &'a json::Material,
+    /// Name in notes, and JSON path.
+    pub(super) name: String,
+    pub(super) place: String,
+    /// TEXCOORD_n that the mesh lacks.
+    pub(super) lacks: &'a [u32],
+    /// TEXCOORD_n behind each of the triangles' sets.
+    pub(super) sets: Vec<u32>,
+    /// TEXCOORD_n of all textures, also of those left out.
+    pub(super) asked: Vec<u32>,
+    pub(super) images: &'a mut ImageList,
+    pub(super) notes: &'a mut Notes,
+}
+
+impl Reader<'_> {
+    /// Adds a note on the material.
+    pub(super) fn note(&mut self, note: &str) {
+        self.notes.add(format!("material {:?}: {note}", self.name));
+    }
+
+    /// Notes that an extension is read, but has no effect yet.
+    pub(super) fn note_unrendered(&mut self, extension: &str) {
+        self.notes.add(format!("{extension} is not rendered yet"));
+    }
+
+    /// An extension of the material that the crate does not know.
+    pub(super) fn extension<T: DeserializeOwned>(&self, name: &str) -> Read<Option<T>> {
+        let extension = self.material.extensions.as_ref().and_then(|extensions| extensions.others.get(name));
+        let Some(extension) = extension else { return Ok(None) };
+        T::deserialize(extension)
+            .map(Some)
+            .or_else(|error| fault(format!("{}.extensions.{name}", self.place), error.to_string()))
+    }
+
+    /// A number of the material, clamped to 0..1; `what` it is in notes, `at` in the file.
+    pub(super) fn unit(&mut self, value: f32, what: &str, at: &str) -> Read<f32> {
+        if !value.is_finite() {
+            return fault(format!("{}.{at}", self.place), format!("{value} is not finite"));
+        }
+        if !(0.0..=1.0).contains(&value) {
+            self.note(&format!("{what} {value} is clamped to 0..1"));
+        }
+        Ok(value.clamp(0.0, 1.0))
+    }
+
+    /// A colour of the material, each channel clamped to 0..1.
+    pub(super) fn color(&mut self, given: [f32; 3], what: &str, at: &str) -> Read<Vec3> {
+        let color = Vec3::from_array(given);
+        if !color.is_finite() {
+            let [r, g, b] = given;
+            return fault(format!("{}.{at}", self.place), format!("{r} {g} {b} is not a colour of finite numbers"));
+        }
+        let clamped = color.clamp(Vec3::ZERO, Vec3::ONE);
+        if clamped != color {
+            let [r, g, b] = given;
+            self.note(&format!("{what} {r} {g} {b} is clamped to 0..1"));
+        }
+        Ok(clamped)
+    }
+
+    /// A number of the material that must be finite and at least `least`.
+    pub(super) fn at_least(&self, least: f32, value: f32, at: &str) -> Read<f32> {
+        if value.is_finite() && value >= least {
+            return Ok(value);
+        }
+        fault(format!("{}.{at}", self.place), format!("{value} is not a finite number of at least {least}"))
+    }
+
+    /// A texture of colours: its RGB have the sRGB curve.
+    pub(super) fn color_texture<'r>(
+        &mut self,
+        reference: Option<impl Into<Reference<'r>>>,
+        at: &str,
+    ) -> Read<Option<Texture>> {
+        self.texture(reference, at, |image| (Content::File(image), true))
+    }
+
+    /// A texture of linear values.
+    pub(super) fn data_texture<'r>(
+        &mut self,
+        reference: Option<impl Into<Reference<'r>>>,
+        at: &str,
+    ) -> Read<Option<Texture>> {
+        self.texture(reference, at, |image| (Content::File(image), false))
+    }
+
+    /// A texture that shows what `content` makes of an image of the file, and whether that is of
+    /// colours. `None` if there is none, or if it is left out with a note.
+    pub(super) fn texture<'r>(
+        &mut self,
+        reference: Option<impl Into<Reference<'r>>>,
+        at: &str,
+        content: impl Fn(usize) -> (Content, bool),
+    ) -> Read<Option<Texture>> {
+        let Some(reference) = reference.map(Into::into) else { return Ok(None) };
+        let place = format!("{}.{at}", self.place);
+        let (set, texture) = textures::sampled(self.root, reference, &place, self.notes)?;
+        let Some(image) = textures::image(self.root, reference.texture, self.notes)? else { return Ok(None) };
+        if !self.asked.contains(&set) {
+            self.asked.push(set);
+        }
+        if self.lacks.contains(&set) {
+            return Ok(None);
+        }
+        let known = self.sets.iter().position(|known| *known == set);
+        if known.is_none() && self.sets.len() == UV_SETS {
+            let what = at.rsplit('.').next().unwrap_or(at);
+            self.note(&format!(
+                "{what} is left out: its TEXCOORD_{set} is one more than the {UV_SETS} sets of texture coordinates \
+                 that a material can use"
+            ));
+            return Ok(None);
+        }
+        let uv_set = known.unwrap_or_else(|| {
+            self.sets.push(set);
+            self.sets.len() - 1
+        });
+        let (content, is_color) = content(image);
+        Ok(Some(Texture { image: self.images.index(content, is_color), uv_set: uv_set as u32, ..texture }))
+    }
+}

@@ -1,0 +1,204 @@
+//! Materials, their textures, and what the corners of triangles carry for them, in tables.
+
+use glam::Vec4;
+
+use super::texels::Texels;
+use crate::{
+    emitters::{albedos::albedos, light_table::emission_in},
+    error::{Error, Result},
+    gpu::{Gpu, Table},
+    layout::{
+        self, BLEND_BIT, CAUSTIC_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS,
+        MaterialRecord, SECOND_UV_BIT, SRGB_BIT, TextureRecord, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
+    },
+    scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
+    settings::LightUnit,
+};
+
+/// The materials on the device.
+#[derive(Debug)]
+pub struct MaterialBuffers {
+    materials: Table,
+    attributes: Table,
+    texels: Table,
+    albedos: Table,
+    /// Some material has lobes beside one that is diffuse or perfectly specular.
+    pub has_layers: bool,
+    /// Some material has a rough lobe, which is lit at every vertex.
+    pub has_rough: bool,
+    /// Some material has a texture, or some triangle has colours.
+    pub has_textures: bool,
+    /// Some surface is not there everywhere.
+    pub has_alpha: bool,
+}
+
+impl MaterialBuffers {
+    /// Uploads materials and textures.
+    ///
+    /// # Errors
+    /// [`crate::Error::Limit`] if a table cannot hold them, [`crate::Error::Scene`] if there are
+    /// more materials than a primitive can name.
+    pub fn new(gpu: &Gpu, scene: &Scene, unit: LightUnit) -> Result<Self> {
+        if scene.materials.len() > MATERIAL_MASK as usize {
+            let problem = format!("{} materials in use; at most {MATERIAL_MASK}", scene.materials.len());
+            return Err(Error::Scene { path: scene.path.clone(), place: "materials".to_owned(), problem });
+        }
+        let mut texels = Texels::new(&scene.images);
+        let first = scene.materials.len() as u32 * MATERIAL_TEXELS;
+        let mut textures = Vec::new();
+        let mut rows: Vec<[u32; 4]> = Vec::with_capacity(first as usize);
+        for material in &scene.materials {
+            let record = record(material, unit, |texture, is_color| {
+                let at = first + textures.len() as u32;
+                let rows: [[u32; 4]; 3] = bytemuck::cast(texture_record(texture, is_color, &mut texels));
+                textures.extend(rows);
+                at
+            });
+            rows.extend::<[[u32; 4]; MATERIAL_TEXELS as usize]>(bytemuck::cast(record));
+        }
+        rows.extend(textures);
+        let materials = || scene.materials.iter();
+        let attributes: Vec<_> = in_order(scene).iter().map(attributes).collect();
+        Ok(Self {
+            has_textures: !attributes.is_empty(),
+            has_layers: materials().any(is_layered),
+            has_rough: materials().any(is_rough),
+            has_alpha: materials().any(|m| m.alpha != Alpha::Opaque),
+            materials: Table::new(gpu, "materials", &rows)?,
+            attributes: Table::new(gpu, "attributes of triangles", &attributes)?,
+            albedos: Table::new(gpu, "albedos", &if materials().any(is_layered) { albedos() } else { Vec::new() })?,
+            texels: Table::layered(gpu, "texels", &texels.into_words())?,
+        })
+    }
+
+    /// The tables by name.
+    #[must_use]
+    pub fn tables(&self) -> [(&'static str, &Table); 4] {
+        [
+            ("materials", &self.materials),
+            ("attributes", &self.attributes),
+            ("texels", &self.texels),
+            ("albedos", &self.albedos),
+        ]
+    }
+}
+
+/// Whether a material has more lobes than the kernels' shorter code follows.
+fn is_layered(material: &Material) -> bool {
+    matches!(material.surface, Surface::Layered { .. })
+        || is_rough(material)
+        || (material.surface.transmits() && (material.transmission < 1.0 || material.textures.transmission.is_some()))
+        || material.clearcoat > 0.0
+}
+
+fn is_rough(material: &Material) -> bool {
+    let has_gloss = !matches!(material.surface, Surface::Diffuse { .. }) || material.clearcoat > 0.0;
+    has_gloss && (material.roughness >= SHARP_ROUGHNESS || material.clearcoat_roughness >= SHARP_ROUGHNESS)
+}
+
+/// The attributes of the triangles, in the order of the corners as they are now.
+fn in_order(scene: &Scene) -> Vec<Attributes> {
+    let mut all = scene.attributes.clone();
+    for triangle in scene.triangles.iter().filter(|triangle| triangle.is_turned && triangle.attributes > 0) {
+        let own = &mut all[triangle.attributes as usize - 1];
+        own.uvs.iter_mut().for_each(|uvs| uvs.swap(1, 2));
+        own.colors.swap(1, 2);
+        own.tangents.swap(1, 2);
+    }
+    all
+}
+
+fn attributes(own: &Attributes) -> layout::Attributes {
+    let tangent = |t: Vec4| (octahedral(t.truncate()) & !1) | u32::from(t.w < 0.0);
+    let uvs = |i: usize| [own.uvs[0][i].x, own.uvs[0][i].y, own.uvs[1][i].x, own.uvs[1][i].y];
+    layout::Attributes {
+        uvs: [0, 1, 2].map(uvs),
+        colors: own.colors.map(|c| c.to_array()),
+        tangents: own.tangents.map(tangent),
+        pad: 0,
+    }
+}
+
+/// Row of the table of materials. `place` adds a texture, of colours or not, and returns where it
+/// lies.
+fn record(material: &Material, unit: LightUnit, mut place: impl FnMut(&Texture, bool) -> u32) -> MaterialRecord {
+    let surface = &material.surface;
+    let (metallic, f0, specular) = match *surface {
+        Surface::Layered { metallic, f0, specular, .. } => (metallic, f0.to_array(), specular),
+        Surface::Mirror { .. } => (1.0, [0.0; 3], 0.0),
+        Surface::Glass { ior, .. } | Surface::Pane { ior, .. } => (0.0, [((ior - 1.0) / (ior + 1.0)).powi(2); 3], 1.0),
+        Surface::Diffuse { .. } => (0.0, [0.0; 3], 0.0),
+    };
+    let alpha = match material.alpha {
+        Alpha::Opaque => 0,
+        Alpha::Mask { .. } => MASK_BIT,
+        Alpha::Blend => BLEND_BIT,
+    };
+    let all = &material.textures;
+    let mut slot = |texture: &Option<Texture>, is_color| texture.as_ref().map_or(0, |t| place(t, is_color));
+    let textures = [
+        [
+            slot(&all.base_color, true),
+            slot(&all.metallic_roughness, false),
+            slot(&all.normal, false),
+            slot(&all.emission, true),
+        ],
+        [
+            slot(&all.specular, false),
+            slot(&all.specular_color, true),
+            slot(&all.transmission, false),
+            slot(&all.clearcoat, false),
+        ],
+        [slot(&all.clearcoat_roughness, false), 0, 0, 0],
+    ];
+    MaterialRecord {
+        color: surface.color().to_array(),
+        kind: match surface {
+            Surface::Diffuse { .. } => layout::DIFFUSE,
+            Surface::Mirror { .. } => layout::MIRROR,
+            Surface::Glass { .. } => layout::GLASS,
+            Surface::Pane { .. } => layout::PANE,
+            Surface::Layered { .. } => layout::LAYERED,
+        },
+        emission: emission_in(material.emission, unit).to_array(),
+        ior: surface.ior().unwrap_or(1.0),
+        roughness: material.roughness,
+        metallic,
+        transmission: material.transmission,
+        flags: alpha
+            | if material.double_sided { DOUBLE_SIDED_BIT } else { 0 }
+            | if material.casts_caustics() { CAUSTIC_BIT } else { 0 },
+        f0,
+        specular,
+        clearcoat: material.clearcoat,
+        clearcoat_roughness: material.clearcoat_roughness,
+        normal_scale: material.normal_scale,
+        opacity: material.opacity,
+        cutoff: if let Alpha::Mask { cutoff } = material.alpha { cutoff } else { 0.0 },
+        pad: [0; 3],
+        textures,
+    }
+}
+
+fn texture_record(texture: &Texture, is_color: bool, texels: &mut Texels<'_>) -> TextureRecord {
+    let wrap = |wrap| match wrap {
+        Wrap::Repeat => WRAP_REPEAT,
+        Wrap::Mirror => WRAP_MIRROR,
+        Wrap::Clamp => WRAP_CLAMP,
+    };
+    let [u, v] = texture.wrap.map(wrap);
+    let bit = |is: bool, bit: u32| if is { bit } else { 0 };
+    let placed = texels.place(texture.image, is_color, texture.is_mipmapped);
+    let row = |row: [f32; 3]| [row[0], row[1], row[2], 0.0];
+    TextureRecord {
+        first: placed.first,
+        size: placed.width | (placed.height << 16),
+        flags: u
+            | (v << 2)
+            | bit(texture.is_linear, LINEAR_BIT)
+            | bit(is_color, SRGB_BIT)
+            | bit(texture.uv_set == 1, SECOND_UV_BIT),
+        levels: placed.levels,
+        transform: texture.transform.map(row),
+    }
+}

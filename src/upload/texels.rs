@@ -1,0 +1,92 @@
+//! All images in one array of texels, each with smaller versions of itself.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use crate::{
+    image::{srgb_decode, srgb_encode},
+    scene::Image,
+};
+
+/// An image among the texels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    /// Index of its first texel.
+    pub first: u32,
+    pub width: u32,
+    pub height: u32,
+    /// The image, and versions of half the size each that follow it.
+    pub levels: u32,
+}
+
+/// The texels that materials need.
+pub(super) struct Texels<'a> {
+    images: &'a [Image],
+    words: Vec<u32>,
+    known: HashMap<(u32, bool, bool), Placed>,
+}
+
+impl<'a> Texels<'a> {
+    pub fn new(images: &'a [Image]) -> Self {
+        Self { images, words: Vec::new(), known: HashMap::new() }
+    }
+
+    /// Where an image lies, which is added at its first use. `is_color`: it is averaged as colours
+    /// by the sRGB curve, weighted by their opacity. `is_mipmapped`: with smaller versions.
+    pub fn place(&mut self, image: u32, is_color: bool, is_mipmapped: bool) -> Placed {
+        if let Some(placed) = self.known.get(&(image, is_color, is_mipmapped)) {
+            return *placed;
+        }
+        let source = &self.images[image as usize];
+        let first = self.words.len() as u32;
+        self.words.extend(source.texels.iter().map(|texel| u32::from_le_bytes(*texel)));
+        let (mut width, mut height, mut levels) = (source.width, source.height, 1);
+        let mut level: Vec<[u8; 4]> = Vec::new();
+        while is_mipmapped && (width > 1 || height > 1) {
+            let finer = if levels == 1 { &source.texels } else { &level };
+            level = halved(finer, (width, height), is_color);
+            (width, height, levels) = ((width / 2).max(1), (height / 2).max(1), levels + 1);
+            self.words.extend(level.iter().map(|texel| u32::from_le_bytes(*texel)));
+        }
+        let placed = Placed { first, width: source.width, height: source.height, levels };
+        self.known.insert((image, is_color, is_mipmapped), placed);
+        placed
+    }
+
+    pub fn into_words(self) -> Vec<u32> {
+        self.words
+    }
+}
+
+/// An image of half the size: each texel is the mean of those that it covers, two by two, or three
+/// where the size is odd.
+fn halved(finer: &[[u8; 4]], (width, height): (u32, u32), is_color: bool) -> Vec<[u8; 4]> {
+    let linear: Vec<f32> = (0..=255_u8)
+        .map(|byte| if is_color { srgb_decode(f32::from(byte) / 255.0) } else { f32::from(byte) })
+        .collect();
+    let (columns, rows) = ((width / 2).max(1), (height / 2).max(1));
+    let covered = |i: u32, halves: u32, whole: u32| {
+        let end = if i + 1 == halves { whole } else { 2 * i + 2 };
+        2 * i..end
+    };
+    let texel = |i: u32| {
+        let (mut sum, mut weight, mut count) = ([0.0; 4], 0.0, 0.0);
+        for y in covered(i / columns, rows, height) {
+            for x in covered(i % columns, columns, width) {
+                let [r, g, b, a] = finer[(y * width + x) as usize];
+                // What is not there has no colour.
+                let own = if is_color { f32::from(a).max(1e-3) } else { 1.0 };
+                for (sum, value) in sum.iter_mut().zip([r, g, b]) {
+                    *sum += own * linear[usize::from(value)];
+                }
+                sum[3] += f32::from(a);
+                weight += own;
+                count += 1.0;
+            }
+        }
+        let stored = |value: f32| if is_color { (255.0 * srgb_encode(value) + 0.5) as u8 } else { (value + 0.5) as u8 };
+        [stored(sum[0] / weight), stored(sum[1] / weight), stored(sum[2] / weight), (sum[3] / count + 0.5) as u8]
+    };
+    (0..columns * rows).into_par_iter().map(texel).collect()
+}
