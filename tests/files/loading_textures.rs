@@ -4,7 +4,9 @@ use base64::Engine as _;
 use caustica::scene::{LoadOptions, Scene, Surface, Texture, Wrap};
 use glam::Vec3;
 use image::{DynamicImage, ImageFormat, Rgb, Rgba};
+use proptest::prelude::*;
 use serde_json::{Value, json};
+use support::any_scene;
 use support::gltf::{lambert, load, loaded, message, push, read_with};
 
 use super::pictures::{add_texture, encoded, four, image_uri, png, textured, uniform};
@@ -345,6 +347,33 @@ fn other_sources_are_taken_where_they_are_read() {
 }
 
 #[test]
+fn ktx2_is_refused_by_name_and_its_fallback_taken() {
+    let mut gltf = textured();
+    gltf["extensionsUsed"].as_array_mut().expect("a list").push("KHR_texture_basisu".into());
+    let packed = push(&mut gltf, "images", image_uri(b"\xabKTX 20\xbb\r\n\x1a\n"));
+    gltf["textures"][0]["extensions"] = json!({ "KHR_texture_basisu": { "source": packed } });
+    let scene = loaded(&gltf);
+    assert_eq!(
+        (scene.images[0].width, &scene.warnings[..]),
+        (2, &["extension KHR_texture_basisu is not read".to_owned()][..])
+    );
+    gltf["textures"][0] = json!({ "extensions": { "KHR_texture_basisu": { "source": packed } } });
+    gltf["extensionsRequired"] = json!(["KHR_texture_basisu"]);
+    let said = "extensionsRequired[0]: KHR_texture_basisu is not supported; `load.ignore_required` KHR_texture_basisu reads the \
+                file without it";
+    assert_eq!(message(load(&gltf)), said);
+    let ignore_required = vec!["KHR_texture_basisu".to_owned()];
+    let read = read_with(&gltf, &LoadOptions { ignore_required, ..LoadOptions::default() });
+    let without = read.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(without.materials[0].textures.base_color, None);
+    gltf["extensionsRequired"] = json!([]);
+    gltf["textures"][0] = json!({ "source": packed });
+    assert_eq!(message(load(&gltf)), "images[1]: the image is KTX2, which is not read");
+    gltf["textures"][0] = json!({ "extensions": { "KHR_texture_basisu": { "source": 7 } } });
+    assert_eq!(message(load(&gltf)), "textures[0].extensions.KHR_texture_basisu.source: 7 of 2");
+}
+
+#[test]
 fn the_hash_covers_the_images_beside_the_scene() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut gltf = textured();
@@ -362,4 +391,42 @@ fn the_hash_covers_the_images_beside_the_scene() {
     std::fs::write(folder.path().join("my image.png"), b"").expect("a temporary file");
     let empty = Scene::load(&path).expect_err("no image").to_string();
     assert!(empty.ends_with(r#"images[0]: "my%20image.png" is neither PNG, JPEG nor WebP"#), "{empty}");
+}
+
+/// The richest file of the corpus: all properties, textures and formats of images.
+fn rich() -> Vec<u8> {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/scene/materials_and_images.gltf");
+    std::fs::read(path).expect("it is there")
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// With any bytes of a textured file changed, it is read as a sound scene or refused.
+    #[test]
+    fn damaged_textured_files_never_panic(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4)) {
+        let mut bytes = rich();
+        for (at, value) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = if value < 200 { b"0123456789-.e,:[]{}\"x"[value as usize % 21] } else { value };
+        }
+        let _ = any_scene::check(&bytes);
+    }
+
+    /// The same for the bytes of images.
+    #[test]
+    fn damaged_images_never_panic(
+        format in prop::sample::select(vec![ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP]),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+    ) {
+        let mut bytes = encoded(DynamicImage::from(four()).to_rgb8(), format);
+        for (at, value) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        if let Ok(scene) = showing(&bytes) {
+            let image = &scene.images[0];
+            prop_assert_eq!(image.texels.len(), image.width as usize * image.height as usize);
+        }
+    }
 }

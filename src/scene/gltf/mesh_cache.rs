@@ -5,6 +5,7 @@ use std::collections::{HashMap, hash_map::Entry::Vacant};
 
 use glam::DMat4;
 use gltf::json::mesh::Primitive;
+use rayon::prelude::*;
 
 use super::accessor::Document;
 use super::attributes;
@@ -163,14 +164,17 @@ impl<'d> MeshCache<'d> {
         worlds: &[DMat4],
         materials: &MaterialTable,
     ) -> Read<()> {
-        for &(mesh, weighted, joints) in &self.keys {
+        let read = |&(mesh, weighted, joints): &MeshKey| {
             let weights = match weighted {
                 Some(node) => document.root.nodes[node].weights.as_deref(),
                 None => document.root.meshes[mesh].weights.as_deref(),
             };
             let deformation = Deformation { weights: weights.unwrap_or_default(), joints };
-            self.meshes.push(meshes::read(document, mesh, &shapes[mesh], deformation, materials)?);
-        }
+            meshes::read(document, mesh, &shapes[mesh], deformation, materials)
+        };
+        let meshes: Vec<Read<Vec<MeshPrimitive>>> = self.keys.par_iter().map(read).collect();
+        // Of several faults the first one counts.
+        self.meshes = meshes.into_iter().collect::<Read<_>>()?;
         for skin in self.entries.iter().filter_map(|entry| entry.skin) {
             if let Vacant(place) = self.poses.entry(skin) {
                 place.insert(skins::pose(document, skin, worlds)?);

@@ -100,18 +100,11 @@ fn extension_source(texture: &json::Texture, name: &str, place: &str) -> Read<Op
 /// [`check`].
 pub(super) fn image(root: &json::Root, index: usize, notes: &mut Notes) -> Read<Option<usize>> {
     let (texture, place) = (&root.textures[index], format!("textures[{index}]"));
-    let own = own_source(texture);
-    if let Some(source) = extension_source(texture, WEBP, &place)? {
-        return Ok(Some(source));
+    let source = extension_source(texture, WEBP, &place)?.or(own_source(texture));
+    if source.is_none() {
+        notes.add(format!("{place} names no image that can be read, and is left out"));
     }
-    let basis = extension_source(texture, BASISU, &place)?.is_some();
-    match own {
-        Some(_) if basis => notes.add(format!("{BASISU} is not read: textures show their other images")),
-        None if basis => return fault(format!("{place}.extensions.{BASISU}"), "images in KTX2 (Basis) are not read"),
-        None => notes.add(format!("{place} names no image that can be read, and is left out")),
-        Some(_) => {}
-    }
-    Ok(own)
+    Ok(source)
 }
 
 /// A texture without its image: the TEXCOORD_n that it is placed by, and how it is sampled. `place`
