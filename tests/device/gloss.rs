@@ -103,7 +103,7 @@ fn gloss_is_the_formula() {
         };
         let (found, wrong) = (error(Masking::Correlated), error(Masking::Separable));
         assert!(found < 3e-3, "roughness {roughness}, cosine {mu}: off by {found}");
-        assert!(roughness < 0.4 || wrong > 3e-2, "control: separable masking is off by {wrong} only");
+        assert!(roughness < 0.6 || mu > 0.8 || wrong > 1e-2, "control: separable masking is off by {wrong} only");
     }
 }
 
@@ -181,17 +181,20 @@ fn weights_of_gloss_are_bounded() {
         let once = Lobe::once(roughness, 1.0);
         let found = most(once, once, mu);
         assert!(found < 1.003, "roughness {roughness}, cosine {mu}: {found}");
-        let narrow = Lobe::once(0.8 * roughness, 1.0);
+        let narrow = Lobe::once(0.6 * roughness, 1.0);
         let wrong = most(once, narrow, mu);
-        assert!(wrong > 1.1, "control: the density of a narrower lobe, roughness {roughness}, cosine {mu}: {wrong}");
+        assert!(
+            mu > 0.8 || wrong > 1.1,
+            "control: the density of a narrower lobe, roughness {roughness}, cosine {mu}: {wrong}"
+        );
         let metal = Lobe::metal(roughness, 1.0);
         let found = most(metal, metal, mu);
         assert!(found < 2.0, "with repeated reflections, roughness {roughness}, cosine {mu}: {found}");
     }
 }
 
-/// Reflected fractions of materials.md, made by another program: masking, roughness, then a fraction
-/// for each of `COSINES`.
+/// Reflected fractions of materials.md, made by another program: masking, roughness, then a
+/// fraction for each of `COSINES`.
 const INTEGRATED: [(Masking, f32, [f64; 6]); 6] = [
     (Masking::Separable, 0.4, [0.8669, 0.8832, 0.9259, 0.9505, 0.9635, 0.9676]),
     (Masking::Separable, 0.6, [0.8243, 0.7793, 0.7764, 0.7929, 0.8142, 0.8243]),

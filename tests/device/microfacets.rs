@@ -1,5 +1,5 @@
-//! Microfacet lobes in f64, as glTF 2.0 and its extensions define them, and integrals over them. The
-//! normal is +Y.
+//! Microfacet lobes in f64, as glTF 2.0 and its extensions define them, and integrals over them.
+//! The normal is +Y.
 
 use std::f64::consts::{PI, TAU};
 
@@ -100,9 +100,9 @@ impl Facets {
         (0..side * side).map(at).collect()
     }
 
-    /// BSDF of a rough dielectric for radiance from `l` to `v` (Walter's equations 20 and 21), `eta`
-    /// the index on the far side over that on the side of `v`. The value of what goes through is
-    /// that for light of the far side.
+    /// BSDF of a rough dielectric for radiance from `l` to `v` (Walter's equations 20 and 21),
+    /// `eta` the index on the far side over that on the side of `v`. The value of what goes through
+    /// is that for light of the far side.
     pub fn walter(self, v: DVec3, l: DVec3, eta: f64) -> f64 {
         if l.y > 0.0 {
             let h = (v + l).normalize();

@@ -72,7 +72,12 @@ fn view(mu: f64) -> DVec3 {
 /// Roughness, index and cosine of the viewer.
 fn cases() -> impl Iterator<Item = (f32, f32, f64)> {
     let lobes = [0.05, 0.1, 0.3, 0.6, 1.0].into_iter().flat_map(|r| [1.5, 1.0 / 1.5, 1.2].map(|eta| (r, eta)));
-    lobes.flat_map(|(roughness, eta)| [0.15, 0.5, 0.95].map(|mu| (roughness, eta, mu)))
+    lobes.flat_map(|(roughness, eta)| [0.15, 0.8, 0.95].map(|mu| (roughness, eta, mu)))
+}
+
+/// Whether a smooth surface lets light through, well within the critical angle.
+fn refracts(eta: f32, mu: f64) -> bool {
+    (1.0 - mu * mu) / f64::from(eta * eta) < 0.9
 }
 
 #[test]
@@ -83,7 +88,8 @@ fn rough_glass_is_walters() {
         let error = |glass: Glass, eta: f32| {
             let of = |(l, found): (&Vec3, &[f32; 4])| {
                 let (l, eta) = (l.as_dvec3().normalize_or_zero(), f64::from(eta));
-                // At the horizon, at grazing microfacets and at their critical angle f32 has fewer digits.
+                // At the horizon, at grazing microfacets and at their critical angle f32 has fewer
+                // digits.
                 let h = if l.y > 0.0 { v + l } else { v + eta * l };
                 let cosine = v.dot(h.normalize_or_zero()).abs();
                 let steep = (1.0 - (1.0 - cosine * cosine) / (eta * eta)).abs() < 2e-2;
@@ -96,8 +102,9 @@ fn rough_glass_is_walters() {
         };
         let found = error(glass, eta);
         assert!(found < 1e-2, "{glass:?}, cosine {mu}: off by {found}");
-        assert!(error(glass, 1.1 * eta) > 5e-2, "control: another index than {glass:?}");
-        assert!(error(Glass { flux: true, ..glass }, eta) > 5e-2, "control: flux, {glass:?}");
+        assert!(!refracts(eta, mu) || error(glass, 1.1 * eta) > 5e-2, "control: another index than {glass:?}");
+        let of_flux = error(Glass { flux: true, ..glass }, eta);
+        assert!(!refracts(eta, mu) || of_flux > 5e-2, "control: flux, {glass:?}");
     }
 }
 
@@ -148,7 +155,7 @@ fn rough_glass_directions_follow_their_density() {
     for (glass, mu) in solids.chain(sheets) {
         let (found, whole) = samples_against_density(glass, glass, view(mu));
         assert!(found.fits(), "{glass:?}, cosine {mu}: {found:?}, the density integrates to {whole}");
-        assert!(whole < 1.001 && whole > 0.7, "{glass:?}, cosine {mu}: the density integrates to {whole}");
+        assert!(whole < 1.001 && whole > 0.5, "{glass:?}, cosine {mu}: the density integrates to {whole}");
         let other = Glass { roughness: 0.93 * glass.roughness, ..glass };
         let (wrong, _) = samples_against_density(other, glass, view(mu));
         assert!(!wrong.fits(), "control: {other:?}, cosine {mu}: {wrong:?}");
@@ -157,7 +164,7 @@ fn rough_glass_directions_follow_their_density() {
 
 #[test]
 fn flux_through_rough_glass_is_radiance_the_other_way() {
-    for (roughness, eta, mu) in cases().filter(|(_, _, mu)| *mu > 0.2) {
+    for (roughness, eta, mu) in cases().filter(|(_, eta, mu)| refracts(*eta, *mu)) {
         let (glass, v) = (Glass { flux: true, ..Glass::solid(roughness, eta) }, view(mu));
         let directions: Vec<Vec3> =
             glass.samples(v, even_numbers(EVEN / 4)).into_iter().filter(|l| l.y < -0.1).collect();
@@ -190,7 +197,7 @@ fn rough_glass_keeps_the_energy_of_walters_integrals() {
                 false => glass.facets().reflections(v, side),
             };
             let of = |(l, angle): (DVec3, f64)| glass.facets().walter(v, l, eta) * l.y.abs() * angle;
-            points.into_iter().filter(|(l, _)| (l.y < 0.0) == through).map(of).sum()
+            points.into_iter().filter(|(l, angle)| *angle > 0.0 && (l.y < 0.0) == through).map(of).sum()
         };
         let eta = f64::from(eta);
         let (expected, passed) = (integral(eta, false), integral(eta, true) * eta * eta);
@@ -202,8 +209,8 @@ fn rough_glass_keeps_the_energy_of_walters_integrals() {
         );
         assert!(all < 1.001, "{glass:?}, {mu}: {all}");
         assert!((2.0 * half - all - reflected).abs() < 1e-4, "{glass:?}, {mu}: half is tinted, {half} of {all}");
-        let other = integral(1.2 * eta, true) * (1.2 * eta).powi(2);
-        assert!((other - passed).abs() > 5e-3, "control: another index, {glass:?}, {mu}: {other} for {passed}");
+        let other = (integral(1.6 * eta, false) - expected, integral(1.6 * eta, true) * (1.6 * eta).powi(2) - passed);
+        assert!(other.0.abs().max(other.1.abs()) > 1e-2, "control: another index, {glass:?}, {mu}: {other:?}");
         let radiance = Glass { flux: false, ..glass }.means(v);
         let scaled = (radiance[0] - radiance[2]) * eta * eta;
         assert!((scaled - passed).abs() < 8e-3, "{glass:?}, {mu}: radiance {scaled}");
