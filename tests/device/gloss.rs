@@ -27,11 +27,13 @@ struct Lobe {
     repeated: bool,
     /// Shading normal (slope, 1, 0).
     slope: f32,
+    /// Strength of the anisotropy along x.
+    strength: f32,
 }
 
 impl Lobe {
     fn once(roughness: f32, f0: f32) -> Self {
-        Self { roughness, f0, repeated: false, slope: 0.0 }
+        Self { roughness, f0, repeated: false, slope: 0.0, strength: 0.0 }
     }
 
     fn metal(roughness: f32, f0: f32) -> Self {
@@ -39,12 +41,13 @@ impl Lobe {
     }
 
     fn facets(self) -> Facets {
-        Facets::of_roughness(self.roughness.into())
+        let alpha = f64::from(self.roughness).powi(2);
+        Facets { along: alpha + (1.0 - alpha) * f64::from(self.strength).powi(2), across: alpha }
     }
 
     fn row(self, a: Vec3, view: DVec3) -> Row {
         let f0 = if self.repeated { self.f0 } else { -self.f0 };
-        [[a.x, a.y, a.z, self.roughness], [view.x as f32, view.z as f32, f0, self.slope]]
+        [[a.x, a.y, a.z, self.roughness], [view.x as f32, view.z as f32, f0, self.slope - self.strength]]
     }
 
     fn run(self, probe: &str, view: DVec3, numbers: impl IntoIterator<Item = Vec3>) -> Vec<[f32; 4]> {
@@ -88,8 +91,10 @@ fn view(mu: f64) -> DVec3 {
 
 #[test]
 fn gloss_is_the_formula() {
-    for (roughness, mu) in ROUGHNESSES.into_iter().flat_map(|r| COSINES.map(|mu| (r, mu))) {
-        let (lobe, v) = (Lobe::once(roughness, 0.3), view(mu));
+    let strengths = |(roughness, mu): (f32, f64)| [0.0, 0.3, 0.8].map(|strength| (roughness, mu, strength));
+    let all = ROUGHNESSES.into_iter().flat_map(|r| COSINES.map(|mu| (r, mu)));
+    for (roughness, mu, strength) in all.flat_map(strengths) {
+        let (lobe, v) = (Lobe { strength, ..Lobe::once(roughness, 0.3) }, view(mu));
         let directions = lobe.even_samples(v);
         let values = lobe.values(v, directions.iter().copied());
         let error = |masking: Masking| {
@@ -102,7 +107,7 @@ fn gloss_is_the_formula() {
             directions.iter().zip(&values).map(of).fold(0.0, f64::max)
         };
         let (found, wrong) = (error(Masking::Correlated), error(Masking::Separable));
-        assert!(found < 3e-3, "roughness {roughness}, cosine {mu}: off by {found}");
+        assert!(found < 3e-3, "{lobe:?}, cosine {mu}: off by {found}");
         assert!(roughness < 0.6 || mu > 0.8 || wrong > 1e-2, "control: separable masking is off by {wrong} only");
     }
 }
@@ -137,8 +142,9 @@ fn samples_against_density(drawn: Lobe, lobe: Lobe, v: DVec3) -> (Deviate, f64) 
 #[test]
 fn glossy_directions_follow_their_density() {
     for roughness in [0.05, 0.1, 0.3, 0.6, 1.0] {
-        for (mu, repeated) in [(0.1, false), (0.5, true), (0.95, false), (0.95, true)] {
-            let lobe = Lobe { repeated, ..Lobe::once(roughness, 0.9) };
+        let cases = [(0.1, false, 0.0), (0.5, true, 0.0), (0.95, false, 0.0), (0.95, true, 0.0)];
+        for (mu, repeated, strength) in cases.into_iter().chain([(0.2, false, 0.4), (0.7, false, 0.8)]) {
+            let lobe = Lobe { repeated, strength, ..Lobe::once(roughness, 0.9) };
             let (found, whole) = samples_against_density(lobe, lobe, view(mu));
             assert!(found.fits(), "{lobe:?}, cosine {mu}: {found:?}, the density integrates to {whole}");
             assert!(whole < 1.001 && whole > 0.6, "{lobe:?}, cosine {mu}: the density integrates to {whole}");
