@@ -8,6 +8,7 @@
 //! | reciprocity | value over cosine is symmetric | the value itself |
 //! | weights | value over density is at most 1, and bounded for repeated reflections | the density of another roughness |
 //! | furnace | white metal reflects all; without repeated reflections what was integrated elsewhere | separable masking; no compensation |
+//! | extremes | numbers are finite at the horizon, behind the shading normal and for narrow lobes | |
 //! | estimate | the mean weight is the integral in f64 | another roughness |
 
 use glam::{DVec3, Vec3, vec3};
@@ -252,5 +253,26 @@ fn mean_weights_are_the_albedo() {
         assert!((guess / right - 1.0).abs() < 0.11, "roughness {roughness}, cosine {mu}: {guess} for {right}");
         let blind = fitted(Lobe { f0: 0.15, ..lobe });
         assert!(mu < 0.6 || (blind / right - 1.0).abs() > 0.11, "control: another reflectance, {roughness}, {mu}");
+    }
+}
+
+#[test]
+fn gloss_is_finite_at_extremes() {
+    let views =
+        [1e-7, 1e-4, 0.05, 1.0 - 1e-7, 1.0].into_iter().flat_map(|mu| [0.0, 3.1].map(|turn| at_cosine(mu, turn)));
+    for (v, roughness) in views.flat_map(|v| [0.01, 0.05, 1.0].map(|r| (v, r))) {
+        for lobe in [Lobe::metal(roughness, 1.0), Lobe { strength: 1.0, ..Lobe::once(roughness, 0.0) }] {
+            // With the second azimuth the viewer can be behind the shading normal.
+            for lobe in [lobe, Lobe { slope: 0.5, strength: 0.0, ..lobe }] {
+                let corners = [0.0, 0.5, 1.0 - f32::EPSILON].map(|x| [0.0, 0.3, 1.0 - f32::EPSILON].map(|y| (x, y)));
+                let numbers = corners.into_iter().flatten().flat_map(|(x, y)| [0.0, 0.999].map(|z| vec3(x, y, z)));
+                let drawn = lobe.run("probe_gloss", v, numbers);
+                let directions = drawn.iter().map(|d| Vec3::from_slice(d));
+                assert!(directions.clone().all(|d| (d.length() - 1.0).abs() < 1e-4), "{lobe:?}, {v}: {drawn:?}");
+                let values = lobe.values(v, directions);
+                let sound = |v: &[f32; 4]| v.iter().all(|x| x.is_finite() && *x >= 0.0);
+                assert!(values.iter().all(sound), "{lobe:?}, {v}: {values:?}");
+            }
+        }
     }
 }

@@ -1,4 +1,5 @@
-//! Sheen and clear coats: value, samples and albedo against the formulas of their extensions in f64.
+//! Sheen and clear coats: value, samples and albedo against the formulas of their extensions in
+//! f64.
 
 use std::f64::consts::PI;
 
@@ -63,7 +64,11 @@ fn sheen_is_the_formula_of_its_extension() {
         };
         assert!(error(roughness) < 5e-3, "roughness {roughness}, cosine {mu}: off by {}", error(roughness));
         let dark = roughness < 0.2 && mu > 0.4;
-        assert!(dark || error(0.95 * roughness) > 2e-2, "control: another roughness is off by {}", error(0.95 * roughness));
+        assert!(
+            dark || error(0.95 * roughness) > 2e-2,
+            "control: another roughness is off by {}",
+            error(0.95 * roughness)
+        );
     }
 }
 

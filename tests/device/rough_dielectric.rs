@@ -239,3 +239,22 @@ fn rough_sheets_reflect_as_panes() {
         assert!((reflected - one).abs() > 8e-3, "control: one face, {sheet:?}, {mu}: {one}");
     }
 }
+
+#[test]
+fn rough_glass_is_finite_at_extremes() {
+    let corners = [0.0, 0.5, 1.0 - f32::EPSILON].map(|x| [0.0, 0.3, 1.0 - f32::EPSILON].map(|y| (x, y)));
+    for (mu, roughness) in [1e-7, 1e-4, 0.05, 1.0].into_iter().flat_map(|mu| [0.01, 0.05, 1.0].map(|r| (mu, r))) {
+        for eta in [1.0 / 2.4, 0.99, 1.0, 1.01, 2.4] {
+            let glass = Glass::solid(roughness, eta);
+            for glass in [glass, Glass { thin: true, ..glass }] {
+                let numbers = corners.into_iter().flatten().flat_map(|(x, y)| [0.0, 0.999].map(|z| Vec3::new(x, y, z)));
+                let directions = glass.samples(view(mu), numbers);
+                let sound = |l: &Vec3| *l == Vec3::ZERO || (l.length() - 1.0).abs() < 1e-4;
+                assert!(directions.iter().all(sound), "{glass:?}, {mu}: {directions:?}");
+                let values = glass.values(view(mu), &directions);
+                let sound = |v: &[f32; 4]| v.iter().all(|x| x.is_finite() && *x >= 0.0);
+                assert!(values.iter().all(sound), "{glass:?}, {mu}: {values:?}");
+            }
+        }
+    }
+}
