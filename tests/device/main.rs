@@ -6,11 +6,15 @@ mod determinism;
 mod emitter_sampling;
 mod faults;
 mod fresnel;
+mod gloss;
 mod kd_tree;
-
+mod layers;
 mod light_sampling;
 mod limits;
+mod losses;
+mod microfacets;
 mod nearest;
 mod probe;
+mod rough_dielectric;
 mod sampling;
 mod traversal;

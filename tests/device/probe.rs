@@ -8,6 +8,7 @@ use caustica::{
     },
     upload::{SceneBuffers, light_buffers::ChoiceBuffer},
 };
+use glam::Vec3;
 use support::{gpu, photons::Random};
 
 /// Input row of a probe, `a` and `b` in the shader.
@@ -54,4 +55,10 @@ fn find(stem: &str) -> &'static Shader {
 pub fn rows(count: usize, b: [f32; 4]) -> Vec<Row> {
     let mut random = Random(77);
     (0..count).map(|_| [[0; 4].map(|_| random.unit()), b]).collect()
+}
+
+/// Numbers in [0, 1)³ that are more even than independent ones (Roberts 2018).
+pub fn even_numbers(count: usize) -> impl Iterator<Item = Vec3> {
+    let steps = [0.819_172_513_4, 0.671_043_606_7, 0.549_700_477_9];
+    (1..=count).map(move |i| Vec3::from(steps.map(|step: f64| (i as f64 * step).fract() as f32)))
 }
