@@ -115,7 +115,7 @@ pub const PANE: u32 = 3;
 pub const LAYERED: u32 = 4;
 
 /// Texels of a [`MaterialRecord`].
-pub const MATERIAL_TEXELS: u32 = 9;
+pub const MATERIAL_TEXELS: u32 = 14;
 
 /// Bits of [`MaterialRecord::flags`]: the back emits as much as the front; the surface is there
 /// where its opacity reaches the cutoff; its opacity is its coverage.
@@ -124,6 +124,8 @@ pub const MASK_BIT: u32 = 2;
 pub const BLEND_BIT: u32 = 4;
 /// Photons that the lobes beside the diffuse one scatter are caustic photons.
 pub const CAUSTIC_BIT: u32 = 8;
+/// The surface is seen in its base colour, whatever lights it.
+pub const UNLIT_BIT: u32 = 16;
 
 /// Factors of a material, and where its textures are.
 #[repr(C)]
@@ -142,23 +144,36 @@ pub struct MaterialRecord {
     pub metallic: f32,
     /// Fraction of the light within glass that is transmitted.
     pub transmission: f32,
-    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`CAUSTIC_BIT`].
+    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`CAUSTIC_BIT`], [`UNLIT_BIT`].
     pub flags: u32,
     /// Reflectance of the coat along the normal, without its strength.
     pub f0: [f32; 3],
     /// Strength of the coat.
     pub specular: f32,
-    pub clearcoat: f32,
-    pub clearcoat_roughness: f32,
     pub normal_scale: f32,
     pub opacity: f32,
     /// Opacity from which on a masked surface is there.
     pub cutoff: f32,
-    pub pad: [u32; 3],
+    /// Fraction of the diffuse light that leaves on the other side, and its colour.
+    pub diffuse_transmission: f32,
+    pub diffuse_transmission_color: [f32; 3],
+    pub clearcoat: f32,
+    pub clearcoat_roughness: f32,
+    pub clearcoat_normal_scale: f32,
+    pub anisotropy: f32,
+    /// Radians.
+    pub anisotropy_rotation: f32,
+    pub sheen_color: [f32; 3],
+    pub sheen_roughness: f32,
+    pub iridescence: f32,
+    pub iridescence_ior: f32,
+    /// Thickness of the film where its texture is 0 and where it is 1, nanometres.
+    pub iridescence_thickness: [f32; 2],
     /// Texels of the table of materials where the [`TextureRecord`]s begin, 0 for none: base
-    /// colour, metallic and roughness, normal, emission, specular, specular colour, transmission,
-    /// clearcoat, roughness of the clearcoat.
-    pub textures: [[u32; 4]; 3],
+    /// colour, metallic and roughness, normal, emission; specular, specular colour, transmission,
+    /// diffuse transmission; its colour, clear coat, its roughness, its normal; sheen, its
+    /// roughness, anisotropy, iridescence; thickness of the film.
+    pub textures: [[u32; 4]; 5],
 }
 
 /// A texture of a material.
@@ -202,8 +217,6 @@ pub struct Attributes {
     pub pad: u32,
 }
 
-/// Entries of the table of albedos along each side.
-pub const ALBEDO_STEPS: u32 = 32;
 /// Texels of [`Attributes`].
 pub const ATTRIBUTE_TEXELS: u32 = 7;
 
@@ -217,7 +230,8 @@ pub struct Medium {
     pub ior: f32,
     /// Absorption coefficient, 1/m.
     pub absorption: [f32; 3],
-    pub pad: u32,
+    /// 20 over the Abbe number; 0 for an index that does not depend on the wavelength.
+    pub dispersion: f32,
 }
 
 /// Kinds of [`Light`]. First the punctual lights.
@@ -353,9 +367,10 @@ pub struct VisiblePoint {
     pub media_high: u32,
     /// Unit, to the viewer.
     pub view: [f32; 3],
-    /// Coat above the diffuse base: reflectance along the normal and at grazing angles, two halves;
-    /// 0 for none.
-    pub coat: u32,
+    /// What lies above the diffuse lobe, eight bits each: roots of the reflectances of a coat along
+    /// the normal and at grazing angles, strongest colour of the sheen and its roughness. 0 for
+    /// nothing.
+    pub above: u32,
 }
 
 /// Lights of [`LobePoint`]s.
@@ -368,7 +383,8 @@ pub struct LobeLight {
     pub pad2: u32,
 }
 
-/// Vertex of a camera path at which a rough lobe is lit.
+/// Vertex of a camera path at which rough lobes are lit. Unit vectors are octahedral, see
+/// [`octahedral`]; `ng` and `ns` as in [`VisiblePoint`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LobePoint {
@@ -378,21 +394,28 @@ pub struct LobePoint {
     pub offset: f32,
     /// Weight of the path before the lobe.
     pub beta: [f32; 3],
-    /// Width of GGX.
-    pub alpha: f32,
-    /// Reflectance along the normal and at grazing angles; of rough glass `f0` is the tint of what
-    /// is transmitted.
-    pub f0: [f32; 3],
-    /// n_b/n_a of rough glass, −1 of a rough pane; 0 of a lobe that reflects.
+    /// n_b/n_a of rough glass, negative for a sheet of it; 0 for lobes that only reflect.
     pub eta: f32,
-    pub f90: [f32; 3],
-    /// Geometric and interpolated normal, and direction to the viewer, octahedral.
     pub ng: u32,
-    /// Factor of compensated multiple scattering.
-    pub compensation: [f32; 3],
     pub ns: u32,
+    /// Direction to the viewer.
     pub view: u32,
-    pub pad: [u32; 3],
+    pub tangent: u32,
+    /// Widths of GGX along the tangent and across it, two halves.
+    pub alpha: u32,
+    /// Halves, as all that follow: reflectance along the normal; of rough glass the tint of what is
+    /// transmitted.
+    pub f0: [u32; 2],
+    /// Strength of the clear coat and its width.
+    pub clearcoat: u32,
+    /// Reflectance at grazing angles.
+    pub f90: [u32; 2],
+    /// Factor of light that is reflected more than once.
+    pub compensation: [u32; 2],
+    pub clearcoat_normal: u32,
+    /// Colour and roughness of the sheen.
+    pub sheen: [u32; 2],
+    pub pad: u32,
 }
 
 /// Counters of a batch of paths; see `shaders/lib/core/queue.wesl`. A batch has at most 2^18 paths

@@ -1,7 +1,6 @@
 //! All that emits light, as one list and the tables that choose from it: punctual lights, emissive
 //! triangles and spheres, the environment. Host only; `upload` puts it on the device.
 
-pub mod albedos;
 mod cumulative;
 pub mod environment_map;
 mod light_media;

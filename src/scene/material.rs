@@ -116,6 +116,8 @@ pub struct Medium {
     pub tint: Vec3,
     /// Absorption coefficient of each channel, 1/m, at least 0.
     pub absorption: Vec3,
+    /// 20 over the Abbe number, at least 0.
+    pub dispersion: f32,
 }
 
 /// How much of a surface is there.
@@ -155,6 +157,8 @@ pub struct Textures {
     pub clearcoat: Option<Texture>,
     /// G: roughness of the clearcoat.
     pub clearcoat_roughness: Option<Texture>,
+    /// As `normal`, of the clearcoat.
+    pub clearcoat_normal: Option<Texture>,
     /// RGB, sRGB: colour of the sheen.
     pub sheen_color: Option<Texture>,
     /// A: roughness of the sheen.
@@ -174,7 +178,7 @@ pub struct Textures {
 impl Textures {
     /// All of them with the name of their property, in the order of the fields.
     #[must_use]
-    pub fn named(&self) -> [(&'static str, Option<Texture>); 16] {
+    pub fn named(&self) -> [(&'static str, Option<Texture>); 17] {
         [
             ("base colour", self.base_color),
             ("metallic and roughness", self.metallic_roughness),
@@ -185,6 +189,7 @@ impl Textures {
             ("transmission", self.transmission),
             ("clearcoat", self.clearcoat),
             ("clearcoat roughness", self.clearcoat_roughness),
+            ("clearcoat normal", self.clearcoat_normal),
             ("sheen colour", self.sheen_color),
             ("sheen roughness", self.sheen_roughness),
             ("anisotropy", self.anisotropy),
@@ -218,6 +223,8 @@ pub struct Material {
     pub clearcoat: f32,
     /// Roughness of the clear coat, 0 to 1.
     pub clearcoat_roughness: f32,
+    /// Factor on the x and y of its normal map.
+    pub clearcoat_normal_scale: f32,
     /// Colour of the sheen of fibres, each channel 0 to 1 (KHR_materials_sheen).
     pub sheen_color: Vec3,
     /// Roughness of the sheen, 0 to 1.
@@ -282,6 +289,7 @@ impl Material {
             absorption: Vec3::ZERO,
             clearcoat: 0.0,
             clearcoat_roughness: 0.0,
+            clearcoat_normal_scale: 1.0,
             sheen_color: Vec3::ZERO,
             sheen_roughness: 0.0,
             anisotropy: 0.0,
@@ -315,11 +323,23 @@ impl Material {
         is_clear && self.roughness <= CAUSTIC_ROUGHNESS
     }
 
+    /// Whether an opaque surface has more than a base: clear coat, sheen, anisotropy, iridescence or
+    /// diffuse transmission.
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        let is_finished = self.clearcoat > 0.0
+            || self.sheen_color != Vec3::ZERO
+            || self.anisotropy > 0.0
+            || self.iridescence > 0.0
+            || self.diffuse_transmission > 0.0;
+        is_finished && !self.unlit && (!self.surface.transmits() || self.transmission < 1.0)
+    }
+
     /// Medium inside the solid that the surface bounds.
     #[must_use]
     pub fn medium(&self) -> Option<Medium> {
         match self.surface {
-            Surface::Glass { ior, tint } => Some(Medium { ior, tint, absorption: self.absorption }),
+            Surface::Glass { ior, tint } => Some(Medium { ior, tint, absorption: self.absorption, dispersion: self.dispersion }),
             _ => None,
         }
     }

@@ -4,12 +4,12 @@ use glam::Vec4;
 
 use super::texels::Texels;
 use crate::{
-    emitters::{albedos::albedos, light_table::emission_in},
+    emitters::light_table::emission_in,
     error::{Error, Result},
     gpu::{Gpu, Table},
     layout::{
         self, BLEND_BIT, CAUSTIC_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS,
-        MaterialRecord, SECOND_UV_BIT, SRGB_BIT, TextureRecord, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
+        MaterialRecord, SECOND_UV_BIT, SRGB_BIT, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
     },
     scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
     settings::LightUnit,
@@ -21,9 +21,10 @@ pub struct MaterialBuffers {
     materials: Table,
     attributes: Table,
     texels: Table,
-    albedos: Table,
     /// Some material has lobes beside one that is diffuse or perfectly specular.
     pub has_layers: bool,
+    /// Some material has more than a base and its coat.
+    pub has_finishes: bool,
     /// Some material has a rough lobe, which is lit at every vertex.
     pub has_rough: bool,
     /// Some material has a texture, or some triangle has colours.
@@ -62,38 +63,39 @@ impl MaterialBuffers {
         Ok(Self {
             has_textures: !attributes.is_empty(),
             has_layers: materials().any(is_layered),
+            has_finishes: materials().any(Material::is_finished),
             has_rough: materials().any(is_rough),
             has_alpha: materials().any(|m| m.alpha != Alpha::Opaque),
             materials: Table::new(gpu, "materials", &rows)?,
             attributes: Table::new(gpu, "attributes of triangles", &attributes)?,
-            albedos: Table::new(gpu, "albedos", &if materials().any(is_layered) { albedos() } else { Vec::new() })?,
             texels: Table::layered(gpu, "texels", &texels.into_words())?,
         })
     }
 
     /// The tables by name.
     #[must_use]
-    pub fn tables(&self) -> [(&'static str, &Table); 4] {
+    pub fn tables(&self) -> [(&'static str, &Table); 3] {
         [
             ("materials", &self.materials),
             ("attributes", &self.attributes),
             ("texels", &self.texels),
-            ("albedos", &self.albedos),
         ]
     }
 }
 
 /// Whether a material has more lobes than the kernels' shorter code follows.
 fn is_layered(material: &Material) -> bool {
-    matches!(material.surface, Surface::Layered { .. })
+    let is_layered = matches!(material.surface, Surface::Layered { .. })
         || is_rough(material)
         || (material.surface.transmits() && (material.transmission < 1.0 || material.textures.transmission.is_some()))
-        || material.clearcoat > 0.0
+        || (material.surface.transmits() && material.metallic > 0.0)
+        || material.is_finished();
+    is_layered && !material.unlit
 }
 
 fn is_rough(material: &Material) -> bool {
-    let has_gloss = !matches!(material.surface, Surface::Diffuse { .. }) || material.clearcoat > 0.0;
-    has_gloss && (material.roughness >= SHARP_ROUGHNESS || material.clearcoat_roughness >= SHARP_ROUGHNESS)
+    let has_gloss = !matches!(material.surface, Surface::Diffuse { .. });
+    (has_gloss && material.roughness >= SHARP_ROUGHNESS) || material.is_finished()
 }
 
 /// The attributes of the triangles, in the order of the corners as they are now.
@@ -126,7 +128,7 @@ fn record(material: &Material, unit: LightUnit, mut place: impl FnMut(&Texture, 
     let (metallic, f0, specular) = match *surface {
         Surface::Layered { metallic, f0, specular, .. } => (metallic, f0.to_array(), specular),
         Surface::Mirror { .. } => (1.0, [0.0; 3], 0.0),
-        Surface::Glass { ior, .. } | Surface::Pane { ior, .. } => (0.0, [((ior - 1.0) / (ior + 1.0)).powi(2); 3], 1.0),
+        Surface::Glass { ior, .. } | Surface::Pane { ior, .. } => (material.metallic, [((ior - 1.0) / (ior + 1.0)).powi(2); 3], 1.0),
         Surface::Diffuse { .. } => (0.0, [0.0; 3], 0.0),
     };
     let alpha = match material.alpha {
@@ -147,13 +149,28 @@ fn record(material: &Material, unit: LightUnit, mut place: impl FnMut(&Texture, 
             slot(&all.specular, false),
             slot(&all.specular_color, true),
             slot(&all.transmission, false),
-            slot(&all.clearcoat, false),
+            slot(&all.diffuse_transmission, false),
         ],
-        [slot(&all.clearcoat_roughness, false), 0, 0, 0],
+        [
+            slot(&all.diffuse_transmission_color, true),
+            slot(&all.clearcoat, false),
+            slot(&all.clearcoat_roughness, false),
+            slot(&all.clearcoat_normal, false),
+        ],
+        [
+            slot(&all.sheen_color, true),
+            slot(&all.sheen_roughness, false),
+            slot(&all.anisotropy, false),
+            slot(&all.iridescence, false),
+        ],
+        [slot(&all.iridescence_thickness, false), 0, 0, 0],
     ];
+    // Finishes are those of layers.
+    let is_finished = material.is_finished() && !surface.transmits();
     MaterialRecord {
         color: surface.color().to_array(),
         kind: match surface {
+            _ if is_finished => layout::LAYERED,
             Surface::Diffuse { .. } => layout::DIFFUSE,
             Surface::Mirror { .. } => layout::MIRROR,
             Surface::Glass { .. } => layout::GLASS,
@@ -167,15 +184,25 @@ fn record(material: &Material, unit: LightUnit, mut place: impl FnMut(&Texture, 
         transmission: material.transmission,
         flags: alpha
             | if material.double_sided { DOUBLE_SIDED_BIT } else { 0 }
-            | if material.casts_caustics() { CAUSTIC_BIT } else { 0 },
+            | if material.casts_caustics() { CAUSTIC_BIT } else { 0 }
+            | if material.unlit { UNLIT_BIT } else { 0 },
         f0,
         specular,
-        clearcoat: material.clearcoat,
-        clearcoat_roughness: material.clearcoat_roughness,
         normal_scale: material.normal_scale,
         opacity: material.opacity,
         cutoff: if let Alpha::Mask { cutoff } = material.alpha { cutoff } else { 0.0 },
-        pad: [0; 3],
+        diffuse_transmission: material.diffuse_transmission,
+        diffuse_transmission_color: material.diffuse_transmission_color.to_array(),
+        clearcoat: material.clearcoat,
+        clearcoat_roughness: material.clearcoat_roughness,
+        clearcoat_normal_scale: material.clearcoat_normal_scale,
+        anisotropy: material.anisotropy,
+        anisotropy_rotation: material.anisotropy_rotation,
+        sheen_color: material.sheen_color.to_array(),
+        sheen_roughness: material.sheen_roughness,
+        iridescence: material.iridescence,
+        iridescence_ior: material.iridescence_ior,
+        iridescence_thickness: material.iridescence_thickness,
         textures,
     }
 }

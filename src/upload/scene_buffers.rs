@@ -32,6 +32,7 @@ pub struct SceneBuffers {
     has_contacts: bool,
     /// Some solid absorbs light.
     has_absorption: bool,
+    has_dispersion: bool,
     /// Some surface has another lobe than a diffuse one.
     pub has_lobes: bool,
     /// Some surface sends light on in two ways: it reflects and transmits, or has a coat above its
@@ -73,7 +74,7 @@ impl SceneBuffers {
             tint: m.tint.to_array(),
             ior: m.ior,
             absorption: m.absorption.to_array(),
-            pad: 0,
+            dispersion: m.dispersion,
         };
         let media: Vec<_> = solids.media.iter().map(row).collect();
         let lights = LightBuffers::new(gpu, scene, &MediaProbe::new(scene, bvh, &solids), settings)?;
@@ -88,10 +89,11 @@ impl SceneBuffers {
             normals: Table::new(gpu, "normals", &bvh.normals)?,
             materials: MaterialBuffers::new(gpu, scene, settings.unit)?,
             has_absorption: solids.media.iter().any(|m| m.absorption != Vec3::ZERO),
+            has_dispersion: solids.media.iter().any(|m| m.dispersion > 0.0),
             media: Table::new(gpu, "media", &media)?,
             has_contacts: contacts.contains(&true),
             has_lobes: scene.has_lobes(),
-            splits: scene.materials.iter().any(|m| m.surface.ior().is_some() || m.surface.is_coated()),
+            splits: scene.materials.iter().any(|m| m.surface.ior().is_some() || m.surface.is_coated() || m.is_finished()),
             has_spheres: !scene.spheres.is_empty(),
             // Rounded up to multiples of 16, so that few variants of a kernel are compiled.
             stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
@@ -121,6 +123,8 @@ impl SceneBuffers {
             ("HAS_CONTACTS", f64::from(u8::from(self.has_contacts))),
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_LAYERS", f64::from(u8::from(self.materials.has_layers))),
+            ("HAS_FINISHES", f64::from(u8::from(self.materials.has_finishes))),
+            ("HAS_DISPERSION", f64::from(u8::from(self.has_dispersion))),
             ("HAS_TEXTURES", f64::from(u8::from(self.materials.has_textures))),
             ("HAS_ALPHA", f64::from(u8::from(self.materials.has_alpha))),
             ("HAS_ABSORPTION", f64::from(u8::from(self.has_absorption))),

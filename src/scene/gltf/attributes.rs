@@ -8,7 +8,7 @@ use json::validation::Checked;
 
 use super::accessor::{Column, Document};
 use super::fault::Read;
-use super::material_table::Slot;
+use super::material_table::{Axes, Slot};
 use super::primitives::attribute;
 use super::tangents;
 use crate::scene::{Attributes, Texture, UV_SETS};
@@ -21,7 +21,7 @@ pub(super) struct VertexAttributes {
     tangents: Tangents,
 }
 
-/// Tangents of a normal map in object space, with ±1; those without a direction are zero.
+/// Tangents along a texture in object space, with ±1; those without a direction are zero.
 #[derive(Debug, Default)]
 enum Tangents {
     #[default]
@@ -84,11 +84,11 @@ pub(super) fn read(
             attributes.colors = colors;
         }
     }
-    if let Some(map) = &slot.normal_map {
+    if let Some(axes) = &slot.axes {
         let given = column(Semantic::Tangents)?.filter(|_| triangles.normals.is_some() && !triangles.is_morphed);
         attributes.tangents = match given {
             Some(column) => Tangents::OfVertices(vertices.iter().map(|v| tangent(&column, *v as usize)).collect()),
-            None => attributes.generated(map, triangles),
+            None => attributes.generated(axes, triangles),
         };
     }
     let is_needed = !slot.sets.is_empty() || !attributes.colors.is_empty();
@@ -109,12 +109,11 @@ fn tangent(column: &Column<'_>, vertex: usize) -> Vec4 {
 }
 
 impl VertexAttributes {
-    /// Tangents along the image of a normal map as its transform places it, where the file has
-    /// none.
-    fn generated(&self, map: &Texture, triangles: Triangles<'_>) -> Tangents {
-        let [u, v] = map.transform.map(Vec3::from_array);
+    /// Tangents along those axes, where the file has none.
+    fn generated(&self, axes: &Axes, triangles: Triangles<'_>) -> Tangents {
+        let [u, v] = axes.transform.map(Vec3::from_array);
         let placed = |uv: &Vec2| Vec2::new(u.dot(uv.extend(1.0)), v.dot(uv.extend(1.0)));
-        let uvs: Vec<Vec2> = self.uvs[map.uv_set as usize].iter().map(placed).collect();
+        let uvs: Vec<Vec2> = self.uvs[axes.uv_set as usize].iter().map(placed).collect();
         let Triangles { positions, normals, corners, .. } = triangles;
         Tangents::OfCorners(tangents::generate(positions, normals, &uvs, corners))
     }

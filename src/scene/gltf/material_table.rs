@@ -37,7 +37,17 @@ pub(super) struct Slot {
     pub(super) index: u32,
     /// TEXCOORD_n of each set of texture coordinates.
     pub(super) sets: Vec<u32>,
-    pub(super) normal_map: Option<Texture>,
+    /// Along what tangents lie; `None` where none are needed.
+    pub(super) axes: Option<Axes>,
+}
+
+/// Axes of texture coordinates, along which tangents lie.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axes {
+    /// Which of the triangles' sets.
+    pub(super) uv_set: u32,
+    /// As in [`Texture`].
+    pub(super) transform: [[f32; 3]; 2],
 }
 
 /// Materials of a scene.
@@ -99,7 +109,7 @@ impl MaterialTable {
         self.names_dark_light |= emits && read.material.emission == Vec3::ZERO && !read.material.unlit;
         let index = self.materials.len() as u32;
         self.slots
-            .insert((material, lacks), Slot { index, sets: read.sets, normal_map: read.material.textures.normal });
+            .insert((material, lacks), Slot { index, sets: read.sets, axes: axes(&read.material, &read.sets) });
         self.materials.push(read.material);
         Ok(())
     }
@@ -108,6 +118,15 @@ impl MaterialTable {
     pub(super) fn slot(&self, material: Option<usize>, sets: &[u32]) -> &Slot {
         &self.slots[&(material, lacking(&self.asked[&material], sets))]
     }
+}
+
+/// Axes of a material's normal map, or of what it has in place of one.
+fn axes(material: &Material, sets: &[u32]) -> Option<Axes> {
+    let textures = &material.textures;
+    let texture = textures.normal.or(textures.clearcoat_normal).or(textures.anisotropy);
+    let own = texture.map(|texture| Axes { uv_set: texture.uv_set, transform: texture.transform });
+    let first = sets.iter().position(|set| *set == 0).filter(|_| material.anisotropy > 0.0);
+    own.or(first.map(|set| Axes { uv_set: set as u32, transform: Texture::IDENTITY }))
 }
 
 /// Those that are asked for and not there, in ascending order.

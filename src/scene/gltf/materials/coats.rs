@@ -1,14 +1,13 @@
-//! Layers above the base of a material, and what is read but not rendered yet.
+//! Layers above the base of a material, and what its base has beyond colour and metal.
 
 use glam::Vec3;
 
 use super::super::fault::{Read, fault};
 use super::extensions::{Anisotropy, Clearcoat, DiffuseTransmission, Dispersion, Iridescence, Sheen};
 use super::reader::Reader;
-use crate::scene::Material;
+use crate::scene::{Material, Surface};
 
-/// Reads the layers. Textures of what is not rendered come last: a material can use but few sets of
-/// texture coordinates.
+/// Reads them.
 pub(super) fn read(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
     clearcoat(reader, material)?;
     dispersion(reader, material)?;
@@ -32,9 +31,13 @@ fn clearcoat(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
     textures.clearcoat = reader.data_texture(coat.clearcoat_texture.as_ref(), &at("clearcoatTexture"))?;
     let roughness = coat.clearcoat_roughness_texture.as_ref();
     textures.clearcoat_roughness = reader.data_texture(roughness, &at("clearcoatRoughnessTexture"))?;
-    if coat.clearcoat_normal_texture.is_some() {
-        reader.notes.add("normal maps of clearcoats are not read: the coat has the normal of the surface");
+    material.clearcoat_normal_scale = coat.clearcoat_normal_texture.as_ref().map_or(1.0, |normal| normal.scale);
+    if !material.clearcoat_normal_scale.is_finite() {
+        let place = format!("{}.{}.scale", reader.place, at("clearcoatNormalTexture"));
+        return fault(place, format!("{} is not finite", material.clearcoat_normal_scale));
     }
+    let normal = coat.clearcoat_normal_texture.as_ref();
+    material.textures.clearcoat_normal = reader.data_texture(normal, &at("clearcoatNormalTexture"))?;
     Ok(())
 }
 
@@ -42,8 +45,9 @@ fn dispersion(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
     const NAME: &str = "KHR_materials_dispersion";
     let Some(Dispersion { dispersion }) = reader.extension(NAME)? else { return Ok(()) };
     material.dispersion = reader.at_least(0.0, dispersion, &format!("extensions.{NAME}.dispersion"))?;
-    if material.dispersion > 0.0 && material.surface.transmits() {
-        reader.note_unrendered(NAME);
+    if material.dispersion > 0.0 && !matches!(material.surface, Surface::Glass { .. }) {
+        material.dispersion = 0.0;
+        reader.note(&format!("{NAME} has no effect, because it is not solid glass"));
     }
     Ok(())
 }
@@ -58,7 +62,6 @@ fn sheen(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
     if material.sheen_color == Vec3::ZERO {
         return Ok(());
     }
-    reader.note_unrendered(NAME);
     let textures = &mut material.textures;
     textures.sheen_color = reader.color_texture(sheen.sheen_color_texture.as_ref(), &at("sheenColorTexture"))?;
     textures.sheen_roughness =
@@ -79,9 +82,12 @@ fn anisotropy(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
     if material.anisotropy == 0.0 {
         return Ok(());
     }
-    reader.note_unrendered(NAME);
     let texture = anisotropy.anisotropy_texture.as_ref();
     material.textures.anisotropy = reader.data_texture(texture, &at("anisotropyTexture"))?;
+    if material.textures.anisotropy.is_none() {
+        // Its tangents lie along the first set.
+        reader.uv_set(0);
+    }
     Ok(())
 }
 
@@ -101,7 +107,6 @@ fn iridescence(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
     if material.iridescence == 0.0 {
         return Ok(());
     }
-    reader.note_unrendered(NAME);
     let textures = &mut material.textures;
     textures.iridescence = reader.data_texture(film.iridescence_texture.as_ref(), &at("iridescenceTexture"))?;
     let thickness = film.iridescence_thickness_texture.as_ref();
@@ -121,7 +126,6 @@ fn diffuse_transmission(reader: &mut Reader<'_>, material: &mut Material) -> Rea
     if material.diffuse_transmission == 0.0 {
         return Ok(());
     }
-    reader.note_unrendered(NAME);
     let textures = &mut material.textures;
     let texture = through.diffuse_transmission_texture.as_ref();
     textures.diffuse_transmission = reader.data_texture(texture, &at("diffuseTransmissionTexture"))?;

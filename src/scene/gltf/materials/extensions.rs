@@ -1,6 +1,6 @@
 //! Members of the extensions of materials that the crate does not know.
 
-use gltf::json::texture::Info;
+use gltf::json::{material::NormalTexture, texture::Info};
 use serde::Deserialize;
 
 /// KHR_materials_clearcoat.
@@ -11,7 +11,7 @@ pub(super) struct Clearcoat {
     pub(super) clearcoat_texture: Option<Info>,
     pub(super) clearcoat_roughness_factor: f32,
     pub(super) clearcoat_roughness_texture: Option<Info>,
-    pub(super) clearcoat_normal_texture: Option<serde_json::Value>,
+    pub(super) clearcoat_normal_texture: Option<NormalTexture>,
 }
 
 /// KHR_materials_sheen.

@@ -68,7 +68,6 @@ impl Reader<'_> {
         if unlit {
             // All but the colour is for readers without the extension.
             material.roughness = 1.0;
-            self.note_unrendered("KHR_materials_unlit");
             return Ok(material);
         }
         material.surface = self.surface(&base, &mut material)?;
@@ -112,9 +111,6 @@ impl Reader<'_> {
 
     /// Glass or a thin pane, as the thickness says.
     fn transmitting(&mut self, base: &Base, material: &mut Material) -> Read<Surface> {
-        if base.metallic > 0.0 {
-            self.note("its metal is not rendered yet, because it transmits light: it is glass all over");
-        }
         if base.specular != 1.0 || base.f0 != Vec3::splat(base::normal_reflectance(base.ior)) {
             self.note("KHR_materials_specular does not change the reflection of glass, which its ior decides");
         }

@@ -32,11 +32,6 @@ impl Reader<'_> {
         self.notes.add(format!("material {:?}: {note}", self.name));
     }
 
-    /// Notes that an extension is read, but has no effect yet.
-    pub(super) fn note_unrendered(&mut self, extension: &str) {
-        self.notes.add(format!("{extension} is not rendered yet"));
-    }
-
     /// An extension of the material that the crate does not know.
     pub(super) fn extension<T: DeserializeOwned>(&self, name: &str) -> Read<Option<T>> {
         let extension = self.material.extensions.as_ref().and_then(|extensions| extensions.others.get(name));
@@ -110,26 +105,38 @@ impl Reader<'_> {
         let place = format!("{}.{at}", self.place);
         let (set, texture) = textures::sampled(self.root, reference, &place, self.notes)?;
         let Some(image) = textures::image(self.root, reference.texture, self.notes)? else { return Ok(None) };
+        let lacks = self.lacks.contains(&set);
+        let Some(uv_set) = self.uv_set(set) else {
+            if !lacks {
+                let what = at.rsplit('.').next().unwrap_or(at);
+                self.note(&format!(
+                    "{what} is left out: its TEXCOORD_{set} is one more than the {UV_SETS} sets of texture \
+                     coordinates that a material can use"
+                ));
+            }
+            return Ok(None);
+        };
+        let (content, is_color) = content(image);
+        Ok(Some(Texture { image: self.images.index(content, is_color), uv_set, ..texture }))
+    }
+
+    /// Which of the triangles' sets of texture coordinates TEXCOORD_n is; `None` where the mesh lacks
+    /// it or there are too many.
+    pub(super) fn uv_set(&mut self, set: u32) -> Option<u32> {
         if !self.asked.contains(&set) {
             self.asked.push(set);
         }
         if self.lacks.contains(&set) {
-            return Ok(None);
+            return None;
         }
         let known = self.sets.iter().position(|known| *known == set);
         if known.is_none() && self.sets.len() == UV_SETS {
-            let what = at.rsplit('.').next().unwrap_or(at);
-            self.note(&format!(
-                "{what} is left out: its TEXCOORD_{set} is one more than the {UV_SETS} sets of texture coordinates \
-                 that a material can use"
-            ));
-            return Ok(None);
+            return None;
         }
         let uv_set = known.unwrap_or_else(|| {
             self.sets.push(set);
             self.sets.len() - 1
         });
-        let (content, is_color) = content(image);
-        Ok(Some(Texture { image: self.images.index(content, is_color), uv_set: uv_set as u32, ..texture }))
+        Some(uv_set as u32)
     }
 }
