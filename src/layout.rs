@@ -401,20 +401,21 @@ pub struct LobePoint {
     /// Direction to the viewer.
     pub view: u32,
     pub tangent: u32,
-    /// Widths of GGX along the tangent and across it, two halves.
-    pub alpha: u32,
     /// Halves, as all that follow: reflectance along the normal; of rough glass the tint of what is
     /// transmitted.
     pub f0: [u32; 2],
-    /// Strength of the clear coat and its width.
-    pub clearcoat: u32,
     /// Reflectance at grazing angles.
     pub f90: [u32; 2],
     /// Factor of light that is reflected more than once.
     pub compensation: [u32; 2],
-    pub clearcoat_normal: u32,
     /// Colour and roughness of the sheen.
     pub sheen: [u32; 2],
+    /// Widths of GGX along the tangent and across it.
+    pub alpha: u32,
+    /// Strength of the clear coat and its width.
+    pub clearcoat: u32,
+    /// Octahedral, as the others.
+    pub clearcoat_normal: u32,
     pub pad: u32,
 }
 

@@ -11,7 +11,7 @@ use super::fault::Read;
 use super::material_table::{Axes, Slot};
 use super::primitives::attribute;
 use super::tangents;
-use crate::scene::{Attributes, Texture, UV_SETS};
+use crate::scene::{Attributes, UV_SETS};
 
 /// Attributes of the vertices of a primitive; lists are empty where the material needs none.
 #[derive(Debug, Default)]

@@ -108,8 +108,8 @@ impl MaterialTable {
         let emits = material.is_some_and(|i| root.materials[i].emissive_factor.0 != [0.0; 3]);
         self.names_dark_light |= emits && read.material.emission == Vec3::ZERO && !read.material.unlit;
         let index = self.materials.len() as u32;
-        self.slots
-            .insert((material, lacks), Slot { index, sets: read.sets, axes: axes(&read.material, &read.sets) });
+        let axes = axes(&read.material, &read.sets);
+        self.slots.insert((material, lacks), Slot { index, sets: read.sets, axes });
         self.materials.push(read.material);
         Ok(())
     }
