@@ -323,8 +323,8 @@ impl Material {
         is_clear && self.roughness <= CAUSTIC_ROUGHNESS
     }
 
-    /// Whether an opaque surface has more than a base: clear coat, sheen, anisotropy, iridescence or
-    /// diffuse transmission.
+    /// Whether an opaque surface has more than a base: clear coat, sheen, anisotropy, iridescence
+    /// or diffuse transmission.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         let is_finished = self.clearcoat > 0.0
@@ -339,7 +339,9 @@ impl Material {
     #[must_use]
     pub fn medium(&self) -> Option<Medium> {
         match self.surface {
-            Surface::Glass { ior, tint } => Some(Medium { ior, tint, absorption: self.absorption, dispersion: self.dispersion }),
+            Surface::Glass { ior, tint } => {
+                Some(Medium { ior, tint, absorption: self.absorption, dispersion: self.dispersion })
+            }
             _ => None,
         }
     }

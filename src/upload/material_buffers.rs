@@ -9,7 +9,8 @@ use crate::{
     gpu::{Gpu, Table},
     layout::{
         self, BLEND_BIT, CAUSTIC_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS,
-        MaterialRecord, SECOND_UV_BIT, SRGB_BIT, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
+        MaterialRecord, SECOND_UV_BIT, SRGB_BIT, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
+        octahedral,
     },
     scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
     settings::LightUnit,
@@ -75,11 +76,7 @@ impl MaterialBuffers {
     /// The tables by name.
     #[must_use]
     pub fn tables(&self) -> [(&'static str, &Table); 3] {
-        [
-            ("materials", &self.materials),
-            ("attributes", &self.attributes),
-            ("texels", &self.texels),
-        ]
+        [("materials", &self.materials), ("attributes", &self.attributes), ("texels", &self.texels)]
     }
 }
 
@@ -128,7 +125,9 @@ fn record(material: &Material, unit: LightUnit, mut place: impl FnMut(&Texture, 
     let (metallic, f0, specular) = match *surface {
         Surface::Layered { metallic, f0, specular, .. } => (metallic, f0.to_array(), specular),
         Surface::Mirror { .. } => (1.0, [0.0; 3], 0.0),
-        Surface::Glass { ior, .. } | Surface::Pane { ior, .. } => (material.metallic, [((ior - 1.0) / (ior + 1.0)).powi(2); 3], 1.0),
+        Surface::Glass { ior, .. } | Surface::Pane { ior, .. } => {
+            (material.metallic, [((ior - 1.0) / (ior + 1.0)).powi(2); 3], 1.0)
+        }
         Surface::Diffuse { .. } => (0.0, [0.0; 3], 0.0),
     };
     let alpha = match material.alpha {

@@ -93,7 +93,10 @@ impl SceneBuffers {
             media: Table::new(gpu, "media", &media)?,
             has_contacts: contacts.contains(&true),
             has_lobes: scene.has_lobes(),
-            splits: scene.materials.iter().any(|m| m.surface.ior().is_some() || m.surface.is_coated() || m.is_finished()),
+            splits: scene
+                .materials
+                .iter()
+                .any(|m| m.surface.ior().is_some() || m.surface.is_coated() || m.is_finished()),
             has_spheres: !scene.spheres.is_empty(),
             // Rounded up to multiples of 16, so that few variants of a kernel are compiled.
             stack: bvh.max_stack_depth().max(1).next_multiple_of(16),

@@ -124,7 +124,7 @@ fn what_lacks_texture_coordinates_has_the_material_without_its_texture() {
     let node = push(&mut gltf, "nodes", json!({ "mesh": mesh, "translation": [0, 0, 1] }));
     gltf["scenes"][0]["nodes"].as_array_mut().expect("a list").push(node.into());
     let scene = loaded(&gltf);
-    let said = "mesh \"bare\" has no TEXCOORD_0: material \"paint\" is without the textures there that need it";
+    let said = "mesh \"bare\" has no TEXCOORD_0: material \"paint\" is there without what needs it";
     assert_eq!(scene.warnings, [said]);
     let [first, second] = [0, 1].map(|i| &scene.materials[scene.triangles[i].material as usize]);
     assert!(first.textures.base_color.is_some() && second.textures.base_color.is_none());
@@ -142,8 +142,7 @@ fn exact_spheres_have_no_texture_coordinates() {
     gltf["extensions"]["KHR_implicit_shapes"] = json!({ "shapes": [{ "type": "sphere" }] });
     gltf["nodes"][1] = json!({ "extensions": { "KHR_implicit_shapes": { "shape": 0 } }, "extras": { "material": 0 } });
     let scene = loaded(&gltf);
-    let said =
-        "the sphere of nodes[1] has no TEXCOORD_0: material \"paint\" is without the textures there that need it";
+    let said = "the sphere of nodes[1] has no TEXCOORD_0: material \"paint\" is there without what needs it";
     assert_eq!(scene.warnings, [said]);
     let textures = |material: u32| scene.materials[material as usize].textures;
     assert_eq!(textures(scene.spheres[0].material).base_color, None);

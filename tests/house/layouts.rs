@@ -42,19 +42,19 @@ fn twins() -> Vec<Twin> {
         BvhNode { grid, low, high }
         Primitive { v0, material, e1, id, e2, emitter }
         Normals { n0, n1, n2, attributes }
-        MaterialRecord { color, kind, emission, ior, roughness, metallic, transmission, flags, f0, specular, clearcoat, clearcoat_roughness, normal_scale, opacity, cutoff, pad, textures }
+        MaterialRecord { color, kind, emission, ior, roughness, metallic, transmission, flags, f0, specular, normal_scale, opacity, cutoff, diffuse_transmission, diffuse_transmission_color, clearcoat, clearcoat_roughness, clearcoat_normal_scale, anisotropy, anisotropy_rotation, sheen_color, sheen_roughness, iridescence, iridescence_ior, iridescence_thickness, textures }
         TextureRecord { first, size, flags, levels, transform }
         Attributes { uvs, colors, tangents, pad }
-        Medium { tint, ior, absorption, pad }
+        Medium { tint, ior, absorption, dispersion }
         Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
         Path { origin, history, direction, bounces, beta, left, media }
         Photon { position, wi, flux, normal }
-        VisiblePoint { position, next_map, weight, offset, ng, media_low, ns, media_high, view, coat }
+        VisiblePoint { position, next_map, weight, offset, ng, media_low, ns, media_high, view, above }
         LobeLight { light_count, pad0, pad1, pad2 }
-        LobePoint { position, offset, beta, alpha, f0, eta, f90, ng, compensation, ns, view, pad }
+        LobePoint { position, offset, beta, eta, ng, ns, view, tangent, f0, f90, compensation, sheen, alpha, clearcoat, clearcoat_normal, pad }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays, reads }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, pad1 }
         Store { staged, first_photon, photons, kind }
@@ -109,11 +109,11 @@ fn constants() -> Vec<(&'static str, f64)> {
         LAYERED,
         MATERIAL_TEXELS,
         ATTRIBUTE_TEXELS,
-        ALBEDO_STEPS,
         DOUBLE_SIDED_BIT,
         MASK_BIT,
         BLEND_BIT,
         CAUSTIC_BIT,
+        UNLIT_BIT,
         WRAP_REPEAT,
         WRAP_MIRROR,
         WRAP_CLAMP,

@@ -101,7 +101,7 @@ impl MaterialTable {
             let sets: Vec<String> = lacks.iter().map(|set| format!("TEXCOORD_{set}")).collect();
             let (owner, name) = (owner.said(root), &read.material.name);
             notes.add(format!(
-                "{owner} has no {}: material {name:?} is without the textures there that need it",
+                "{owner} has no {}: material {name:?} is there without what needs it",
                 sets.join(" and no ")
             ));
         }

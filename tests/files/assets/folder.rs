@@ -82,7 +82,9 @@ fn render(path: &Path) -> Result<(), String> {
     let silent = caustica::progress::Silent;
     let render = caustica::renderer::render(support::gpu(), &scene, &settings, &silent).map_err(|e| e.to_string())?;
     let pixels = render.frame.radiance().as_flattened();
-    if !pixels.iter().all(|x| x.is_finite() && *x >= 0.0) {
+    // The colours of single wavelengths lie outside of Rec.709.
+    let has_colours_outside = scene.materials.iter().any(|material| material.dispersion > 0.0);
+    if !pixels.iter().all(|x| x.is_finite() && (*x >= 0.0 || has_colours_outside)) {
         return Err("a pixel is no finite number".to_owned());
     }
     if pixels.iter().all(|x| *x == 0.0) {

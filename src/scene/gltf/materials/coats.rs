@@ -45,9 +45,8 @@ fn dispersion(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
     const NAME: &str = "KHR_materials_dispersion";
     let Some(Dispersion { dispersion }) = reader.extension(NAME)? else { return Ok(()) };
     material.dispersion = reader.at_least(0.0, dispersion, &format!("extensions.{NAME}.dispersion"))?;
-    if material.dispersion > 0.0 && !matches!(material.surface, Surface::Glass { .. }) {
-        material.dispersion = 0.0;
-        reader.note(&format!("{NAME} has no effect, because it is not solid glass"));
+    if material.dispersion > 0.0 && matches!(material.surface, Surface::Pane { .. }) {
+        reader.note(&format!("{NAME} has no effect on a thin pane"));
     }
     Ok(())
 }
