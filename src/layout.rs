@@ -122,10 +122,8 @@ pub const MATERIAL_TEXELS: u32 = 14;
 pub const DOUBLE_SIDED_BIT: u32 = 1;
 pub const MASK_BIT: u32 = 2;
 pub const BLEND_BIT: u32 = 4;
-/// Photons that the lobes beside the diffuse one scatter are caustic photons.
-pub const CAUSTIC_BIT: u32 = 8;
 /// The surface is seen in its base colour, whatever lights it.
-pub const UNLIT_BIT: u32 = 16;
+pub const UNLIT_BIT: u32 = 8;
 
 /// Factors of a material, and where its textures are.
 #[repr(C)]
@@ -144,7 +142,7 @@ pub struct MaterialRecord {
     pub metallic: f32,
     /// Fraction of the light within glass that is transmitted.
     pub transmission: f32,
-    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`CAUSTIC_BIT`], [`UNLIT_BIT`].
+    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`UNLIT_BIT`].
     pub flags: u32,
     /// Reflectance of the coat along the normal, without its strength.
     pub f0: [f32; 3],

@@ -4,7 +4,7 @@
 type Row = (&'static str, &'static str);
 
 /// Inputs that an error or a warning of the library can name.
-const FLAGS: [Row; 26] = [
+const FLAGS: [Row; 27] = [
     ("device", "--device"),
     ("estimate.cone_constant", "--cone-constant"),
     ("estimate.max_radius", "--max-radius"),
@@ -14,6 +14,7 @@ const FLAGS: [Row; 26] = [
     ("estimate.share_reach", "--share"),
     ("lights.photon_weights", "--light-photons"),
     ("load.allow_outside", "--allow-outside"),
+    ("load.caustic_roughness", "--caustic-roughness"),
     ("load.ignore_required", "--ignore-required"),
     ("load.scene", "--scene"),
     ("load.texture_size", "--texture-size"),

@@ -1,8 +1,8 @@
 //! Options of reading a scene file.
 
-use caustica::scene::LoadOptions;
+use caustica::scene::{CAUSTIC_ROUGHNESS, LoadOptions};
 
-use super::values::whole;
+use super::values::{caustic_roughness, whole};
 
 /// Which of the file's scenes is read, and what is allowed to it.
 #[derive(Debug, clap::Args)]
@@ -18,6 +18,15 @@ pub struct LoadingOptions {
     /// Longest side of a texture's image: larger images are halved until they fit
     #[arg(long, value_name = "N", value_parser = whole(LoadOptions::TEXTURE_SIZE), help_heading = "Scene")]
     pub texture_size: Option<u32>,
+
+    /// Roughness up to which metal and glass cast caustics; the light that rougher ones throw is
+    /// gathered as that of diffuse surfaces
+    #[arg(long, value_name = "R", default_value_t = CAUSTIC_ROUGHNESS, value_parser = caustic_roughness, help_heading = "Scene")]
+    pub caustic_roughness: f32,
+
+    /// Metals lose the light that they reflect more than once, as by the bare specification of glTF
+    #[arg(long, help_heading = "Scene")]
+    pub single_scattering: bool,
 
     /// Read buffers and images from anywhere, not only from the scene's folder and below it
     #[arg(long, help_heading = "Scene")]
@@ -36,6 +45,8 @@ impl LoadingOptions {
             scene: self.scene.clone(),
             variant: self.variant.clone(),
             texture_size: self.texture_size,
+            caustic_roughness: self.caustic_roughness,
+            single_scattering: self.single_scattering,
             allow_outside: self.allow_outside,
             ignore_required: self.ignore_required.clone(),
         }

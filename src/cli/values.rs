@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use caustica::scene::LoadOptions;
 use caustica::settings::{Crop, EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Range};
 
 /// A whole number of at least 1 with an optional suffix: `250`, `200k`, `1.5M`.
@@ -98,6 +99,11 @@ pub fn scale(text: &str) -> Result<f64, String> {
 /// A factor of at least 0.
 pub fn strength(text: &str) -> Result<f32, String> {
     number(text).filter(|s| *s >= 0.0).ok_or_else(|| "a number of at least 0".to_string())
+}
+
+/// A roughness.
+pub fn caustic_roughness(text: &str) -> Result<f32, String> {
+    in_range(text, LoadOptions::CAUSTIC_ROUGHNESS, "a number of ")
 }
 
 /// An angle.

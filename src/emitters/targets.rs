@@ -85,7 +85,8 @@ pub fn scene_target(scene: &Scene) -> Target {
 /// smaller than that of the whole cluster.
 #[must_use]
 pub fn specular_targets(scene: &Scene) -> Vec<Target> {
-    let specular = items(scene, |material| scene.materials[material as usize].casts_caustics());
+    let casts = scene.caustic_materials();
+    let specular = items(scene, |material| casts[material as usize]);
     if specular.is_empty() {
         return Vec::new();
     }

@@ -27,6 +27,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
+    scene::LoadOptions,
     settings::Settings,
     stats::Stats,
 };
@@ -38,6 +39,8 @@ pub struct Provenance<'a> {
     pub scene: &'a str,
     /// Hash of the scene's bytes.
     pub scene_hash: &'a str,
+    /// Options with which the scene was read.
+    pub options: &'a LoadOptions,
     /// Environment light, if there is any.
     pub environment: Option<EnvironmentProvenance<'a>>,
     /// Settings of the render.
@@ -110,6 +113,7 @@ fn attributes(provenance: &Provenance) -> LayerAttributes {
         ("version", version.to_string()),
         ("settings", serde_json::to_string(settings).expect("settings hold nothing that JSON cannot")),
         ("seed", settings.photons.seed.to_string()),
+        ("loading", serde_json::to_string(provenance.options).expect("options hold nothing that JSON cannot")),
         ("scene", provenance.scene.to_string()),
         ("sceneHash", provenance.scene_hash.to_string()),
         ("device", stats.device.name.clone()),
@@ -261,7 +265,7 @@ mod tests {
 
     fn write(path: &Path, frame: &Frame, settings: &Settings) {
         let provenance =
-            Provenance { scene: "räume.gltf", scene_hash: "ab12", environment: None, settings, stats: &stats() };
+            Provenance { scene: "räume.gltf", scene_hash: "ab12", options: &LoadOptions::default(), environment: None, settings, stats: &stats() };
         write_exr(path, frame, &provenance).unwrap();
     }
 
@@ -298,7 +302,7 @@ mod tests {
             let path = folder.path().join("a.exr");
             let settings = Settings::default();
             let provenance =
-                Provenance { scene: "", scene_hash: "", environment, settings: &settings, stats: &stats() };
+                Provenance { scene: "", scene_hash: "", options: &LoadOptions::default(), environment, settings: &settings, stats: &stats() };
             write_exr(&path, &frame(), &provenance).unwrap();
             let mut all = read_exr_attributes(&path).unwrap();
             all.retain(|name, _| name.starts_with("environment"));

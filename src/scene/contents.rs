@@ -4,13 +4,16 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
 
-use super::{Attributes, Bounds, Camera, Environment, Image, Light, Material, Sphere, Surface, Triangle};
+use super::{Attributes, Bounds, Camera, Environment, Image, Light, LoadOptions, Material, Sphere, Surface, Triangle};
 use crate::{
     Error, Result,
     image::{EnvironmentProvenance, Provenance},
     settings::Settings,
     stats::Stats,
 };
+
+/// Fraction of metal from which on a surface casts caustics.
+const METAL: f32 = 0.5;
 
 /// A scene, ready to be traced.
 #[derive(Clone, Debug, Default)]
@@ -19,6 +22,8 @@ pub struct Scene {
     pub path: PathBuf,
     /// File name without folders.
     pub file_name: String,
+    /// Options with which it was read.
+    pub options: LoadOptions,
     /// Files that the file refers to: buffers and images, read or not.
     pub files: Vec<PathBuf>,
     /// Variants of the materials that the file names.
@@ -80,24 +85,55 @@ impl Scene {
     /// Whether a surface is sharp enough for caustics.
     #[must_use]
     pub fn has_specular(&self) -> bool {
-        self.uses_material(Material::casts_caustics)
+        let casts = self.caustic_materials();
+        self.uses_material(|i, _| casts[i])
+    }
+
+    /// Of each material, whether what it reflects or transmits is sharp enough for caustics
+    /// somewhere: mirrors, metals, glass and panes up to [`LoadOptions::caustic_roughness`]. For
+    /// one point `shaders/lib/transport/material.wesl` decides.
+    #[must_use]
+    pub fn caustic_materials(&self) -> Vec<bool> {
+        self.materials.iter().map(|material| self.casts_caustics(material)).collect()
+    }
+
+    fn casts_caustics(&self, material: &Material) -> bool {
+        let metallic = match material.surface {
+            Surface::Diffuse { .. } => return false,
+            Surface::Mirror { .. } | Surface::Glass { .. } | Surface::Pane { .. } => None,
+            Surface::Layered { metallic, .. } => Some(metallic),
+        };
+        let casts = |roughness: f32, metal: f32| {
+            material.roughness * roughness <= self.options.caustic_roughness
+                && metallic.is_none_or(|metallic| metallic * metal >= METAL)
+        };
+        let texture = material.textures.metallic_roughness;
+        match texture.and_then(|texture| self.images.get(texture.image as usize)) {
+            // Nothing is sharper than a factor of 0, or more of metal than a factor of 1.
+            Some(image) if casts(0.0, 1.0) => {
+                let texel = |of: &[u8; 4]| casts(f32::from(of[1]) / 255.0, f32::from(of[2]) / 255.0);
+                image.texels.iter().any(texel)
+            }
+            Some(_) => false,
+            None => casts(1.0, 1.0),
+        }
     }
 
     /// Whether a surface has another lobe than a diffuse one.
     #[must_use]
     pub fn has_lobes(&self) -> bool {
-        self.uses_material(|m| !matches!(m.surface, Surface::Diffuse { .. }) || m.clearcoat > 0.0)
+        self.uses_material(|_, m| !matches!(m.surface, Surface::Diffuse { .. }) || m.is_finished())
     }
 
     /// Whether a surface emits light.
     #[must_use]
     pub fn has_emission(&self) -> bool {
-        self.uses_material(|material| material.emission != Vec3::ZERO)
+        self.uses_material(|_, material| material.emission != Vec3::ZERO)
     }
 
     /// Whether a triangle or sphere has a material that satisfies the predicate.
-    fn uses_material(&self, predicate: impl Fn(&Material) -> bool) -> bool {
-        let satisfied: Vec<bool> = self.materials.iter().map(predicate).collect();
+    fn uses_material(&self, predicate: impl Fn(usize, &Material) -> bool) -> bool {
+        let satisfied: Vec<bool> = self.materials.iter().enumerate().map(|(i, m)| predicate(i, m)).collect();
         let satisfies = |material: u32| satisfied.get(material as usize) == Some(&true);
         self.triangles.iter().any(|triangle| satisfies(triangle.material))
             || self.spheres.iter().any(|sphere| satisfies(sphere.material))
@@ -127,7 +163,8 @@ impl Scene {
             strength: environment.strength,
             rotation: environment.rotation,
         });
-        Provenance { scene: &self.file_name, scene_hash: &self.hash, environment, settings, stats }
+        let options = &self.options;
+        Provenance { scene: &self.file_name, scene_hash: &self.hash, options, environment, settings, stats }
     }
 
     /// Finds a camera by its name or by its index in [`Scene::cameras`]; the first if `wanted` is

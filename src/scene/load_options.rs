@@ -1,9 +1,12 @@
 //! Options of reading a scene file.
 
+use serde::Serialize;
+
+use super::CAUSTIC_ROUGHNESS;
 use crate::settings::Range;
 
 /// Options of reading a file into a [`Scene`](super::Scene).
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoadOptions {
     /// Scene of the file, by name or else by index from 0; `None` for its default scene.
     pub scene: Option<String>,
@@ -12,13 +15,35 @@ pub struct LoadOptions {
     pub variant: Option<String>,
     /// Longest side of images, texels: larger ones are halved. `None` for no limit.
     pub texture_size: Option<u32>,
+    /// Roughness up to which metal and glass cast caustics, in [`Self::CAUSTIC_ROUGHNESS`]: light
+    /// that rougher surfaces throw is gathered as that of diffuse ones.
+    pub caustic_roughness: f32,
+    /// Metals lose the light that their microfacets reflect more than once, as by the bare
+    /// specification.
+    pub single_scattering: bool,
     /// Allows buffers and images outside the folder of the file and its subfolders.
     pub allow_outside: bool,
     /// Names of unsupported extensions that are ignored although the file requires them.
     pub ignore_required: Vec<String>,
 }
 
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self {
+            scene: None,
+            variant: None,
+            texture_size: None,
+            caustic_roughness: CAUSTIC_ROUGHNESS,
+            single_scattering: false,
+            allow_outside: false,
+            ignore_required: Vec::new(),
+        }
+    }
+}
+
 impl LoadOptions {
+    /// Range of `caustic_roughness`.
+    pub const CAUSTIC_ROUGHNESS: Range<f32> = Range::closed(0.0, 1.0);
     /// Range of `texture_size`: the largest side of an image that is read.
     pub const TEXTURE_SIZE: Range<u32> = Range::closed(1, 16_384);
 }

@@ -271,7 +271,8 @@ pub struct Material {
 /// Roughness below which a lobe is perfectly specular: narrower than a pixel.
 pub const SHARP_ROUGHNESS: f32 = 0.03;
 
-/// Roughness up to which a lobe of metal or glass casts caustics: above it the light that it throws
+/// Roughness up to which a lobe of metal or glass casts caustics unless [`super::LoadOptions`] say another:
+/// above it the light that it throws
 /// is as smooth as that of diffuse surfaces.
 pub const CAUSTIC_ROUGHNESS: f32 = 0.35;
 
@@ -309,18 +310,6 @@ impl Material {
             priority: 0,
             textures: Textures::default(),
         }
-    }
-
-    /// Whether what the surface reflects or transmits is sharp enough for caustics: mirrors,
-    /// metals, glass and panes up to [`CAUSTIC_ROUGHNESS`].
-    #[must_use]
-    pub fn casts_caustics(&self) -> bool {
-        let is_clear = match self.surface {
-            Surface::Diffuse { .. } => false,
-            Surface::Mirror { .. } | Surface::Glass { .. } | Surface::Pane { .. } => true,
-            Surface::Layered { metallic, .. } => metallic >= 0.5,
-        };
-        is_clear && self.roughness <= CAUSTIC_ROUGHNESS
     }
 
     /// Whether an opaque surface has more than a base: clear coat, sheen, anisotropy, iridescence

@@ -8,7 +8,7 @@ use crate::{
     error::{Error, Result},
     gpu::{Gpu, Table},
     layout::{
-        self, BLEND_BIT, CAUSTIC_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS,
+        self, BLEND_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS,
         MaterialRecord, SECOND_UV_BIT, SRGB_BIT, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
         octahedral,
     },
@@ -183,7 +183,6 @@ fn record(material: &Material, unit: LightUnit, mut place: impl FnMut(&Texture, 
         transmission: material.transmission,
         flags: alpha
             | if material.double_sided { DOUBLE_SIDED_BIT } else { 0 }
-            | if material.casts_caustics() { CAUSTIC_BIT } else { 0 }
             | if material.unlit { UNLIT_BIT } else { 0 },
         f0,
         specular,

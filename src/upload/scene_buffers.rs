@@ -33,6 +33,8 @@ pub struct SceneBuffers {
     /// Some solid absorbs light.
     has_absorption: bool,
     has_dispersion: bool,
+    caustic_roughness: f32,
+    single_scattering: bool,
     /// Some surface has another lobe than a diffuse one.
     pub has_lobes: bool,
     /// Some surface sends light on in two ways: it reflects and transmits, or has a coat above its
@@ -89,6 +91,8 @@ impl SceneBuffers {
             normals: Table::new(gpu, "normals", &bvh.normals)?,
             materials: MaterialBuffers::new(gpu, scene, settings.unit)?,
             has_absorption: solids.media.iter().any(|m| m.absorption != Vec3::ZERO),
+            caustic_roughness: scene.options.caustic_roughness,
+            single_scattering: scene.options.single_scattering,
             has_dispersion: solids.media.iter().any(|m| m.dispersion > 0.0),
             media: Table::new(gpu, "media", &media)?,
             has_contacts: contacts.contains(&true),
@@ -127,6 +131,8 @@ impl SceneBuffers {
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_LAYERS", f64::from(u8::from(self.materials.has_layers))),
             ("HAS_FINISHES", f64::from(u8::from(self.materials.has_finishes))),
+            ("CAUSTIC_ROUGHNESS", f64::from(self.caustic_roughness)),
+            ("COMPENSATES", f64::from(u8::from(!self.single_scattering))),
             ("HAS_DISPERSION", f64::from(u8::from(self.has_dispersion))),
             ("HAS_TEXTURES", f64::from(u8::from(self.materials.has_textures))),
             ("HAS_ALPHA", f64::from(u8::from(self.materials.has_alpha))),

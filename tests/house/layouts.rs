@@ -112,7 +112,6 @@ fn constants() -> Vec<(&'static str, f64)> {
         DOUBLE_SIDED_BIT,
         MASK_BIT,
         BLEND_BIT,
-        CAUSTIC_BIT,
         UNLIT_BIT,
         WRAP_REPEAT,
         WRAP_MIRROR,

@@ -13,3 +13,4 @@ mod references;
 mod refraction;
 mod seen;
 mod solids;
+mod transport;

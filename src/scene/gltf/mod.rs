@@ -67,6 +67,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
 /// Reads the bytes of the file at `path`.
 pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene> {
     options.texture_size.map_or(Ok(()), |size| LoadOptions::TEXTURE_SIZE.check("load.texture_size", size))?;
+    LoadOptions::CAUSTIC_ROUGHNESS.check("load.caustic_roughness", options.caustic_roughness)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let file_name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
     let mut notes = Notes::default();
@@ -90,7 +91,7 @@ pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<S
     let resources = Resources { bin, folder, allow_outside: options.allow_outside };
     let scene =
         assemble(&root, chosen, &resources, options.texture_size, hash, notes).map_err(|fault| fault.of(path))?;
-    Ok(Scene { path: path.to_owned(), file_name, files: resources.named(&root), variants, ..scene })
+    Ok(Scene { path: path.to_owned(), file_name, files: resources.named(&root), variants, options: options.clone(), ..scene })
 }
 
 /// The JSON part, with its graph of nodes checked, and the binary chunk.

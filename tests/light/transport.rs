@@ -1,0 +1,200 @@
+//! Paths through all lobes: the table of `docs/transport.md`, a scene for each row in which it
+//! dominates, and the energy of every lobe.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | furnace | a ball of each material under a uniform sky is as bright as its albedo says | half of the sky |
+//! | lobes | modes 0 and 1 agree on a room with a ball of each material | a ball of another material |
+//! | rays | light seen in sharp and rough metal is there in the modes of rays, and in no other | – |
+//! | caustic | a rough ball's caustic is in the modes with photons | lamp turned away |
+//! | bound | caustic photons above the roughness bound are those of the global map | a ball that absorbs |
+//! | transmission | a leaf lights what is behind it, and photons and rays agree | a leaf that transmits less |
+
+use caustica::{
+    scene::{Environment, LightKind, Material, Scene, Surface},
+    settings::Mode,
+};
+use glam::{Vec3, vec3};
+use support::*;
+
+fn metal(roughness: f32) -> Material {
+    let surface = Surface::Layered { base: Vec3::ONE, metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    Material { roughness, ..Material::new("metal", surface) }
+}
+
+fn coated(roughness: f32) -> Material {
+    let surface =
+        Surface::Layered { base: Vec3::splat(0.5), metallic: 0.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    Material { roughness, ..Material::new("coated", surface) }
+}
+
+fn rough_glass() -> Material {
+    Material { roughness: 0.3, ..Material::new("glass", glass()) }
+}
+
+/// A material of each lobe, by name.
+fn lobes() -> Vec<(&'static str, Material)> {
+    let leaf = Material {
+        diffuse_transmission: 0.5,
+        diffuse_transmission_color: Vec3::splat(0.5),
+        ..Material::new("leaf", diffuse(0.5))
+    };
+    vec![
+        ("metal", metal(0.2)),
+        ("rough metal", metal(0.8)),
+        ("coat", coated(0.3)),
+        ("clear coat", Material { clearcoat: 1.0, clearcoat_roughness: 0.1, ..coated(0.6) }),
+        ("sheen", Material { sheen_color: Vec3::splat(0.8), sheen_roughness: 0.5, ..coated(0.6) }),
+        ("film", Material { iridescence: 1.0, ..metal(0.2) }),
+        ("leaf", leaf),
+        ("rough glass", rough_glass()),
+        ("prism", Material { dispersion: 2.0, ..Material::new("prism", glass()) }),
+    ]
+}
+
+/// A ball that fills the picture, under a sky of radiance 1.
+fn furnace(material: Material) -> Scene {
+    let mut scene = Scene { materials: vec![material], ..Scene::default() };
+    scene.spheres.push(sphere(Vec3::ZERO, 1.0, 0));
+    scene.cameras.push(camera(vec3(0.0, 0.0, 4.0), Vec3::ZERO, 20.0));
+    scene.environment = Some(Environment::uniform(Vec3::ONE));
+    scene
+}
+
+#[test]
+fn every_lobe_reflects_what_it_gets() {
+    let mean_of = |material: &Material, strength: f32| {
+        let mut scene = furnace(material.clone());
+        scene.environment.as_mut().expect("a sky").strength = strength;
+        mean(&render_scene(&scene, &settings(Mode::Hybrid, 1000, 16).with(|s| s.picture.spp = 64)))
+    };
+    // Rough glass loses what meets several of its microfacets. The other bounds are what is left
+    // of the noise, and Schlick's weights above a coat.
+    for (name, material, least, most) in [
+        ("smooth metal", metal(0.0), 0.999, 1.001),
+        ("metal", metal(0.2), 0.99, 1.01),
+        ("rough metal", metal(1.0), 0.985, 1.015),
+        ("film", Material { iridescence: 1.0, ..metal(0.3) }, 0.99, 1.01),
+        ("glass", Material { dispersion: 2.0, ..Material::new("", glass()) }, 0.98, 1.02),
+        ("rough glass", rough_glass(), 0.95, 1.0),
+        ("white under a coat", Material { surface: white_coated(), roughness: 0.5, ..coated(0.5) }, 0.985, 1.02),
+    ] {
+        let found = mean_of(&material, 1.0);
+        assert!((least..most).contains(&found), "{name}: {found}");
+        let half = mean_of(&material, 0.5);
+        assert!(half < least, "control: {name} under half of the sky has {half}");
+    }
+}
+
+fn white_coated() -> Surface {
+    Surface::Layered { base: Vec3::ONE, metallic: 0.0, f0: Vec3::splat(0.04), specular: 1.0 }
+}
+
+/// A room with a ball of that material and a lamp of some size.
+fn room(material: Material) -> Scene {
+    let mut scene = Scene {
+        materials: vec![Material::new("wall", diffuse(0.5)), material, emissive("lamp", 0.0, 20.0, false)],
+        ..Scene::default()
+    };
+    add_box(&mut scene, vec3(-1.0, 0.0, -1.0), vec3(1.0, 2.0, 3.0), 0);
+    scene.spheres.push(sphere(vec3(0.0, 0.7, 0.0), 0.6, 1));
+    add_quad(&mut scene, vec3(-0.3, 1.95, 0.6), vec3(0.0, 0.0, -0.6), vec3(0.6, 0.0, 0.0), 2);
+    scene.triangles.iter_mut().rev().take(2).for_each(|triangle| {
+        triangle.positions.swap(1, 2);
+        triangle.normals = [Vec3::NEG_Y; 3];
+    });
+    scene.cameras.push(camera(vec3(0.0, 1.0, 2.9), vec3(0.0, 0.8, 0.0), 50.0));
+    scene
+}
+
+#[test]
+fn rays_and_photons_agree_on_every_lobe() {
+    let of = |material: &Material, mode| {
+        let settings = settings(mode, 60_000, 24).with(|s| s.picture.spp = 16);
+        mean(&render_scene(&room(material.clone()), &settings))
+    };
+    for (name, material) in lobes() {
+        let (rays, photons) = (of(&material, Mode::Hybrid), of(&material, Mode::Photons));
+        assert!((photons / rays - 1.0).abs() < 0.025, "{name}: {rays} by rays, {photons} by photons");
+    }
+    let (black, metal) = (of(&Material::new("", diffuse(0.0)), Mode::Hybrid), of(&metal(0.2), Mode::Photons));
+    assert!((metal / black - 1.0).abs() > 0.05, "control: {black} with a black ball, {metal} with one of metal");
+}
+
+#[test]
+fn light_in_metal_is_seen_by_rays_alone() {
+    for roughness in [0.0, 0.3] {
+        let scene = furnace(metal(roughness));
+        let of = |mode| mean(&render_scene(&scene, &settings(mode, 1000, 8).with(|s| s.picture.spp = 16)));
+        for mode in [Mode::Hybrid, Mode::Photons, Mode::DirectRays] {
+            assert!((of(mode) - 1.0).abs() < 0.02, "roughness {roughness}, {mode:?}: {}", of(mode));
+        }
+        assert_eq!(of(Mode::DirectPhotons) + of(Mode::IndirectPhotons), 0.0, "roughness {roughness}");
+    }
+}
+
+/// A floor that only a ball of rough metal lights: the spot light points at the ball, from below a
+/// screen.
+fn caustic(roughness: f32, turned: bool) -> Scene {
+    let mut scene = Scene { materials: vec![Material::new("floor", diffuse(0.5)), metal(roughness)], ..Scene::default() };
+    add_quad(&mut scene, vec3(-2.0, 0.0, 2.0), vec3(4.0, 0.0, 0.0), vec3(0.0, 0.0, -4.0), 0);
+    scene.spheres.push(sphere(vec3(0.0, 1.0, 0.0), 0.5, 1));
+    let mut light = point_light(vec3(2.0, 1.0, 0.0), 20.0);
+    light.kind = LightKind::Spot { inner: 0.05, outer: 0.2 };
+    light.direction = if turned { Vec3::Y } else { Vec3::NEG_X };
+    scene.lights.push(light);
+    scene.cameras.push(camera(vec3(1.0, 3.0, 0.0), vec3(1.0, 0.0, 0.0), 40.0));
+    scene
+}
+
+#[test]
+fn the_caustic_of_rough_metal_is_that_of_photons() {
+    let of = |turned, mode| mean(&render_scene(&caustic(0.2, turned), &settings(mode, 40_000, 24)));
+    let hybrid = of(false, Mode::Hybrid);
+    assert!(hybrid > 0.01, "{hybrid}");
+    assert!(of(false, Mode::DirectRays) < 0.02 * hybrid, "rays see none of it");
+    for mode in [Mode::Photons, Mode::DirectPhotons, Mode::IndirectPhotons] {
+        assert!((of(false, mode) / hybrid - 1.0).abs() < 0.02, "{mode:?}: {} for {hybrid}", of(false, mode));
+    }
+    assert!(of(true, Mode::Hybrid) < 0.02 * hybrid, "control: the lamp turned away");
+}
+
+#[test]
+fn photons_above_the_bound_are_those_of_the_global_map() {
+    let of = |bound: f32, roughness: f32| {
+        let mut scene = caustic(roughness, false);
+        scene.options.caustic_roughness = bound;
+        let render = render_scene(&scene, &settings(Mode::Hybrid, 40_000, 24));
+        (mean(&render), render.stats.photons.caustic.stored, render.stats.photons.global.stored)
+    };
+    let ((caustic, stored, _), (global, none, moved)) = (of(0.35, 0.3), of(0.2, 0.3));
+    assert!(stored > 0 && none == 0 && moved > 0, "{stored} and {none} in the caustic map, {moved} in the global one");
+    assert!((global / caustic - 1.0).abs() < 0.05, "{caustic} as a caustic, {global} as global light");
+    let (sharper, ..) = of(0.35, 0.1);
+    assert!((sharper / caustic - 1.0).abs() > 0.05, "control: {sharper} by a sharper ball");
+}
+
+#[test]
+fn a_leaf_lights_what_is_behind_it() {
+    let of = |fraction: f32, mode| {
+        let leaf = Material {
+            diffuse_transmission: fraction,
+            diffuse_transmission_color: Vec3::ONE,
+            ..Material::new("leaf", diffuse(0.0))
+        };
+        let mut scene = Scene { materials: vec![Material::new("floor", diffuse(0.5)), leaf], ..Scene::default() };
+        add_quad(&mut scene, vec3(-3.0, 0.0, 3.0), vec3(6.0, 0.0, 0.0), vec3(0.0, 0.0, -6.0), 0);
+        add_quad(&mut scene, vec3(-3.0, 1.0, 3.0), vec3(6.0, 0.0, 0.0), vec3(0.0, 0.0, -6.0), 1);
+        scene.lights.push(point_light(vec3(0.0, 2.0, 0.0), 10.0));
+        // Between both, to the underside of the leaf.
+        scene.cameras.push(camera(vec3(0.0, 0.3, 0.5), vec3(0.0, 1.0, 0.0), 40.0));
+        mean(&render_scene(&scene, &settings(mode, 60_000, 16).with(|s| s.picture.spp = 4)))
+    };
+    let (rays, photons) = (of(1.0, Mode::Hybrid), of(1.0, Mode::Photons));
+    // I cos θ/d² through the leaf at the axis, where it is most.
+    let most = 10.0 / std::f64::consts::PI;
+    assert!((0.6 * most..1.1 * most).contains(&rays), "{rays} of at most {most}");
+    assert!((photons / rays - 1.0).abs() < 0.03, "{rays} by rays, {photons} by photons");
+    let half = of(0.5, Mode::Hybrid);
+    assert!((half / rays - 0.5).abs() < 0.03, "control: {half} through a leaf of half");
+}
