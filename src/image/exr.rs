@@ -264,8 +264,14 @@ mod tests {
     }
 
     fn write(path: &Path, frame: &Frame, settings: &Settings) {
-        let provenance =
-            Provenance { scene: "räume.gltf", scene_hash: "ab12", options: &LoadOptions::default(), environment: None, settings, stats: &stats() };
+        let provenance = Provenance {
+            scene: "räume.gltf",
+            scene_hash: "ab12",
+            options: &LoadOptions::default(),
+            environment: None,
+            settings,
+            stats: &stats(),
+        };
         write_exr(path, frame, &provenance).unwrap();
     }
 
@@ -301,8 +307,14 @@ mod tests {
         let found = |environment: Option<EnvironmentProvenance>| {
             let path = folder.path().join("a.exr");
             let settings = Settings::default();
-            let provenance =
-                Provenance { scene: "", scene_hash: "", options: &LoadOptions::default(), environment, settings: &settings, stats: &stats() };
+            let provenance = Provenance {
+                scene: "",
+                scene_hash: "",
+                options: &LoadOptions::default(),
+                environment,
+                settings: &settings,
+                stats: &stats(),
+            };
             write_exr(&path, &frame(), &provenance).unwrap();
             let mut all = read_exr_attributes(&path).unwrap();
             all.retain(|name, _| name.starts_with("environment"));

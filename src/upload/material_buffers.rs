@@ -8,9 +8,8 @@ use crate::{
     error::{Error, Result},
     gpu::{Gpu, Table},
     layout::{
-        self, BLEND_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS,
-        MaterialRecord, SECOND_UV_BIT, SRGB_BIT, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
-        octahedral,
+        self, BLEND_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS, MaterialRecord,
+        SECOND_UV_BIT, SRGB_BIT, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
     },
     scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
     settings::LightUnit,

@@ -5,9 +5,9 @@
 //! |---|---|---|
 //! | furnace | a ball of each material under a uniform sky is as bright as its albedo says | half of the sky |
 //! | lobes | modes 0 and 1 agree on a room with a ball of each material | a ball of another material |
-//! | rays | light seen in sharp and rough metal is there in the modes of rays, and in no other | – |
+//! | rays | light seen in sharp and rough metal is there in all modes that show direct light | the mode that does not |
 //! | caustic | a rough ball's caustic is in the modes with photons | lamp turned away |
-//! | bound | caustic photons above the roughness bound are those of the global map | a ball that absorbs |
+//! | bound | caustic photons above the roughness bound are those of the global map | a darker ball |
 //! | transmission | a leaf lights what is behind it, and photons and rays agree | a leaf that transmits less |
 
 use caustica::{
@@ -23,8 +23,7 @@ fn metal(roughness: f32) -> Material {
 }
 
 fn coated(roughness: f32) -> Material {
-    let surface =
-        Surface::Layered { base: Vec3::splat(0.5), metallic: 0.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    let surface = Surface::Layered { base: Vec3::splat(0.5), metallic: 0.0, f0: Vec3::splat(0.04), specular: 1.0 };
     Material { roughness, ..Material::new("coated", surface) }
 }
 
@@ -39,13 +38,17 @@ fn lobes() -> Vec<(&'static str, Material)> {
         diffuse_transmission_color: Vec3::splat(0.5),
         ..Material::new("leaf", diffuse(0.5))
     };
+    let cloth = Material {
+        clearcoat: 0.5,
+        clearcoat_roughness: 0.1,
+        sheen_color: Vec3::splat(0.8),
+        sheen_roughness: 0.5,
+        ..coated(0.6)
+    };
     vec![
         ("metal", metal(0.2)),
-        ("rough metal", metal(0.8)),
         ("coat", coated(0.3)),
-        ("clear coat", Material { clearcoat: 1.0, clearcoat_roughness: 0.1, ..coated(0.6) }),
-        ("sheen", Material { sheen_color: Vec3::splat(0.8), sheen_roughness: 0.5, ..coated(0.6) }),
-        ("film", Material { iridescence: 1.0, ..metal(0.2) }),
+        ("clear coat over sheen", cloth),
         ("leaf", leaf),
         ("rough glass", rough_glass()),
         ("prism", Material { dispersion: 2.0, ..Material::new("prism", glass()) }),
@@ -99,10 +102,6 @@ fn room(material: Material) -> Scene {
     add_box(&mut scene, vec3(-1.0, 0.0, -1.0), vec3(1.0, 2.0, 3.0), 0);
     scene.spheres.push(sphere(vec3(0.0, 0.7, 0.0), 0.6, 1));
     add_quad(&mut scene, vec3(-0.3, 1.95, 0.6), vec3(0.0, 0.0, -0.6), vec3(0.6, 0.0, 0.0), 2);
-    scene.triangles.iter_mut().rev().take(2).for_each(|triangle| {
-        triangle.positions.swap(1, 2);
-        triangle.normals = [Vec3::NEG_Y; 3];
-    });
     scene.cameras.push(camera(vec3(0.0, 1.0, 2.9), vec3(0.0, 0.8, 0.0), 50.0));
     scene
 }
@@ -110,7 +109,7 @@ fn room(material: Material) -> Scene {
 #[test]
 fn rays_and_photons_agree_on_every_lobe() {
     let of = |material: &Material, mode| {
-        let settings = settings(mode, 60_000, 24).with(|s| s.picture.spp = 16);
+        let settings = settings(mode, 40_000, 20).with(|s| s.picture.spp = 9);
         mean(&render_scene(&room(material.clone()), &settings))
     };
     for (name, material) in lobes() {
@@ -122,28 +121,29 @@ fn rays_and_photons_agree_on_every_lobe() {
 }
 
 #[test]
-fn light_in_metal_is_seen_by_rays_alone() {
+fn light_in_metal_is_seen_by_rays() {
     for roughness in [0.0, 0.3] {
         let scene = furnace(metal(roughness));
         let of = |mode| mean(&render_scene(&scene, &settings(mode, 1000, 8).with(|s| s.picture.spp = 16)));
-        for mode in [Mode::Hybrid, Mode::Photons, Mode::DirectRays] {
+        for mode in [Mode::Hybrid, Mode::Photons, Mode::DirectRays, Mode::DirectPhotons] {
             assert!((of(mode) - 1.0).abs() < 0.02, "roughness {roughness}, {mode:?}: {}", of(mode));
         }
-        assert_eq!(of(Mode::DirectPhotons) + of(Mode::IndirectPhotons), 0.0, "roughness {roughness}");
+        assert_eq!(of(Mode::IndirectPhotons), 0.0, "control: roughness {roughness}");
     }
 }
 
 /// A floor that only a ball of rough metal lights: the spot light points at the ball, from below a
 /// screen.
 fn caustic(roughness: f32, turned: bool) -> Scene {
-    let mut scene = Scene { materials: vec![Material::new("floor", diffuse(0.5)), metal(roughness)], ..Scene::default() };
+    let mut scene =
+        Scene { materials: vec![Material::new("floor", diffuse(0.5)), metal(roughness)], ..Scene::default() };
     add_quad(&mut scene, vec3(-2.0, 0.0, 2.0), vec3(4.0, 0.0, 0.0), vec3(0.0, 0.0, -4.0), 0);
     scene.spheres.push(sphere(vec3(0.0, 1.0, 0.0), 0.5, 1));
     let mut light = point_light(vec3(2.0, 1.0, 0.0), 20.0);
     light.kind = LightKind::Spot { inner: 0.05, outer: 0.2 };
     light.direction = if turned { Vec3::Y } else { Vec3::NEG_X };
     scene.lights.push(light);
-    scene.cameras.push(camera(vec3(1.0, 3.0, 0.0), vec3(1.0, 0.0, 0.0), 40.0));
+    scene.cameras.push(camera(vec3(1.4, 3.0, 0.0), vec3(1.4, 0.0, 0.0), 28.0));
     scene
 }
 
@@ -151,7 +151,7 @@ fn caustic(roughness: f32, turned: bool) -> Scene {
 fn the_caustic_of_rough_metal_is_that_of_photons() {
     let of = |turned, mode| mean(&render_scene(&caustic(0.2, turned), &settings(mode, 40_000, 24)));
     let hybrid = of(false, Mode::Hybrid);
-    assert!(hybrid > 0.01, "{hybrid}");
+    assert!(hybrid > 0.001, "{hybrid}");
     assert!(of(false, Mode::DirectRays) < 0.02 * hybrid, "rays see none of it");
     for mode in [Mode::Photons, Mode::DirectPhotons, Mode::IndirectPhotons] {
         assert!((of(false, mode) / hybrid - 1.0).abs() < 0.02, "{mode:?}: {} for {hybrid}", of(false, mode));
@@ -161,17 +161,20 @@ fn the_caustic_of_rough_metal_is_that_of_photons() {
 
 #[test]
 fn photons_above_the_bound_are_those_of_the_global_map() {
-    let of = |bound: f32, roughness: f32| {
-        let mut scene = caustic(roughness, false);
+    let of = |bound: f32, tint: f32| {
+        let mut scene = caustic(0.3, false);
+        if let Surface::Layered { base, .. } = &mut scene.materials[1].surface {
+            *base = Vec3::splat(tint);
+        }
         scene.options.caustic_roughness = bound;
         let render = render_scene(&scene, &settings(Mode::Hybrid, 40_000, 24));
         (mean(&render), render.stats.photons.caustic.stored, render.stats.photons.global.stored)
     };
-    let ((caustic, stored, _), (global, none, moved)) = (of(0.35, 0.3), of(0.2, 0.3));
+    let ((caustic, stored, _), (global, none, moved)) = (of(0.35, 1.0), of(0.2, 1.0));
     assert!(stored > 0 && none == 0 && moved > 0, "{stored} and {none} in the caustic map, {moved} in the global one");
     assert!((global / caustic - 1.0).abs() < 0.05, "{caustic} as a caustic, {global} as global light");
-    let (sharper, ..) = of(0.35, 0.1);
-    assert!((sharper / caustic - 1.0).abs() > 0.05, "control: {sharper} by a sharper ball");
+    let (darker, ..) = of(0.35, 0.8);
+    assert!((darker / caustic - 1.0).abs() > 0.1, "control: {darker} by a darker ball");
 }
 
 #[test]

@@ -91,7 +91,14 @@ pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<S
     let resources = Resources { bin, folder, allow_outside: options.allow_outside };
     let scene =
         assemble(&root, chosen, &resources, options.texture_size, hash, notes).map_err(|fault| fault.of(path))?;
-    Ok(Scene { path: path.to_owned(), file_name, files: resources.named(&root), variants, options: options.clone(), ..scene })
+    Ok(Scene {
+        path: path.to_owned(),
+        file_name,
+        files: resources.named(&root),
+        variants,
+        options: options.clone(),
+        ..scene
+    })
 }
 
 /// The JSON part, with its graph of nodes checked, and the binary chunk.
