@@ -287,6 +287,7 @@ mod tests {
         for (name, value) in [
             ("version", env!("CARGO_PKG_VERSION")),
             ("seed", "4294967295"),
+            ("loading", &serde_json::to_string(&LoadOptions::default()).unwrap()),
             ("scene", "räume.gltf"),
             ("sceneHash", "ab12"),
             ("device", "Große Karte"),
@@ -298,7 +299,7 @@ mod tests {
         ] {
             assert_eq!(found[name], value, "{name}");
         }
-        assert_eq!(found.len(), 11);
+        assert_eq!(found.len(), 12);
     }
 
     #[test]
