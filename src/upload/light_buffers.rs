@@ -82,7 +82,7 @@ impl LightBuffers {
             direct: upload("direct light choices", &table.for_direct_light())?,
             specular_targets: targets.len() as u32,
             has_environment: map.is_some(),
-            warnings: reduced(scene, map.as_ref()).into_iter().collect(),
+            warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
             targets: gpu.storage_with("targets", &spheres)?,
             scene_sphere: gpu.uniform("scene sphere", &scene_sphere),
