@@ -4,15 +4,11 @@
 use std::{collections::BTreeMap, f64::consts::PI};
 
 use glam::{DVec3, Vec2, Vec3};
-use rayon::prelude::*;
 
 use crate::{
     layout,
-    scene::{EmissionMap, Emitted, Part, Scene},
+    scene::{Cut, EmissionMap, Emitted, Part, Scene},
 };
-
-/// Most lights that all triangles of varied emission are cut into, unless they are more themselves.
-const MAX_PARTS: u64 = 65_536;
 
 /// A light of a surface, without its emission.
 pub(super) struct SurfaceLight {
@@ -24,28 +20,14 @@ pub(super) struct SurfaceLight {
 pub(super) struct SurfaceLights<'a> {
     scene: &'a Scene,
     map: EmissionMap<'a>,
-    /// By primitive of varied emission: parts along an edge, and what they emit; none if it is dark.
-    cut: BTreeMap<usize, (u32, Vec<Emitted>)>,
+    /// The primitives of varied emission, by index.
+    cut: BTreeMap<usize, Cut>,
 }
 
 impl<'a> SurfaceLights<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let map = EmissionMap::new(scene);
-        let materials = scene.triangles.iter().map(|t| t.material).chain(scene.spheres.iter().map(|s| s.material));
-        let varied: Vec<usize> =
-            materials.enumerate().filter(|(_, material)| map.is_varied(*material)).map(|(i, _)| i).collect();
-        let sides: Vec<u32> = varied.par_iter().map(|primitive| map.side(*primitive)).collect();
-        let parts = |most: u32| sides.iter().map(|side| u64::from(*side.min(&most)).pow(2)).sum::<u64>();
-        let mut most = sides.iter().copied().max().unwrap_or(0);
-        while most > 1 && parts(most) > MAX_PARTS {
-            most /= 2;
-        }
-        let of = |(primitive, side): (&usize, &u32)| {
-            let side = (*side).min(most);
-            let emitted = if side == 0 { Vec::new() } else { map.parts(*primitive, side) };
-            (*primitive, (side, emitted))
-        };
-        let cut = varied.par_iter().zip(&sides).map(of).collect();
+        let cut = map.cut();
         Self { scene, map, cut }
     }
 
@@ -61,10 +43,10 @@ impl<'a> SurfaceLights<'a> {
         if whole.area <= 0.0 {
             return Vec::new();
         }
-        let Some((side, emitted)) = self.cut.get(&primitive) else {
+        let Some(Cut { side, parts }) = self.cut.get(&primitive) else {
             return vec![SurfaceLight { light: whole, emitted: Emitted { mean: DVec3::ONE, is_lit: true } }];
         };
-        if emitted.iter().all(|part| !part.is_lit) {
+        if parts.iter().all(|part| !part.is_lit) {
             return Vec::new();
         }
         let triangle = self.scene.triangles.get(primitive);
@@ -75,7 +57,7 @@ impl<'a> SurfaceLights<'a> {
         let attributes = triangle.map_or(0, |triangle| triangle.attributes);
         let whole = layout::Light { material: material + 1, attributes, side: *side, ..whole };
         let part = |(part, emitted): (Part, &Emitted)| SurfaceLight { light: cut_out(&whole, part), emitted: *emitted };
-        Part::all(*side).zip(emitted).map(part).collect()
+        Part::all(*side).zip(parts).map(part).collect()
     }
 }
 

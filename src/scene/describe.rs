@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    EmissionMap, LightKind, Projection, Scene,
+    Cut, EmissionMap, LightKind, Projection, Scene,
     describe_materials::{self, ImageInfo, MaterialInfo},
     words::one_line,
 };
@@ -143,13 +143,12 @@ impl Scene {
                 power: [0.0; 3],
             })
             .collect();
-        let map = EmissionMap::new(self);
+        let varied = EmissionMap::new(self).cut();
         // Areas, times the mean of what varies the emission.
         let mut lit = vec![DVec3::ZERO; emitters.len()];
         let mut add = |primitive: usize, material: u32, area: f64| {
             emitters[material as usize].area += area;
-            lit[material as usize] +=
-                if map.is_varied(material) { area * map.mean(primitive) } else { DVec3::splat(area) };
+            lit[material as usize] += varied.get(&primitive).map_or(DVec3::ONE, Cut::mean) * area;
         };
         for (i, triangle) in self.triangles.iter().enumerate() {
             add(i, triangle.material, triangle.area());

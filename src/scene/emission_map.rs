@@ -8,6 +8,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::{
     Alpha, Attributes, Material, Scene, Texture, Triangle,
@@ -16,9 +17,11 @@ use super::{
 
 /// Most parts along an edge of a triangle.
 const MAX_SIDE: u32 = 16;
-/// Texels along an edge that a part should cover.
-const PART_TEXELS: f32 = 4.0;
-/// Least and greatest number of points along an edge of a part by which its mean is taken.
+/// Most parts of a scene, unless it has more triangles of varied emission.
+const MAX_PARTS: u64 = 65_536;
+/// Points for each texel along an edge of a part by which its mean is taken, and their least and
+/// greatest number.
+const POINTS_PER_TEXEL: f32 = 2.0;
 const POINTS: [u32; 2] = [4, 32];
 
 /// Place of a part in its triangle.
@@ -53,6 +56,22 @@ pub(crate) struct Emitted {
     pub mean: DVec3,
     /// Whether the factor can be above 0 somewhere.
     pub is_lit: bool,
+}
+
+/// A primitive of varied emission, cut into parts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Cut {
+    /// Parts along an edge; 0 if it emits nothing.
+    pub side: u32,
+    /// `side` squared.
+    pub parts: Vec<Emitted>,
+}
+
+impl Cut {
+    /// Mean over the primitive of the factor on the emission of its material.
+    pub fn mean(&self) -> DVec3 {
+        self.parts.iter().map(|part| part.mean).sum::<DVec3>() / (self.parts.len() as f64).max(1.0)
+    }
 }
 
 /// Textures on which the emission of a material depends.
@@ -93,28 +112,49 @@ impl<'a> EmissionMap<'a> {
         self.materials[material as usize].is_some()
     }
 
+    /// All primitives of varied emission, by their indices in the scene.
+    pub fn cut(&self) -> BTreeMap<usize, Cut> {
+        let (triangles, spheres) = (&self.scene.triangles, &self.scene.spheres);
+        let materials = triangles.iter().map(|t| t.material).chain(spheres.iter().map(|s| s.material));
+        let varied: Vec<usize> =
+            materials.enumerate().filter(|(_, material)| self.is_varied(*material)).map(|(i, _)| i).collect();
+        let sides: Vec<u32> = varied.par_iter().map(|primitive| self.side(*primitive)).collect();
+        let count = |most: u32| sides.iter().map(|side| u64::from(*side.min(&most)).pow(2)).sum::<u64>();
+        let mut most = MAX_SIDE;
+        while most > 1 && count(most) > MAX_PARTS {
+            most /= 2;
+        }
+        let cut = |(primitive, side): (&usize, &u32)| {
+            let side = (*side).min(most);
+            let parts = if side == 0 { Vec::new() } else { self.parts(*primitive, side) };
+            (*primitive, Cut { side, parts })
+        };
+        varied.par_iter().zip(&sides).map(cut).collect()
+    }
+
     /// Number of parts that a primitive of varied emission should be cut into, along an edge; 0 if
     /// it emits nothing.
-    pub fn side(&self, primitive: usize) -> u32 {
+    fn side(&self, primitive: usize) -> u32 {
         let Some((triangle, own)) = self.triangle(primitive) else {
             return u32::from(self.parts(primitive, 1)[0].is_lit);
         };
         if !self.is_lit(triangle, &own, |weights| weights) {
             return 0;
         }
-        let wanted = (self.extent(triangle, &own) / PART_TEXELS).ceil() as u32;
+        // One part for each texel.
+        let wanted = self.extent(triangle, &own).ceil() as u32;
         wanted.clamp(1, MAX_SIDE).next_power_of_two()
     }
 
     /// What each part of a primitive emits. A sphere is one part.
-    pub fn parts(&self, primitive: usize, side: u32) -> Vec<Emitted> {
+    fn parts(&self, primitive: usize, side: u32) -> Vec<Emitted> {
         let Some((triangle, own)) = self.triangle(primitive) else {
             let sphere = &self.scene.spheres[primitive - self.scene.triangles.len()];
             let material = &self.scene.materials[sphere.material as usize];
             let mean = DVec3::splat(coverage(material, material.opacity).into());
             return vec![Emitted { mean, is_lit: mean != DVec3::ZERO }];
         };
-        let points = (self.extent(triangle, &own) / side as f32).ceil() as u32;
+        let points = (POINTS_PER_TEXEL * self.extent(triangle, &own) / side as f32).ceil() as u32;
         let points = points.clamp(POINTS[0], POINTS[1]);
         let emitted = |part: Part| {
             if !self.is_lit(triangle, &own, |weights| part.weights(side, weights)) {
@@ -125,15 +165,6 @@ impl<'a> EmissionMap<'a> {
             Emitted { mean: sum / f64::from(points * points), is_lit: true }
         };
         Part::all(side).map(emitted).collect()
-    }
-
-    /// Mean of the factor on the emission over a primitive.
-    pub fn mean(&self, primitive: usize) -> DVec3 {
-        let side = self.side(primitive);
-        if side == 0 {
-            return DVec3::ZERO;
-        }
-        self.parts(primitive, side).iter().map(|part| part.mean).sum::<DVec3>() / f64::from(side * side)
     }
 
     /// A triangle and what its corners carry; `None` for a sphere.
@@ -197,4 +228,27 @@ where
     T: std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
 {
     a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_tile_the_triangle() {
+        for side in [1, 2, 16] {
+            let parts: Vec<Part> = Part::all(side).collect();
+            assert_eq!(parts.len(), (side * side) as usize);
+            for (i, part) in parts.iter().enumerate() {
+                // The kernels' formula for the number of a part.
+                let before = part.row * (2 * side - part.row) + 2 * part.column + u32::from(part.is_turned);
+                assert_eq!(before, i as u32);
+                let middle = part.weights(side, Vec2::splat(1.0 / 3.0));
+                assert!(middle.min_element() > 0.0 && middle.element_sum() < 1.0, "{part:?} lies outside");
+                let place = middle * side as f32;
+                assert_eq!((place.floor() - Vec2::new(part.column as f32, part.row as f32)).length(), 0.0);
+                assert_eq!(place.fract().element_sum() > 1.0, part.is_turned);
+            }
+        }
+    }
 }

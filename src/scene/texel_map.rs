@@ -160,3 +160,50 @@ fn decoded([r, g, b, a]: [u8; 4]) -> Vec4 {
     let [r, g, b] = [r, g, b].map(|byte| LINEAR[usize::from(byte)]);
     Vec4::new(r, g, b, f32::from(a) / 255.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec2;
+
+    /// An image of 11 by 7 texels of which few are not black.
+    fn image() -> Image {
+        let texel = |i: usize| if i % 23 == 5 { [0, 200, 3, 255] } else { [0, 0, 0, 255] };
+        Image { name: String::new(), width: 11, height: 7, texels: (0..77).map(texel).collect() }
+    }
+
+    #[test]
+    fn a_region_is_dark_only_where_all_its_points_are() {
+        let image = image();
+        let counts = Arc::new(Counts::new(&image, Channels::Color));
+        for (i, wrap) in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp].into_iter().enumerate() {
+            let texture = Texture {
+                image: 0,
+                wrap: [wrap, [Wrap::Clamp, Wrap::Repeat, Wrap::Mirror][i]],
+                is_linear: i != 1,
+                is_mipmapped: false,
+                uv_set: 0,
+                transform: [[0.8, 0.3, -1.7], [-0.2, 1.4, 0.6]],
+            };
+            let map = TexelMap { image: &image, texture, counts: Arc::clone(&counts) };
+            let corner =
+                |k: usize| vec2((k as f32 * 0.618).fract() * 6.0 - 3.0, (k as f32 * 0.414).fract() * 6.0 - 3.0);
+            let (mut dark, mut lit) = (0, 0);
+            for k in 0..600 {
+                let (a, size) = (corner(k), 0.02 + 0.2 * (k as f32 * 0.37).fract());
+                let uvs = [a, a + vec2(size, 0.1 * size), a + vec2(-0.2 * size, size)];
+                let points = (0..400).map(|i| [(i % 20) as f32 / 19.0, (i / 20) as f32 / 19.0]);
+                let inside = points.filter(|[u, v]| u + v <= 1.0);
+                let shines = |[u, v]: [f32; 2]| map.value(a + u * (uvs[1] - a) + v * (uvs[2] - a)).y > 0.0;
+                let is_lit = map.is_lit(uvs);
+                assert!(is_lit || !inside.clone().any(shines), "{wrap:?}: a bright point in {uvs:?}");
+                dark += u32::from(!is_lit);
+                lit += u32::from(is_lit && inside.clone().any(shines));
+            }
+            assert!(dark > 60 && lit > 60, "control: {dark} regions are dark and {lit} bright");
+            assert!(
+                map.is_lit([vec2(f32::NAN, 0.0); 3]) && map.is_lit([vec2(-1e30, 0.0), vec2(1e30, 9.0), Vec2::ZERO])
+            );
+        }
+    }
+}
