@@ -81,7 +81,7 @@ pub struct Primitive {
     /// Index of the primitive in the scene before the BVH reordered it.
     pub id: u32,
     pub e2: [f32; 3],
-    /// Index of the primitive's [`Light`], plus one; 0 if it does not emit light.
+    /// Index of the primitive's first [`Light`], plus one; 0 if it does not emit light.
     pub emitter: u32,
 }
 
@@ -242,8 +242,9 @@ pub const SPHERE_LIGHT: u32 = 4;
 /// The environment.
 pub const ENVIRONMENT_LIGHT: u32 = 5;
 
-/// A punctual light, an emissive triangle or sphere, or the environment. Its power is `emission ·
-/// area · solid_angle`, except for directional lights and the environment.
+/// A punctual light, an emissive triangle or a part of one, an emissive sphere, or the environment.
+/// Its power is `emission · area · solid_angle`, times the mean of what varies over a surface,
+/// except for directional lights and the environment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Light {
@@ -273,6 +274,26 @@ pub struct Light {
     /// [`crate::bvh::MediaProbe`].
     pub media: [u32; MEDIA_WORDS],
     pub back_media: [u32; MEDIA_WORDS],
+    /// Index of the material plus one where the emission varies over the surface, by a texture or
+    /// by opacity; else 0. `emission` is then a factor.
+    pub material: u32,
+    /// Index of the triangle's [`Attributes`] plus one; 0 for none.
+    pub attributes: u32,
+    /// Triangle: place of this light among the parts of its triangle, [`part_word`].
+    pub part: u32,
+    /// Triangle: number of parts along an edge of its triangle; 0 or 1 if the light is all of it.
+    /// The parts are consecutive lights, row by row.
+    pub side: u32,
+}
+
+/// Set in [`Light::part`] for a part that is turned by half a turn against its triangle.
+pub const TURNED_BIT: u32 = 1 << 16;
+
+/// [`Light::part`]: column and row of the corner nearest to the triangle's first corner, along its
+/// edges, in units of parts.
+#[must_use]
+pub fn part_word(column: u32, row: u32, is_turned: bool) -> u32 {
+    column | (row << 8) | if is_turned { TURNED_BIT } else { 0 }
 }
 
 /// One entry of a table from which lights are sampled.

@@ -14,7 +14,9 @@ pub fn set_media(light: &mut Light, probe: &MediaProbe) {
     let (place, normal, reach) = match light.kind {
         layout::POINT_LIGHT | layout::SPOT_LIGHT => (position, DVec3::ZERO, 0.0),
         layout::TRIANGLE_LIGHT => {
-            let reach = position.abs().max(e1.abs()).max(e2.abs()).max_element();
+            // That of the whole triangle, whose rounding rays meet.
+            let edges = e1.abs().max(e2.abs()) * f64::from(light.side.max(1));
+            let reach = position.abs().max(edges).max_element();
             (position + (e1 + e2) / 3.0, e1.cross(e2).normalize_or_zero(), reach)
         }
         layout::SPHERE_LIGHT => {

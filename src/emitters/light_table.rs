@@ -15,6 +15,7 @@ use glam::{DVec3, Vec3};
 use super::{
     cumulative::{MAX_CHOICES, cumulative, probabilities},
     environment_map::EnvironmentMap,
+    surface_lights::{SurfaceLight, SurfaceLights},
     targets::Target,
 };
 use crate::{
@@ -23,6 +24,10 @@ use crate::{
     scene::{LUMENS_PER_WATT, LightKind, Scene, spot_heights},
     settings::{LightSampling, LightSettings, LightUnit},
 };
+
+/// Least share that paths take of what a part of a surface would emit if nothing darkened it: its
+/// mean may miss what is bright between the points by which it is taken.
+const MIN_SHARE: f64 = 1.0 / 64.0;
 
 /// A group of lights: what a user calls one light.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,9 +48,13 @@ pub struct LightTable {
     pub groups: Vec<LightGroup>,
     /// Number of punctual lights, the first ones in `lights`.
     pub punctual: usize,
+    /// The emission of some surface varies: it has lights with a [`layout::Light::material`].
+    pub is_varied: bool,
+    /// Materials that shine nowhere, one line each.
+    pub warnings: Vec<String>,
     /// Power of each light, W, mean of the channels.
     powers: Vec<f64>,
-    /// Index into `lights` of each emissive primitive, by the index of the primitive in the scene.
+    /// Index of the first light of each emissive primitive, by its index in the scene.
     emitters: BTreeMap<u32, u32>,
 }
 
@@ -87,7 +96,7 @@ impl LightTable {
         Ok(table)
     }
 
-    /// Index of a primitive's light, plus one; 0 if the primitive does not emit light.
+    /// Index of a primitive's first light, plus one; 0 if the primitive does not emit light.
     #[must_use]
     pub fn emitter(&self, primitive: u32) -> u32 {
         self.emitters.get(&primitive).map_or(0, |light| light + 1)
@@ -194,21 +203,32 @@ impl LightTable {
                 of_materials.entry(material).or_default().push(primitive);
             }
         }
+        let surfaces = SurfaceLights::new(scene);
         for (material, primitives) in of_materials {
+            let is_varied = surfaces.is_varied(material);
             let material = &scene.materials[material as usize];
             self.start_group(&material.name, "surface");
             let emission = emission_in(material.emission, unit);
             let solid_angle = if material.double_sided { TAU } else { PI };
+            let first = self.lights.len();
             for primitive in primitives {
-                let light = surface_light(scene, primitive);
-                // A degenerate surface emits nothing.
-                if light.area > 0.0 {
-                    self.emitters.insert(primitive as u32, self.lights.len() as u32);
+                let own = self.lights.len() as u32;
+                for SurfaceLight { light, emitted } in surfaces.of(primitive) {
                     let power = emission.as_dvec3() * f64::from(light.area) * solid_angle;
-                    let emission = emission.to_array();
-                    self.add(layout::Light { emission, solid_angle: solid_angle as f32, ..light }, power);
+                    let light = layout::Light { emission: emission.to_array(), ..light };
+                    self.add(layout::Light { solid_angle: solid_angle as f32, ..light }, power * emitted.mean);
+                    if emitted.is_lit {
+                        let least = MIN_SHARE * power.element_sum() / 3.0;
+                        self.powers.last_mut().into_iter().for_each(|power| *power = power.max(least));
+                    }
+                    self.emitters.insert(primitive as u32, own);
                 }
             }
+            if is_varied && self.lights.len() == first {
+                self.warnings
+                    .push(format!("material {:?} is black wherever it is seen: it gives no light", material.name));
+            }
+            self.is_varied |= is_varied && self.lights.len() > first;
         }
     }
 
@@ -229,21 +249,6 @@ pub(crate) fn emission_in(emission: Vec3, unit: LightUnit) -> Vec3 {
         LightUnit::Radiometric => emission,
         LightUnit::Photometric => emission / LUMENS_PER_WATT,
     }
-}
-
-/// Shape of the primitive with that index in the scene; triangles come before spheres.
-fn surface_light(scene: &Scene, primitive: usize) -> layout::Light {
-    if let Some(triangle) = scene.triangles.get(primitive) {
-        let [a, b, c] = triangle.positions;
-        let area = 0.5 * (b - a).as_dvec3().cross((c - a).as_dvec3()).length();
-        let (e1, e2) = ((b - a).to_array(), (c - a).to_array());
-        let kind = layout::TRIANGLE_LIGHT;
-        return layout::Light { position: a.to_array(), kind, e1, e2, area: area as f32, ..Default::default() };
-    }
-    let sphere = &scene.spheres[primitive - scene.triangles.len()];
-    let (position, e1) = (sphere.center.to_array(), [sphere.radius, 0.0, 0.0]);
-    let area = 4.0 * PI * f64::from(sphere.radius).powi(2);
-    layout::Light { position, kind: layout::SPHERE_LIGHT, e1, area: area as f32, ..Default::default() }
 }
 
 /// Approximate fraction of a light's power that goes towards the targets; above 0 if any light can

@@ -2,10 +2,11 @@
 
 use std::{f64::consts::PI, fmt};
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::{
-    LightKind, Projection, Scene,
+    Cut, EmissionMap, LightKind, Projection, Scene,
     describe_materials::{self, ImageInfo, MaterialInfo},
     words::one_line,
 };
@@ -69,12 +70,12 @@ pub struct EmitterInfo {
     pub spheres: usize,
     /// Area of one side, m².
     pub area: f64,
-    /// Emitted radiance, W/(m² sr) in each channel.
+    /// Emitted radiance, W/(m² sr) in each channel, before its texture and opacity.
     pub radiance: [f32; 3],
     /// Whether both sides emit.
     pub double_sided: bool,
-    /// Power, W in each channel: π times radiance and area, of both sides if the material is
-    /// double-sided.
+    /// Power, W in each channel: π times radiance and area, times the mean of its texture and
+    /// opacity, of both sides if the material is double-sided.
     pub power: [f64; 3],
 }
 
@@ -142,21 +143,26 @@ impl Scene {
                 power: [0.0; 3],
             })
             .collect();
-        for triangle in &self.triangles {
-            let emitter = &mut emitters[triangle.material as usize];
-            emitter.triangles += 1;
-            emitter.area += triangle.area();
+        let varied = EmissionMap::new(self).cut();
+        // Areas, times the mean of what varies the emission.
+        let mut lit = vec![DVec3::ZERO; emitters.len()];
+        let mut add = |primitive: usize, material: u32, area: f64| {
+            emitters[material as usize].area += area;
+            lit[material as usize] += varied.get(&primitive).map_or(DVec3::ONE, Cut::mean) * area;
+        };
+        for (i, triangle) in self.triangles.iter().enumerate() {
+            add(i, triangle.material, triangle.area());
         }
-        for sphere in &self.spheres {
-            let emitter = &mut emitters[sphere.material as usize];
-            emitter.spheres += 1;
-            emitter.area += sphere.area();
+        for (i, sphere) in self.spheres.iter().enumerate() {
+            add(self.triangles.len() + i, sphere.material, sphere.area());
+        }
+        self.triangles.iter().for_each(|triangle| emitters[triangle.material as usize].triangles += 1);
+        self.spheres.iter().for_each(|sphere| emitters[sphere.material as usize].spheres += 1);
+        for (emitter, lit) in emitters.iter_mut().zip(lit) {
+            let sides = if emitter.double_sided { 2.0 } else { 1.0 };
+            emitter.power = [0, 1, 2].map(|c| PI * sides * lit[c] * f64::from(emitter.radiance[c]));
         }
         emitters.retain(|emitter| emitter.radiance != [0.0; 3] && emitter.area > 0.0);
-        for emitter in &mut emitters {
-            let sides = if emitter.double_sided { 2.0 } else { 1.0 };
-            emitter.power = emitter.radiance.map(|radiance| PI * sides * emitter.area * f64::from(radiance));
-        }
         emitters
     }
 }

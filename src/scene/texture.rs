@@ -65,6 +65,22 @@ pub struct Attributes {
     pub tangents: [Vec4; 3],
 }
 
+impl Attributes {
+    /// In the order of the corners as they are now, see [`Triangle::is_turned`].
+    ///
+    /// [`Triangle::is_turned`]: super::Triangle::is_turned
+    #[must_use]
+    pub fn in_order(&self, is_turned: bool) -> Self {
+        let mut own = *self;
+        if is_turned {
+            own.uvs.iter_mut().for_each(|uvs| uvs.swap(1, 2));
+            own.colors.swap(1, 2);
+            own.tangents.swap(1, 2);
+        }
+        own
+    }
+}
+
 impl Default for Attributes {
     fn default() -> Self {
         Self { uvs: [[Vec2::ZERO; 3]; UV_SETS], colors: [Vec4::ONE; 3], tangents: [Vec4::ZERO; 3] }

@@ -1,6 +1,8 @@
 //! The lights in bind group 0: all lights, the tables by which passes choose from them, targets,
 //! environment.
 
+use rayon::prelude::*;
+
 use crate::{
     bvh::MediaProbe,
     emitters::{
@@ -59,7 +61,7 @@ impl LightBuffers {
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
-        table.lights.iter_mut().for_each(|light| set_media(light, probe));
+        table.lights.par_iter_mut().for_each(|light| set_media(light, probe));
         let upload = |label: &str, choices: &Choices| -> Result<ChoiceBuffer> {
             Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, strata: choices.strata })
         };
@@ -82,7 +84,7 @@ impl LightBuffers {
             direct: upload("direct light choices", &table.for_direct_light())?,
             specular_targets: targets.len() as u32,
             has_environment: map.is_some(),
-            warnings: reduced(scene, map.as_ref()).into_iter().collect(),
+            warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
             targets: gpu.storage_with("targets", &spheres)?,
             scene_sphere: gpu.uniform("scene sphere", &scene_sphere),

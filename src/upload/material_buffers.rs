@@ -99,9 +99,7 @@ fn in_order(scene: &Scene) -> Vec<Attributes> {
     let mut all = scene.attributes.clone();
     for triangle in scene.triangles.iter().filter(|triangle| triangle.is_turned && triangle.attributes > 0) {
         let own = &mut all[triangle.attributes as usize - 1];
-        own.uvs.iter_mut().for_each(|uvs| uvs.swap(1, 2));
-        own.colors.swap(1, 2);
-        own.tangents.swap(1, 2);
+        *own = own.in_order(true);
     }
     all
 }

@@ -137,6 +137,7 @@ impl SceneBuffers {
             ("HAS_TEXTURES", f64::from(u8::from(self.materials.has_textures))),
             ("HAS_ALPHA", f64::from(u8::from(self.materials.has_alpha))),
             ("HAS_ABSORPTION", f64::from(u8::from(self.has_absorption))),
+            ("HAS_VARIED_LIGHTS", f64::from(u8::from(self.lights.table.is_varied))),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
             ("SPLIT", f64::from(u8::from(self.primitives.window > 0))),
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),

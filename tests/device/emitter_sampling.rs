@@ -1,5 +1,5 @@
 //! Multiple importance sampling: where several techniques can draw a direction, each evaluates the
-//! density of the others.
+//! density of the others. Lamps are plain ones, and ones whose texture cuts them into parts.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
@@ -9,8 +9,12 @@
 
 use std::f64::consts::PI;
 
-use caustica::{emitters::targets::specular_targets, scene::Scene, settings::LightSampling};
-use glam::{DVec3, Vec3, vec3};
+use caustica::{
+    emitters::targets::specular_targets,
+    scene::{Attributes, Image, Scene, Texture, Wrap},
+    settings::LightSampling,
+};
+use glam::{DVec3, Vec2, Vec3, vec2, vec3};
 use support::*;
 
 use super::{
@@ -60,7 +64,7 @@ fn aimed_emission_follows_the_balance_of_its_targets() {
 }
 
 /// Lamps and a sky around the origin. No lamp hides another.
-fn lamps() -> Scene {
+fn plain_lamps() -> Scene {
     let mut scene = scene(&[]);
     scene.materials.extend([emissive("panel", 0.0, 3.0, true), emissive("bulb", 0.0, 5.0, false)]);
     add_quad(&mut scene, vec3(-0.8, 1.5, -0.7), vec3(1.0, 0.3, 0.0), vec3(0.1, 0.0, 1.2), 0);
@@ -69,35 +73,74 @@ fn lamps() -> Scene {
     scene
 }
 
+/// The same with a texture on the panel, varied by more than a hundred times and black in places.
+fn textured_lamps() -> Scene {
+    let mut scene = plain_lamps();
+    let mut random = photons::Random(5);
+    let texel = |i: u32| {
+        let bright = if i % 64 < 40 && i < 64 * 50 { (255.0 * random.unit().powi(2)) as u8 } else { 0 };
+        [bright, bright / 2, 40.min(bright), 255]
+    };
+    let texels = (0..64 * 64).map(texel).collect();
+    scene.images.push(Image { name: String::new(), width: 64, height: 64, texels });
+    scene.materials[0].textures.emission = Some(Texture {
+        image: 0,
+        wrap: [Wrap::Repeat; 2],
+        is_linear: true,
+        is_mipmapped: false,
+        uv_set: 1,
+        transform: Texture::IDENTITY,
+    });
+    let corners = [[vec2(0.0, 0.0), vec2(0.9, 0.1), vec2(1.0, 1.0)], [vec2(0.0, 0.0), vec2(1.0, 1.0), vec2(0.1, 0.9)]];
+    for (triangle, uvs) in scene.triangles.iter_mut().zip(corners) {
+        scene.attributes.push(Attributes { uvs: [[Vec2::ZERO; 3], uvs], ..Attributes::default() });
+        triangle.attributes = scene.attributes.len() as u32;
+    }
+    scene
+}
+
+/// Lamps, and their number: two triangles, or 256 parts of each, a sphere and the sky.
+struct Lamps {
+    scene: Scene,
+    count: f32,
+}
+
+fn lamps() -> [Lamps; 2] {
+    [Lamps { scene: plain_lamps(), count: 4.0 }, Lamps { scene: textured_lamps(), count: 514.0 }]
+}
+
 /// Directions to the lamps with two densities: as sampled (negative where hidden), and as evaluated
 /// for a ray that hits the lamp.
-fn drawn_and_met(samples: &[Row], sampling: LightSampling) -> Vec<([f32; 4], f32)> {
-    let buffers = upload(&lamps(), sampling);
+fn drawn_and_met(lamps: &Lamps, samples: &[Row], sampling: LightSampling) -> Vec<([f32; 4], f32)> {
+    let buffers = upload(&lamps.scene, sampling);
+    assert_eq!(buffers.lights.table.lights.len(), lamps.count as usize);
     let choices = if sampling == LightSampling::Power { &buffers.lights.direct } else { &buffers.lights.photons };
     let drawn = Probe::of_scene("probe_emitter", &buffers, choices).run(samples);
-    let asked: Vec<Row> = drawn.iter().map(|d| [*d, [0.0, LAMPS, 0.0, 0.0]]).collect();
+    let asked: Vec<Row> = drawn.iter().map(|d| [*d, [0.0, lamps.count, 0.0, 0.0]]).collect();
     let met = Probe::of_scene("probe_emitter_pdf", &buffers, choices).run(&asked);
     drawn.into_iter().zip(met).map(|(drawn, met)| (drawn, met[0])).collect()
 }
 
-/// Number of emitters: two triangles, a sphere and the sky.
-const LAMPS: f32 = 4.0;
-
-fn lamp_samples() -> Vec<Row> {
+fn lamp_samples(count: f32) -> Vec<Row> {
     let more = rows(2 * SAMPLES, [0.0; 4]);
     let fifth = more[SAMPLES..].iter().map(|row| row[0][0]);
-    more[..SAMPLES].iter().zip(fifth).map(|(row, fifth)| [row[0], [fifth, LAMPS, 0.0, 0.0]]).collect()
+    more[..SAMPLES].iter().zip(fifth).map(|(row, fifth)| [row[0], [fifth, count, 0.0, 0.0]]).collect()
 }
 
 #[test]
 fn emitters_are_sampled_with_the_density_that_is_told() {
+    lamps().iter().for_each(check_density);
+}
+
+fn check_density(lamps: &Lamps) {
     let visible = |sampling| {
-        let all = drawn_and_met(&lamp_samples(), sampling);
+        let all = drawn_and_met(lamps, &lamp_samples(lamps.count), sampling);
         all.into_iter().filter(|(d, _)| d[3] > 0.0).map(|(d, _)| d).collect::<Vec<_>>()
     };
     let grid = Directions { rows: 16, columns: 32 };
-    let points = grid.midpoints(32).into_iter().map(|d| [d.as_vec3().extend(0.0).to_array(), [0.0, LAMPS, 0.0, 0.0]]);
-    let densities = probe("probe_emitter_pdf", &lamps(), &points.collect::<Vec<_>>());
+    let points =
+        grid.midpoints(32).into_iter().map(|d| [d.as_vec3().extend(0.0).to_array(), [0.0, lamps.count, 0.0, 0.0]]);
+    let densities = probe("probe_emitter_pdf", &lamps.scene, &points.collect::<Vec<_>>());
     let mut probabilities = grid.probabilities(&densities.iter().map(|d| f64::from(d[0])).collect::<Vec<_>>());
     // Samples of the sky behind a lamp are hidden.
     let seen: f64 = probabilities.iter().sum();
@@ -123,9 +166,13 @@ fn weight(p: f64, q: f64) -> f64 {
 
 #[test]
 fn weights_of_both_ways_to_an_emitter_sum_to_one() {
-    let samples = lamp_samples();
-    let pairs = drawn_and_met(&samples, LightSampling::Power);
-    let other = drawn_and_met(&samples, LightSampling::Uniform);
+    lamps().iter().for_each(check_weights);
+}
+
+fn check_weights(lamps: &Lamps) {
+    let samples = lamp_samples(lamps.count);
+    let pairs = drawn_and_met(lamps, &samples, LightSampling::Power);
+    let other = drawn_and_met(lamps, &samples, LightSampling::Uniform);
     // Densities of the same direction: of light sampling as drawn, of light sampling as evaluated
     // for a cosine sample, and of cosine sampling.
     let sums = |met: &dyn Fn(usize) -> Option<f32>| {

@@ -46,7 +46,7 @@ fn twins() -> Vec<Twin> {
         TextureRecord { first, size, flags, levels, transform }
         Attributes { uvs, colors, tangents, pad }
         Medium { tint, ior, absorption, dispersion }
-        Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media }
+        Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media, material, attributes, part, side }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
@@ -125,6 +125,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         TRIANGLE_LIGHT,
         SPHERE_LIGHT,
         ENVIRONMENT_LIGHT,
+        TURNED_BIT,
         STREAM_PHOTON,
         STREAM_CAUSTIC,
         STORE_GLOBAL,

@@ -24,7 +24,7 @@ use super::{direct_flux, floor, spot};
 
 /// Irradiance of the surface of albedo 1/2 that a camera sees at `target`, by direct light. The
 /// target must lie on no edge.
-fn irradiance_at(scene: &Scene, eye: Vec3, target: Vec3, light_samples: u32) -> f64 {
+pub fn irradiance_at(scene: &Scene, eye: Vec3, target: Vec3, light_samples: u32) -> f64 {
     let mut scene = scene.clone();
     scene.cameras = vec![camera(eye, target, 0.02)];
     let settings = settings(Mode::DirectRays, 1, 16).with(|s| s.picture.light_samples = light_samples);

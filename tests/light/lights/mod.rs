@@ -3,6 +3,7 @@
 mod aimed;
 mod closed_forms;
 mod photons;
+mod textured;
 
 use caustica::{
     bvh::Bvh,
