@@ -1,6 +1,6 @@
 //! Options of reading a scene file.
 
-use caustica::scene::{CAUSTIC_ROUGHNESS, LoadOptions};
+use caustica::scene::LoadOptions;
 
 use super::values::{caustic_roughness, whole};
 
@@ -21,7 +21,7 @@ pub struct LoadingOptions {
 
     /// Roughness up to which metal and glass cast caustics; the light that rougher ones throw is
     /// gathered as that of diffuse surfaces
-    #[arg(long, value_name = "R", default_value_t = CAUSTIC_ROUGHNESS, value_parser = caustic_roughness, help_heading = "Scene")]
+    #[arg(long, value_name = "R", default_value_t = LoadOptions::default().caustic_roughness, value_parser = caustic_roughness, help_heading = "Scene")]
     pub caustic_roughness: f32,
 
     /// Metals lose the light that they reflect more than once, as by the bare specification of glTF

@@ -27,8 +27,7 @@ use super::{
 };
 use crate::{
     error::{Error, Result},
-    scene::LoadOptions,
-    settings::Settings,
+    settings::{LoadOptions, Settings},
     stats::Stats,
 };
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{contents::Scene, load_options::LoadOptions};
+use super::{LoadOptions, contents::Scene};
 use crate::Result;
 
 impl Scene {

@@ -271,10 +271,6 @@ pub struct Material {
 /// Roughness below which a lobe is perfectly specular: narrower than a pixel.
 pub const SHARP_ROUGHNESS: f32 = 0.03;
 
-/// Roughness up to which a lobe of metal or glass casts caustics unless [`super::LoadOptions`] say
-/// another: above it the light that it throws is as smooth as that of diffuse surfaces.
-pub const CAUSTIC_ROUGHNESS: f32 = 0.35;
-
 impl Material {
     /// A material of that name and surface: smooth where it is specular, without emission or
     /// textures.

@@ -2,6 +2,7 @@
 
 mod estimate;
 mod lights;
+mod loading;
 mod photons;
 mod picture;
 mod range;
@@ -9,6 +10,7 @@ mod render_settings;
 
 pub use estimate::{EstimateSettings, Search};
 pub use lights::{LightSampling, LightSettings, LightUnit};
+pub use loading::LoadOptions;
 pub use photons::{Emission, MAX_BOUNCES, Mode, PhotonSettings, Sampler};
 pub use picture::{Crop, PictureSettings};
 pub use range::{Number, Range};

@@ -2,10 +2,9 @@
 
 use serde::Serialize;
 
-use super::CAUSTIC_ROUGHNESS;
-use crate::settings::Range;
+use super::Range;
 
-/// Options of reading a file into a [`Scene`](super::Scene).
+/// Options of reading a file into a [`Scene`](crate::scene::Scene).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoadOptions {
     /// Scene of the file, by name or else by index from 0; `None` for its default scene.
@@ -33,7 +32,7 @@ impl Default for LoadOptions {
             scene: None,
             variant: None,
             texture_size: None,
-            caustic_roughness: CAUSTIC_ROUGHNESS,
+            caustic_roughness: 0.35,
             single_scattering: false,
             allow_outside: false,
             ignore_required: Vec::new(),
