@@ -307,8 +307,8 @@ impl Material {
         }
     }
 
-    /// Whether an opaque surface has more than a base: clear coat, sheen, anisotropy, iridescence
-    /// or diffuse transmission.
+    /// Whether the surface has more than a base: clear coat, sheen, anisotropy, iridescence or
+    /// diffuse transmission. Of these glass has iridescence alone.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         let is_finished = self.clearcoat > 0.0
@@ -316,7 +316,8 @@ impl Material {
             || self.anisotropy > 0.0
             || self.iridescence > 0.0
             || self.diffuse_transmission > 0.0;
-        is_finished && !self.unlit && (!self.surface.transmits() || self.transmission < 1.0)
+        let is_opaque = !self.surface.transmits() || self.transmission < 1.0;
+        !self.unlit && ((is_finished && is_opaque) || self.iridescence > 0.0)
     }
 
     /// Medium inside the solid that the surface bounds.

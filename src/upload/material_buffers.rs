@@ -91,7 +91,8 @@ fn is_layered(material: &Material) -> bool {
 
 fn is_rough(material: &Material) -> bool {
     let has_gloss = !matches!(material.surface, Surface::Diffuse { .. });
-    (has_gloss && material.roughness >= SHARP_ROUGHNESS) || material.is_finished()
+    let is_opaque = !material.surface.transmits() || material.transmission < 1.0;
+    (has_gloss && material.roughness >= SHARP_ROUGHNESS) || (material.is_finished() && is_opaque)
 }
 
 /// The attributes of the triangles, in the order of the corners as they are now.

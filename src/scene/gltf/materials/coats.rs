@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::super::fault::{Read, fault};
 use super::extensions::{Anisotropy, Clearcoat, DiffuseTransmission, Dispersion, Iridescence, Sheen};
 use super::reader::Reader;
-use crate::scene::{Material, Surface};
+use crate::scene::{Material, SHARP_ROUGHNESS, Surface};
 
 /// Reads them.
 pub(super) fn read(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
@@ -14,7 +14,29 @@ pub(super) fn read(reader: &mut Reader<'_>, material: &mut Material) -> Read<()>
     sheen(reader, material)?;
     anisotropy(reader, material)?;
     iridescence(reader, material)?;
-    diffuse_transmission(reader, material)
+    diffuse_transmission(reader, material)?;
+    note_glass(reader, material);
+    Ok(())
+}
+
+/// Notes what has no effect on glass.
+fn note_glass(reader: &mut Reader<'_>, material: &Material) {
+    if !material.surface.transmits() {
+        return;
+    }
+    let is_rough = material.roughness >= SHARP_ROUGHNESS;
+    for (name, has) in [
+        ("clearcoat", material.clearcoat > 0.0),
+        ("sheen", material.sheen_color != Vec3::ZERO),
+        ("anisotropy", material.anisotropy > 0.0),
+        ("iridescence", material.iridescence > 0.0 && is_rough),
+        ("diffuse_transmission", material.diffuse_transmission > 0.0),
+    ] {
+        if has {
+            let rough = if name == "iridescence" { "rough " } else { "" };
+            reader.note(&format!("KHR_materials_{name} has no effect on what of it is {rough}glass"));
+        }
+    }
 }
 
 fn clearcoat(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
