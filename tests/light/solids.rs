@@ -112,6 +112,7 @@ fn meshes_that_are_no_clean_solids_are_named_and_never_too_bright() {
         ("hole", holed, "has holes, but is taken for a solid"),
         ("parts that cross", cross, ""),
         ("crossing itself", bow_tie, "crosses itself"),
+        ("hollow", ball.clone().with(&Mesh::ball(Vec3::ZERO, 0.6, 24).turned()), ""),
         ("clean", ball.clone(), ""),
     ] {
         let scene = assert_white(name, &[(mesh, 0)], &glasses);

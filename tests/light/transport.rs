@@ -8,6 +8,7 @@
 //! | rays | light seen in sharp and rough metal is there in all modes that show direct light | the mode that does not |
 //! | caustic | a rough ball's caustic is in the modes with photons | lamp turned away |
 //! | bound | caustic photons above the roughness bound are those of the global map | a darker ball |
+//! | unlit | an unlit surface has its colour, whatever the sky | a lit one |
 //! | transmission | a leaf lights what is behind it, and photons and rays agree | a leaf that transmits less |
 
 use caustica::{
@@ -78,6 +79,7 @@ fn every_lobe_reflects_what_it_gets() {
         ("metal", metal(0.2), 0.99, 1.01),
         ("rough metal", metal(1.0), 0.985, 1.015),
         ("film", Material { iridescence: 1.0, ..metal(0.3) }, 0.99, 1.01),
+        ("film on glass", Material { iridescence: 1.0, ..Material::new("", glass()) }, 0.98, 1.02),
         ("glass", Material { dispersion: 2.0, ..Material::new("", glass()) }, 0.98, 1.02),
         ("rough glass", rough_glass(), 0.95, 1.0),
         ("white under a coat", Material { surface: white_coated(), roughness: 0.5, ..coated(0.5) }, 0.985, 1.02),
@@ -104,6 +106,17 @@ fn room(material: Material) -> Scene {
     add_quad(&mut scene, vec3(-0.3, 1.95, 0.6), vec3(0.0, 0.0, -0.6), vec3(0.6, 0.0, 0.0), 2);
     scene.cameras.push(camera(vec3(0.0, 1.0, 2.9), vec3(0.0, 0.8, 0.0), 50.0));
     scene
+}
+
+#[test]
+fn unlit_surfaces_show_their_colour_alone() {
+    let seen = |unlit: bool| {
+        let mut scene = furnace(Material { unlit, ..Material::new("label", diffuse(0.5)) });
+        scene.environment.as_mut().expect("a sky").strength = 0.5;
+        mean(&render_scene(&scene, &settings(Mode::Hybrid, 1000, 8)))
+    };
+    assert!((seen(true) - 0.5).abs() < 1e-3, "{}", seen(true));
+    assert!((seen(false) - 0.25).abs() < 0.05, "control: {}", seen(false));
 }
 
 #[test]

@@ -123,7 +123,9 @@ impl Shell {
             let triangle = &triangles[*i as usize];
             let [a, b, c] = triangle.positions.map(Vec3::as_dvec3);
             let below = PROBE_DEPTH * triangle.area().sqrt() * triangle.geometric_normal().as_dvec3();
-            (winding(triangles, self, (a + b + c) / 3.0 - below) - self.volume.signum()).abs() > 0.5
+            // Below the faces of a hollow lies the glass around it, which is outside of this shell.
+            let expected = self.volume.signum().max(0.0);
+            (winding(triangles, self, (a + b + c) / 3.0 - below) - expected).abs() > 0.5
         })
     }
 
