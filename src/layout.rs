@@ -103,7 +103,7 @@ pub struct Normals {
 /// supports.
 pub const TABLE_COLUMNS: u32 = 2048;
 
-/// Kinds of [`Material`].
+/// Kinds of [`MaterialRecord`].
 pub const DIFFUSE: u32 = 0;
 pub const MIRROR: u32 = 1;
 /// Closed solid with an index of refraction.
