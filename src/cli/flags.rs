@@ -4,7 +4,7 @@
 type Row = (&'static str, &'static str);
 
 /// Inputs that an error or a warning of the library can name.
-const FLAGS: [Row; 27] = [
+const FLAGS: [Row; 28] = [
     ("device", "--device"),
     ("estimate.cone_constant", "--cone-constant"),
     ("estimate.max_radius", "--max-radius"),
@@ -12,6 +12,7 @@ const FLAGS: [Row; 27] = [
     ("estimate.radius", "--radius"),
     ("estimate.search", "--search"),
     ("estimate.share_reach", "--share"),
+    ("estimate.irradiance_cells", "--irradiance-cells"),
     ("lights.photon_weights", "--light-photons"),
     ("load.allow_outside", "--allow-outside"),
     ("load.caustic_roughness", "--caustic-roughness"),
