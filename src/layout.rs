@@ -503,7 +503,7 @@ pub struct PhotonBatch {
     /// Diffuse surfaces that a path meets at most.
     pub max_bounces: u32,
     /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`], [`AIM`],
-    /// [`CAUSTICS_APART`].
+    /// [`CAUSTICS_APART`], [`EVENLY`].
     pub rules: u32,
     pub staging_capacity: u32,
     pub lost_scale: f32,
@@ -548,6 +548,8 @@ pub const AIM: u32 = 16;
 /// Caustic photons are those that come from a light through specular surfaces only. Photons that a
 /// diffuse surface scattered before belong to the global map.
 pub const CAUSTICS_APART: u32 = 32;
+/// All targets are chosen as often, whatever their size.
+pub const EVENLY: u32 = 64;
 
 /// Maximum number of targets that caustic paths are aimed at.
 pub const MAX_TARGETS: u32 = 32;
@@ -706,7 +708,7 @@ pub struct IrradianceCell {
     pub level: u32,
     /// The point that speaks for the cell, metres, and its geometric normal.
     pub position: [f32; 3],
-    /// Whether the cells of the next level are asked first: [`WHOLE`], [`SPLIT`] or [`TOO_WIDE`].
+    /// Whether the cells of the next level are asked first: [`WHOLE_CELL`], [`SPLIT_CELL`] or [`WIDE_CELL`].
     pub split: u32,
     pub normal: [f32; 3],
     pub pad0: u32,
@@ -717,9 +719,9 @@ pub struct IrradianceCell {
 
 /// The cell has no parts; it has, and speaks for those without an entry; it has, and is too wide to
 /// speak for them.
-pub const WHOLE: u32 = 0;
-pub const SPLIT: u32 = 1;
-pub const TOO_WIDE: u32 = 2;
+pub const WHOLE_CELL: u32 = 0;
+pub const SPLIT_CELL: u32 = 1;
+pub const WIDE_CELL: u32 = 2;
 
 /// Distance from the plane of an entry's point, in cells, and cosine to its normal, up to which a
 /// point takes its irradiance.

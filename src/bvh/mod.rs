@@ -11,6 +11,7 @@ mod contacts;
 mod convert;
 mod media;
 mod node;
+mod ray;
 mod split;
 #[cfg(test)]
 mod tests;
@@ -20,3 +21,4 @@ pub use build::{Bvh, FILLER};
 pub use contacts::contacts;
 pub use media::{Media, MediaProbe};
 pub use node::{BvhChild, MAX_LEAF, WIDTH};
+pub use ray::RayHit;

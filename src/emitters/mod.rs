@@ -5,6 +5,7 @@ mod cumulative;
 pub mod environment_map;
 mod light_media;
 pub mod light_table;
+pub mod sight;
 mod surface_lights;
 pub mod targets;
 

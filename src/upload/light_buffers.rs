@@ -4,11 +4,12 @@
 use rayon::prelude::*;
 
 use crate::{
-    bvh::MediaProbe,
+    bvh::{Bvh, MediaProbe},
     emitters::{
         environment_map::EnvironmentMap,
         light_table::{Choices, LightTable},
         set_media,
+        sight::seen_targets,
         targets::{scene_target, specular_targets},
     },
     error::Result,
@@ -36,8 +37,9 @@ pub struct LightBuffers {
     pub photons: ChoiceBuffer,
     pub aimed: ChoiceBuffer,
     pub direct: ChoiceBuffer,
-    /// Number of spheres around mirrors and glass. In `targets` they follow the sphere around the
-    /// scene.
+    /// Number of spheres around what the cameras see, and around mirrors and glass. In `targets`,
+    /// the sphere around the scene lies between them.
+    pub seen_targets: u32,
     pub specular_targets: u32,
     pub has_environment: bool,
     pub warnings: Vec<String>,
@@ -55,9 +57,10 @@ impl LightBuffers {
     ///
     /// # Errors
     /// As [`LightTable::new`], and [`crate::Error::Limit`] if the lights exceed a binding.
-    pub fn new(gpu: &Gpu, scene: &Scene, probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
+    pub fn new(gpu: &Gpu, (scene, bvh): (&Scene, &Bvh), probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = specular_targets(scene);
+        let seen = seen_targets(scene, bvh, &scene.cameras.iter().collect::<Vec<_>>());
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
@@ -66,7 +69,7 @@ impl LightBuffers {
             Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, strata: choices.strata })
         };
         let spheres: Vec<[f32; 4]> =
-            [&around].into_iter().chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
+            seen.iter().chain([&around]).chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
         let (sine, cosine) = map.as_ref().map_or(0.0, |map| map.rotation).sin_cos();
         let scene_sphere = SceneSphere { center: around.center.to_array(), radius: around.radius };
         let environment_info = EnvironmentInfo {
@@ -82,6 +85,7 @@ impl LightBuffers {
             photons: upload("photon light choices", &table.for_photons(settings))?,
             aimed: upload("aimed light choices", &table.for_aimed_photons(&targets, &around, settings))?,
             direct: upload("direct light choices", &table.for_direct_light())?,
+            seen_targets: seen.len() as u32,
             specular_targets: targets.len() as u32,
             has_environment: map.is_some(),
             warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),

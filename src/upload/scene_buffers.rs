@@ -79,7 +79,7 @@ impl SceneBuffers {
             dispersion: m.dispersion,
         };
         let media: Vec<_> = solids.media.iter().map(row).collect();
-        let lights = LightBuffers::new(gpu, scene, &MediaProbe::new(scene, bvh, &solids), settings)?;
+        let lights = LightBuffers::new(gpu, (scene, bvh), &MediaProbe::new(scene, bvh, &solids), settings)?;
         let contacts = contacts(scene, bvh);
         Ok(Self {
             nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,

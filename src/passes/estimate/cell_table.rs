@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use crate::{
     error::Result,
-    layout::{CELL_COSINE, CELL_FLATNESS, IrradianceCell, SPLIT, TOO_WIDE, VisiblePoint, WHOLE},
+    layout::{CELL_COSINE, CELL_FLATNESS, IrradianceCell, SPLIT_CELL, VisiblePoint, WHOLE_CELL, WIDE_CELL},
 };
 
 /// Levels of cells. Each is half as wide as the one before.
@@ -43,7 +43,7 @@ impl CellTable {
     /// there. A cell is at most `spacing` times as wide as the radius of its estimate; where it is
     /// wider, cells of the next level take its place. `None` without marks.
     pub fn build(marks: &[VisiblePoint], spacing: f32, irradiances: &mut Irradiances) -> Result<Option<Self>> {
-        let pilots: Vec<_> = marks.iter().step_by(marks.len().div_ceil(PILOTS).max(1)).copied().collect();
+        let pilots: Vec<_> = marks.iter().step_by(marks.len().div_ceil(PILOTS) | 1).copied().collect();
         let mut radii: Vec<f32> = irradiances(&pilots)?.iter().map(|(_, radius)| *radius).collect();
         radii.sort_by(f32::total_cmp);
         let Some(radius) = radii.get((radii.len() as f64 * PILOT_QUANTILE) as usize).filter(|r| **r > 0.0) else {
@@ -62,12 +62,13 @@ impl CellTable {
             open.clear();
             for (surface, (irradiance, radius)) in surfaces.into_iter().zip(irradiances(&points)?) {
                 let cells = radius * spacing * per_metre;
-                let split = [TOO_WIDE, SPLIT, WHOLE][usize::from(cells >= SUBSTITUTE) + usize::from(cells >= 1.0)];
+                let split =
+                    [WIDE_CELL, SPLIT_CELL, WHOLE_CELL][usize::from(cells >= SUBSTITUTE) + usize::from(cells >= 1.0)];
                 let Surface { place, marks } = surface;
                 let VisiblePoint { position, ng: normal, .. } = *marks[0];
                 let level = level + 1;
                 entries.push(IrradianceCell { place, level, position, split, normal, irradiance, pad0: 0, pad1: 0 });
-                if split != WHOLE {
+                if split != WHOLE_CELL {
                     open.extend(marks);
                 }
             }
@@ -166,7 +167,7 @@ mod tests {
     #[test]
     fn cells_are_as_wide_as_their_estimates_allow() {
         let table = CellTable::build(&marks(), 0.5, &mut found).unwrap().unwrap();
-        let kept: Vec<_> = table.places.iter().filter(|e| e.level > 0 && e.split == WHOLE).collect();
+        let kept: Vec<_> = table.places.iter().filter(|e| e.level > 0 && e.split == WHOLE_CELL).collect();
         let width = |e: &IrradianceCell| 1.0 / at_level(table.per_metre, e.level - 1);
         for entry in &kept {
             let most = if entry.position[0] < 50.0 { 0.05 } else { 0.4 };

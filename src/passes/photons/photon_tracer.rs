@@ -179,11 +179,12 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool)
     let general = EmissionPlan {
         choices: &lights.photons,
         stream: layout::STREAM_PHOTON,
-        first_target: 0,
-        target_count: 1,
+        first_target: if aimed { 0 } else { lights.seen_targets },
+        target_count: if aimed { lights.seen_targets + 1 } else { 1 },
         // Rays of final gathering see light that was scattered diffusely before it came through
         // glass.
         rules: rule(aimed, layout::AIM)
+            | rule(aimed && lights.seen_targets > 0, layout::EVENLY)
             | rule(aimed || settings.final_gather > 0, layout::CAUSTICS_APART)
             | rule(settings.stores_direct(), layout::STORE_DIRECT)
             | rule(settings.mode.follows_diffuse(), layout::FOLLOW_DIFFUSE),
@@ -192,7 +193,7 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool)
     let caustic = EmissionPlan {
         choices: &lights.aimed,
         stream: layout::STREAM_CAUSTIC,
-        first_target: 1,
+        first_target: lights.seen_targets + 1,
         target_count: lights.specular_targets,
         rules: layout::AIM | layout::CAUSTICS_APART,
         fills: &[MapKind::Caustic],

@@ -1,0 +1,119 @@
+//! Nearest hits of single rays on the CPU: what few rays find before the device has anything to do.
+
+use glam::Vec3;
+
+use super::{Bvh, FILLER};
+use crate::{
+    layout::{MATERIAL_MASK, Primitive, SPHERE_BIT},
+    scene::Bounds,
+};
+
+/// Nearest distance of a hit from the ray's origin, as a fraction of the largest coordinate there.
+const LEAST: f32 = 1e-5;
+
+/// Hit of a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// Metres.
+    pub position: Vec3,
+    /// Geometric normal, unit, on the side of the ray's origin.
+    pub normal: Vec3,
+    /// Index of the material in the scene.
+    pub material: u32,
+}
+
+impl Bvh {
+    /// The nearest hit of a ray; `direction` is a unit vector.
+    #[must_use]
+    pub fn nearest_hit(&self, origin: Vec3, direction: Vec3) -> Option<RayHit> {
+        let least = LEAST * origin.abs().max_element();
+        let mut nearest: Option<(f32, &Primitive)> = None;
+        let mut waiting = vec![0];
+        while let Some(node) = waiting.pop() {
+            for child in self.nodes[node as usize].children() {
+                let reach = nearest.map_or(f32::INFINITY, |(distance, _)| distance);
+                if !is_met(&child.bounds, origin, direction, reach) {
+                    continue;
+                }
+                if child.count == 0 {
+                    waiting.push(child.first);
+                }
+                for primitive in &self.primitives[child.first as usize..(child.first + child.count) as usize] {
+                    let reach = nearest.map_or(f32::INFINITY, |(distance, _)| distance);
+                    let distance = distance_to(primitive, origin, direction, least);
+                    nearest = distance.filter(|d| *d < reach).map(|d| (d, primitive)).or(nearest);
+                }
+            }
+        }
+        nearest.map(|(distance, primitive)| {
+            let position = origin + distance * direction;
+            let normal = normal_at(primitive, position);
+            let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
+            RayHit { position, normal, material: primitive.material & MATERIAL_MASK }
+        })
+    }
+}
+
+fn is_met(bounds: &Bounds, origin: Vec3, direction: Vec3, reach: f32) -> bool {
+    let (a, b) = ((bounds.min - origin) / direction, (bounds.max - origin) / direction);
+    // Zero over zero is not a number: `min` and `max` then leave the other operand.
+    let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
+    !(enter.max(0.0) > leave * (1.0 + 1e-6) || enter > reach)
+}
+
+fn distance_to(primitive: &Primitive, origin: Vec3, direction: Vec3, least: f32) -> Option<f32> {
+    if primitive.id == FILLER {
+        return None;
+    }
+    let (v0, e1, e2) = (Vec3::from(primitive.v0), Vec3::from(primitive.e1), Vec3::from(primitive.e2));
+    let from = origin - v0;
+    if primitive.material & SPHERE_BIT != 0 {
+        let (along, radius) = (-from.dot(direction), e1.x);
+        let half_squared = radius * radius - (from + along * direction).length_squared();
+        let half = (half_squared >= 0.0).then(|| half_squared.sqrt())?;
+        return [along - half, along + half].into_iter().find(|distance| *distance > least);
+    }
+    // Möller and Trumbore 1997, "Fast, Minimum Storage Ray/Triangle Intersection".
+    let p = direction.cross(e2);
+    let per_determinant = 1.0 / e1.dot(p);
+    let (u, q) = (from.dot(p) * per_determinant, from.cross(e1));
+    let (v, distance) = (direction.dot(q) * per_determinant, e2.dot(q) * per_determinant);
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > least && distance.is_finite()).then_some(distance)
+}
+
+fn normal_at(primitive: &Primitive, position: Vec3) -> Vec3 {
+    if primitive.material & SPHERE_BIT != 0 {
+        return (position - Vec3::from(primitive.v0)).normalize_or(Vec3::Y);
+    }
+    Vec3::from(primitive.e1).cross(primitive.e2.into()).normalize_or(Vec3::Y)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::vec3;
+
+    use super::*;
+    use crate::scene::{Material, Scene, Sphere, Surface, Triangle};
+
+    #[test]
+    fn the_nearest_surface_is_hit() {
+        let materials = [0.2, 0.4].map(|a| Material::new("", Surface::Diffuse { albedo: Vec3::splat(a) })).to_vec();
+        let triangle = Triangle {
+            positions: [vec3(-9.0, 0.0, 9.0), vec3(9.0, 0.0, 9.0), vec3(0.0, 0.0, -9.0)],
+            material: 0,
+            ..Triangle::default()
+        };
+        let spheres = vec![Sphere { center: vec3(0.0, 3.0, 0.0), radius: 1.0, material: 1 }];
+        let scene = Scene { materials, triangles: vec![triangle], spheres, ..Scene::default() };
+        let bvh = Bvh::build(&scene);
+        let hit = |origin, direction: Vec3| bvh.nearest_hit(origin, direction.normalize());
+        let ball = hit(vec3(0.0, 9.0, 0.0), -Vec3::Y).expect("the ball");
+        assert!(ball.material == 1 && ball.position.distance(vec3(0.0, 4.0, 0.0)) < 1e-5 && ball.normal.y > 0.999);
+        let floor = hit(vec3(2.0, 9.0, 0.0), -Vec3::Y).expect("the floor");
+        assert!(floor.material == 0 && floor.position.y.abs() < 1e-5 && floor.normal.y > 0.999, "{floor:?}");
+        let below = hit(vec3(0.5, -1.0, 0.5), vec3(0.0, 1.0, 0.0)).expect("the floor from below");
+        assert!(below.material == 0 && below.normal.y < -0.999, "{below:?}");
+        assert_eq!(hit(vec3(0.0, 9.0, 0.0), Vec3::Y), None);
+        assert_eq!(hit(vec3(20.0, 1.0, 0.0), -Vec3::Y), None);
+    }
+}

@@ -1,0 +1,170 @@
+//! Spheres that photon paths are aimed at since what the camera sees, and what lights that, lies in
+//! them (compare Suykens and Willems 2000, "Density Control for Photon Maps").
+
+use glam::{Vec3, vec3};
+use rayon::prelude::*;
+
+use super::targets::{Target, scene_target};
+use crate::{
+    bvh::Bvh,
+    scene::{Camera, Material, Projection, Scene, Surface},
+};
+
+/// Camera rays along the longer side of the picture, and cosine-distributed rays from each point
+/// that they see.
+const RAYS: u32 = 64;
+const BOUNCES: u32 = 2;
+/// Maximum number of mirrors and panes that a ray passes.
+const MAX_CHAIN: u32 = 12;
+/// Minimum number of points that spheres are made of.
+const MIN_POINTS: usize = 64;
+/// Part of the points within the smallest sphere. The spheres have one centre.
+const QUANTILE: f64 = 0.5;
+/// Factor on its radius, for what lies at the border.
+const MARGIN: f32 = 1.2;
+/// Radius of each sphere over that of the next smaller one. The density of paths then falls with the
+/// square of the distance, as what a surface far away adds to the light does.
+const RATIO: f32 = 3.0;
+/// Maximum number of spheres: the last is then smaller than the scene by more than the ratio.
+const MAX_SPHERES: usize = 12;
+/// Steps of a low-discrepancy sequence in two dimensions (Roberts 2018, "The Unreasonable
+/// Effectiveness of Quasirandom Sequences").
+const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
+
+/// Spheres around what the cameras see and what lies around that, from the smallest to the largest;
+/// none if that is most of the scene.
+#[must_use]
+pub fn seen_targets(scene: &Scene, bvh: &Bvh, cameras: &[&Camera]) -> Vec<Target> {
+    let points = cameras.iter().flat_map(|camera| points_seen(scene, bvh, camera)).collect();
+    spheres_around(points, &scene_target(scene))
+}
+
+/// Points on diffuse surfaces that the camera sees, and those that are seen from there.
+fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<Vec3> {
+    let aspect = camera.aspect.filter(|aspect| *aspect > 0.0).unwrap_or(1.0);
+    let side = |part: f32| ((RAYS as f32 * part) as u32).max(1);
+    let size = (side(aspect.min(1.0)), side((1.0 / aspect).min(1.0)));
+    let half_height = camera.half_height_at(1.0, size);
+    let half = (half_height * size.0 as f32 / size.1 as f32, half_height);
+    let pixel = |i: u32| {
+        let at = |i: u32, n: u32| (2 * i + 1) as f32 / n as f32 - 1.0;
+        let aside = half.0 * at(i % size.0, size.0) * camera.right - half.1 * at(i / size.0, size.1) * camera.up;
+        let (origin, direction) = match camera.projection {
+            Projection::Orthographic { .. } => (camera.position + aside, camera.forward),
+            Projection::Perspective { .. } => (camera.position, (camera.forward + aside).normalize()),
+        };
+        let origin = origin + camera.near.min(0.0) * camera.forward;
+        let mut points = Vec::new();
+        if let Some((position, normal)) = diffuse_hit(scene, bvh, origin, direction) {
+            points.push(position);
+            let directions = (0..BOUNCES).map(|bounce| cosine_direction(normal, BOUNCES * i + bounce));
+            points.extend(directions.filter_map(|d| diffuse_hit(scene, bvh, position, d).map(|(seen, _)| seen)));
+        }
+        points
+    };
+    (0..size.0 * size.1).into_par_iter().flat_map_iter(pixel).collect()
+}
+
+/// The first surface with a diffuse lobe along a ray, by way of mirrors and straight through glass.
+fn diffuse_hit(scene: &Scene, bvh: &Bvh, mut origin: Vec3, mut direction: Vec3) -> Option<(Vec3, Vec3)> {
+    for _ in 0..MAX_CHAIN {
+        let hit = bvh.nearest_hit(origin, direction)?;
+        match goes_on(&scene.materials[hit.material as usize]) {
+            None => return Some((hit.position, hit.normal)),
+            Some(Way::Reflected) => direction = (direction - 2.0 * direction.dot(hit.normal) * hit.normal).normalize(),
+            Some(Way::Through) => {}
+        }
+        origin = hit.position;
+    }
+    None
+}
+
+enum Way {
+    Reflected,
+    Through,
+}
+
+/// How a ray goes on at a surface without a diffuse lobe.
+fn goes_on(material: &Material) -> Option<Way> {
+    match material.surface {
+        Surface::Mirror { .. } => Some(Way::Reflected),
+        Surface::Glass { .. } | Surface::Pane { .. } => Some(Way::Through),
+        Surface::Layered { metallic, .. } => (metallic > 0.5).then_some(Way::Reflected),
+        Surface::Diffuse { .. } => None,
+    }
+}
+
+/// The `i`-th cosine-distributed direction about `normal`.
+fn cosine_direction(normal: Vec3, i: u32) -> Vec3 {
+    let [u, v] = STEPS.map(|step| (0.5 + step * f64::from(i)).fract() as f32);
+    let (right, up) = normal.any_orthonormal_pair();
+    let (sine, cosine) = (std::f32::consts::TAU * v).sin_cos();
+    let local = vec3(u.sqrt() * cosine, u.sqrt() * sine, (1.0 - u).max(1e-6).sqrt());
+    (local.x * right + local.y * up + local.z * normal).normalize()
+}
+
+/// Spheres about the middle of the points, up to one that is not much smaller than the scene.
+fn spheres_around(points: Vec<Vec3>, whole: &Target) -> Vec<Target> {
+    if points.len() < MIN_POINTS {
+        return Vec::new();
+    }
+    let median = |axis: usize| {
+        let mut all: Vec<f32> = points.iter().map(|p| p[axis]).collect();
+        *all.select_nth_unstable_by(points.len() / 2, f32::total_cmp).1
+    };
+    let center = vec3(median(0), median(1), median(2));
+    let mut distances: Vec<f32> = points.iter().map(|p| p.distance(center)).collect();
+    distances.sort_by(f32::total_cmp);
+    let smallest = MARGIN * distances[(QUANTILE * distances.len() as f64) as usize];
+    let radii = std::iter::successors(Some(smallest), |radius| Some(RATIO * radius)).take(MAX_SPHERES);
+    let radii = radii.take_while(|radius| *radius > 0.0 && RATIO * radius <= whole.radius);
+    radii.map(|radius| Target { center, radius }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Sphere, Triangle};
+
+    /// A ball of radius 1 on a floor of half side `reach`, seen from 6 m.
+    fn seen(reach: f32) -> Vec<Target> {
+        let corner = |x: f32, z: f32| vec3(x * reach, 0.0, z * reach);
+        let triangle = |positions| Triangle { positions, material: 0, ..Triangle::default() };
+        let floor = [
+            triangle([corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)]),
+            triangle([corner(-1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)]),
+        ];
+        let scene = Scene {
+            materials: vec![Material::new("", Surface::Diffuse { albedo: Vec3::splat(0.5) })],
+            triangles: floor.to_vec(),
+            spheres: vec![Sphere { center: Vec3::Y, radius: 1.0, material: 0 }],
+            ..Scene::default()
+        };
+        let forward = vec3(0.0, -0.4, -1.0).normalize();
+        let right = Vec3::X;
+        let camera = Camera {
+            position: vec3(0.0, 3.4, 6.0),
+            forward,
+            right,
+            up: right.cross(forward),
+            projection: Projection::Perspective { yfov: 0.7 },
+            ..Camera::framing(scene.bounds())
+        };
+        seen_targets(&scene, &Bvh::build(&scene), &[&camera])
+    }
+
+    #[test]
+    fn what_is_seen_of_a_wide_floor_has_spheres() {
+        let spheres = seen(1000.0);
+        assert!(!spheres.is_empty());
+        let smallest = spheres.first().expect("a sphere");
+        assert!(smallest.radius < 8.0 && smallest.center.length() < 4.0, "{spheres:?}");
+        let largest = spheres.last().expect("a sphere");
+        assert!(largest.radius > 100.0 && spheres.len() < 8, "{spheres:?}");
+    }
+
+    #[test]
+    fn a_scene_that_is_seen_whole_has_none() {
+        assert_eq!(seen(3.0), Vec::new());
+    }
+}
