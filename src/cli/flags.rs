@@ -4,7 +4,7 @@
 type Row = (&'static str, &'static str);
 
 /// Inputs that an error or a warning of the library can name.
-const FLAGS: [Row; 27] = [
+const FLAGS: [Row; 29] = [
     ("device", "--device"),
     ("estimate.cone_constant", "--cone-constant"),
     ("estimate.max_radius", "--max-radius"),
@@ -19,6 +19,8 @@ const FLAGS: [Row; 27] = [
     ("load.scene", "--scene"),
     ("load.texture_size", "--texture-size"),
     ("load.variant", "--variant"),
+    ("passes.alpha", "--alpha"),
+    ("passes.range", "--passes"),
     ("photons.caustic", "--caustic-photons"),
     ("photons.final_gather", "--final-gather"),
     ("photons.global", "--photons"),
@@ -103,7 +105,8 @@ mod tests {
     fn every_row_names_a_setting_and_a_flag_of_the_command() {
         let paths: Vec<String> = paths().into_iter().map(|(section, field)| format!("{section}.{field}")).collect();
         let is_input = |name: &str| {
-            let is_other = ["device", "scene.environment"].contains(&name) || name.starts_with("load.");
+            let is_other = ["device", "scene.environment"].contains(&name)
+                || ["load.", "passes."].iter().any(|section| name.starts_with(section));
             is_other || paths.iter().any(|path| path == name)
         };
         let mut command = Args::command();

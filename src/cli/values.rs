@@ -1,9 +1,9 @@
 //! Parsers of option values. Their error messages name the permitted values.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, time::Duration};
 
 use caustica::scene::LoadOptions;
-use caustica::settings::{Crop, EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Range};
+use caustica::settings::{Crop, EstimateSettings, LightSettings, PassRange, PhotonSettings, PictureSettings, Range};
 
 /// A whole number of at least 1 with an optional suffix: `250`, `200k`, `1.5M`.
 pub fn count(text: &str) -> Result<u64, String> {
@@ -49,6 +49,24 @@ pub fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |s: &str| s.parse::<u32>().ok().filter(|n| range.contains(*n));
     let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
     parts.ok_or_else(|| format!("width x height in pixels, as 1024x768, each {range}"))
+}
+
+/// `N` or `A..B`: passes from 0 to N, or from A to B.
+pub fn passes(text: &str) -> Result<PassRange, String> {
+    let (first, end) = text.split_once("..").unwrap_or(("0", text));
+    let number = |text: &str| text.parse::<u32>().ok();
+    let range = number(first).zip(number(end)).map(|(first, end)| PassRange { first, end });
+    let range = range.filter(|range| range.first < range.end && PassRange::END.contains(range.end));
+    range.ok_or_else(|| format!("a number of passes, as 8, or a range, as 3..8; at most {}", PassRange::END.most()))
+}
+
+/// `90s`, `10m` or `2h`.
+pub fn duration(text: &str) -> Result<Duration, String> {
+    let unit = |suffix: char, seconds: f64| Some((text.strip_suffix(suffix)?.parse::<f64>().ok()?, seconds));
+    let parsed = unit('s', 1.0).or_else(|| unit('m', 60.0)).or_else(|| unit('h', 3600.0));
+    let seconds = parsed.map(|(number, seconds)| number * seconds);
+    let seconds = seconds.filter(|seconds| (0.0..1e9).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "a time, as 90s, 10m or 2h".to_string())
 }
 
 /// Constant of the cone filter.
@@ -150,6 +168,11 @@ pub fn output(path: PathBuf) -> Result<PathBuf, String> {
     }
 }
 
+/// A part of a picture.
+pub fn part(path: PathBuf) -> Result<PathBuf, String> {
+    if extension(&path) == "exr" { Ok(path) } else { Err("the name does not end in .exr".to_string()) }
+}
+
 /// Extension in lower case, empty if there is none.
 pub fn extension(path: &std::path::Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
@@ -182,6 +205,21 @@ mod tests {
         }
         assert_eq!(count("18446744073709551616"), Err("too large".to_string()));
         assert!(photons("4294967296").is_err() && photons("4294967295").is_ok());
+    }
+
+    #[test]
+    fn passes_and_times_are_told_by_their_ends() {
+        assert_eq!(passes("8"), Ok(PassRange { first: 0, end: 8 }));
+        assert_eq!(passes("3..8"), Ok(PassRange { first: 3, end: 8 }));
+        for text in ["", "0", "..8", "3..", "8..8", "8..3", "-1", "1.5", "3..8..9", "1000001", "3 .. 8"] {
+            assert!(passes(text).is_err(), "{text}");
+        }
+        let seconds = |text| duration(text).map(|time| time.as_secs_f64());
+        assert_eq!((seconds("90s"), seconds("1.5m"), seconds("2h")), (Ok(90.0), Ok(90.0), Ok(7200.0)));
+        for text in ["", "90", "s", "-1s", "NaNs", "infh", "1d", "1e9s", "1 0s"] {
+            assert!(duration(text).is_err(), "{text}");
+        }
+        assert!(part("a.exr".into()).is_ok() && part("a.png".into()).is_err());
     }
 
     #[test]

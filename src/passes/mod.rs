@@ -9,4 +9,4 @@ pub mod wavefront;
 pub use camera::{CameraKernels, CameraTracer, FinalGather, StepCount, Tile};
 pub use estimate::{EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, SharedPoints};
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
-pub use photons::{PhotonTracer, RawMap, TracedPhotons};
+pub use photons::{PathRange, PathRanges, PhotonTracer, RawMap, TracedPhotons};

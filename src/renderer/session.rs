@@ -11,7 +11,7 @@ use crate::{
     error::Result,
     gpu::Gpu,
     image::{Film, Frame},
-    passes::{CameraKernels, EstimateSharing, MapKernels, PhotonTracer},
+    passes::{CameraKernels, EstimateSharing, MapKernels, PathRanges, PhotonTracer},
     progress::{Progress, Stage},
     scene::Scene,
     settings::{EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Search, Settings, check_samples},
@@ -86,8 +86,19 @@ impl<'a> Session<'a> {
     /// # Errors
     /// As [`super::render`].
     pub fn photon_maps(&self, settings: &PhotonSettings, progress: &dyn Progress) -> Result<PhotonMaps> {
+        self.photon_maps_of(settings, &PathRanges::default(), progress)
+    }
+
+    /// As [`Self::photon_maps`], with the photon paths of the given indices.
+    pub(super) fn photon_maps_of(
+        &self,
+        settings: &PhotonSettings,
+        paths: &PathRanges,
+        progress: &dyn Progress,
+    ) -> Result<PhotonMaps> {
         settings.check()?;
-        trace_maps(self.gpu, &self.buffers, settings, self.scene.has_specular(), self.stats.clone(), progress)
+        let photons = (self.scene.has_specular(), paths);
+        trace_maps(self.gpu, &self.buffers, settings, photons, self.stats.clone(), progress)
     }
 
     /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode,
@@ -156,6 +167,7 @@ impl<'a> Session<'a> {
         let camera = (&self.scene.cameras[number], self.camera_media[number]);
         let scene = (self.scene, &self.buffers);
         let pass = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, picture)?;
+        let pass = pass.of_pass(picture, maps.first_sample)?;
         let mut stats = maps.stats().clone();
         let films = pass.render(gatherer, stage, &mut stats, progress)?;
         Ok((films, stats))
