@@ -20,6 +20,9 @@ use caustica::{
 
 use super::{args::RenderArgs, progress::Display, signals, study_progress::duration};
 
+/// Passes from which on their spread is trusted to end a run.
+const LEAST_PASSES: u32 = 4;
+
 /// A picture of passes.
 pub struct Picture {
     pub frame: Frame,
@@ -133,7 +136,7 @@ fn run(inputs: &Inputs, range: PassRange, started: Instant, done: &mut Done) -> 
 
 /// Whether nothing is left to do but for the time.
 fn is_over(inputs: &Inputs, next: u32, range: PassRange, error: Option<&ErrorEstimate>) -> bool {
-    let target = inputs.args.passes.target_error;
+    let target = inputs.args.passes.target_error.filter(|_| next >= range.first.saturating_add(LEAST_PASSES));
     next >= range.end || target.is_some_and(|target| error.is_some_and(|error| error.total() <= target))
 }
 

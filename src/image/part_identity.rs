@@ -8,8 +8,10 @@ use super::exr::Attributes;
 
 /// Attributes that parts of one picture may differ in, since they follow from where and what a part
 /// is.
-const OF_PART: [&str; 9] = [
+const OF_PART: [&str; 10] = [
     "scene",
+    // The settings hold it too.
+    "seed",
     "device",
     "driver",
     "passes",
@@ -39,12 +41,18 @@ fn identity(attributes: &Attributes) -> BTreeMap<String, String> {
     for (name, value) in attributes.iter().filter(|(name, _)| !OF_PART.contains(&name.as_str())) {
         let settings = serde_json::from_str::<Value>(value).ok().filter(|_| OF_SETTINGS.contains(&name.as_str()));
         match settings {
-            Some(Value::Object(fields)) => fields.iter().for_each(|(field, value)| flatten(field, value, &mut all)),
+            Some(Value::Object(fields)) => {
+                let section = if name == "loading" { "load." } else { "" };
+                fields.iter().for_each(|(field, value)| flatten(&format!("{section}{field}"), value, &mut all));
+            }
             _ => drop(all.insert(name.clone(), value.clone())),
         }
     }
+    if let Some(alpha) = all.remove("alpha") {
+        all.insert("`passes.alpha`".to_owned(), alpha);
+    }
     // The part's pixels are those of its data window.
-    all.remove("`picture.crop`");
+    all.retain(|name, _| !name.starts_with("`picture.crop"));
     all
 }
 

@@ -5,5 +5,6 @@ mod cli;
 mod compare;
 mod compare_page;
 mod drivers;
+mod passes;
 mod study;
 mod study_page;
