@@ -14,8 +14,8 @@ const TARGET_ERROR: Range<f64> = Range::above(0.0, 1.0);
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("progressive").multiple(true))]
 pub struct PassOptions {
-    /// Render the passes from 0 to N, or from A to B, B left out; each has photons and samples of its
-    /// own and smaller radii, so that together they converge [default: a single picture]
+    /// Render the passes from 0 to N, or from A to B, B left out; each has photons and samples of
+    /// its own and smaller radii, so that together they converge [default: a single picture]
     #[arg(long, value_name = "N|A..B", value_parser = passes, group = "progressive", help_heading = "Passes")]
     pub passes: Option<PassRange>,
 

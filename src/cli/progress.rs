@@ -47,8 +47,8 @@ impl Display {
         }
     }
 
-    /// Shows the state of long work in one line. On a terminal it stands beside the bar; elsewhere it
-    /// is printed only if it is `new`.
+    /// Shows the state of long work in one line. On a terminal it stands beside the bar; elsewhere
+    /// it is printed only if it is `new`.
     pub fn state(&self, line: &str, done: f64, new: bool) {
         match &self.0 {
             Target::Nowhere => {}

@@ -53,8 +53,8 @@ impl ErrorEstimate {
 }
 
 impl Film {
-    /// Means as by [`Film::finish`], with the channels `standardError.C` and `bias.C` of radiance if
-    /// the passes tell them.
+    /// Means as by [`Film::finish`], with the channels `standardError.C` and `bias.C` of radiance
+    /// if the passes tell them.
     #[must_use]
     pub fn finish_with_errors(&self) -> super::Frame {
         let mut frame = self.finish();

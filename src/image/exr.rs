@@ -13,7 +13,11 @@ use std::{
 
 use exr::{
     math::Vec2,
-    meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text},
+    meta::{
+        MetaData,
+        attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text},
+        header::Header,
+    },
     prelude::{
         AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels,
         ReadLayers, WritableImage,
@@ -68,6 +72,11 @@ pub struct EnvironmentProvenance<'a> {
 pub type Attributes = BTreeMap<String, String>;
 pub(super) type Channel = AnyChannel<FlatSamples>;
 type ReadImage = Image<exr::image::Layer<AnyChannels<FlatSamples>>>;
+
+/// Bytes that any file may claim, and those that one byte of a compressed file may: more than
+/// DEFLATE's 1032.
+const UNCHECKED_BYTES: u64 = 1 << 26;
+const MOST_COMPRESSION: u64 = 1100;
 
 /// CIE xy of ITU-R BT.709 primaries and D65.
 const REC709: Chromaticities =
@@ -275,6 +284,7 @@ pub(super) fn open(path: &Path) -> Result<ReadImage> {
     open_regular(path)
         .and_then(|mut file| file.read_to_end(&mut bytes))
         .map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
+    check_claims(&bytes).map_err(|problem| failure(path, problem))?;
     exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -285,6 +295,24 @@ pub(super) fn open(path: &Path) -> Result<ReadImage> {
         .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(|e| failure(path, e))
+}
+
+/// Refuses a file that claims more numbers than its bytes can hold, before memory is taken for
+/// them.
+fn check_claims(bytes: &[u8]) -> std::result::Result<(), String> {
+    let Ok(meta) = MetaData::read_from_buffered(bytes, false) else { return Ok(()) };
+    let claimed = |header: &Header| {
+        let pixels = header.layer_size.width() as u64 * header.layer_size.height() as u64;
+        pixels.saturating_mul(4 * header.channels.list.len() as u64)
+    };
+    let most = UNCHECKED_BYTES + MOST_COMPRESSION * bytes.len() as u64;
+    match meta.headers.iter().find(|header| claimed(header) > most) {
+        None => Ok(()),
+        Some(header) => {
+            let (width, height) = (header.layer_size.width(), header.layer_size.height());
+            Err(format!("is damaged: {} bytes do not hold {width} x {height} pixels", bytes.len()))
+        }
+    }
 }
 
 pub(super) fn failure(path: &Path, problem: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {

@@ -205,7 +205,10 @@ fn no_part(path: &Path) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stats::Stats;
+    use crate::{
+        image::{read_exr, write_exr_with},
+        stats::Stats,
+    };
 
     const WINDOW: Crop = Crop { column: 1, row: 2, width: 3, height: 2 };
 
@@ -251,7 +254,7 @@ mod tests {
         let path = folder.path().join("a.exr");
         let written = sum(3..8);
         write_part(&path, &written, &attributes()).unwrap();
-        let shown = super::super::read_exr(&path).unwrap();
+        let shown = read_exr(&path).unwrap();
         let expected = written.total().unwrap().unwrap().film.finish();
         assert_eq!((shown.radiance(), shown.alpha()), (expected.radiance(), expected.alpha()));
         assert_eq!(shown.window, expected.window);
@@ -266,12 +269,22 @@ mod tests {
             assert_eq!(read_part_header(path).unwrap_err().to_string(), message);
             message
         };
-        super::super::write_exr_with(&path, &sum(0..1).blocks[0].film.finish(), &attributes()).unwrap();
+        write_exr_with(&path, &sum(0..1).blocks[0].film.finish(), &attributes()).unwrap();
         assert!(said(&path).contains("is no part of a picture"), "{}", said(&path));
+        // A header alone, of 16 gigapixels.
+        write_part(&path, &sum(0..1), &attributes()).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+            let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4;
+            bytes[at..at + 16].copy_from_slice(&[[0; 4], [0; 4], [255, 255, 1, 0], [255, 255, 1, 0]].concat());
+        }
+        std::fs::write(&path, &bytes).unwrap();
+        let message = read_part(&path).unwrap_err().to_string();
+        assert!(message.contains("is damaged: ") && message.ends_with("131072 x 131072 pixels"), "{message}");
         for blocks in ["[]", "{}", "7", r#"[{"passes":{"first":3,"end":9}}]"#] {
             let mut attributes = attributes();
             attributes.insert("blocks".to_owned(), blocks.to_owned());
-            super::super::write_exr_with(&path, &sum(0..1).blocks[0].film.finish(), &attributes).unwrap();
+            write_exr_with(&path, &sum(0..1).blocks[0].film.finish(), &attributes).unwrap();
             assert!(said(&path).contains("is no part of a picture"), "{blocks}");
         }
     }

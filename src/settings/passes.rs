@@ -55,8 +55,8 @@ impl PassSettings {
         }
     }
 
-    /// Squared radius of the estimate of pass `index`, relative to that of pass 0: the shrinkage, but
-    /// for whole numbers of neighbours.
+    /// Squared radius of the estimate of pass `index`, relative to that of pass 0: the shrinkage,
+    /// but for whole numbers of neighbours.
     #[must_use]
     pub fn bandwidth(&self, first: &EstimateSettings, index: u32) -> f64 {
         match first.search {

@@ -32,8 +32,8 @@ const GROWTH_WINDOW: u64 = 1 << 17;
 /// Fixed-point unit of lost flux, as a fraction of a path's mean flux.
 const LOST_UNIT: f64 = 1.0 / 4096.0;
 
-/// Indices of the paths of one emission: `count` of them from `first` on; `None`: until the maps are
-/// full, hardly grow, or the setting's maximum of paths is emitted.
+/// Indices of the paths of one emission: `count` of them from `first` on; `None`: until the maps
+/// are full, hardly grow, or the setting's maximum of paths is emitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PathRange {
     pub first: u64,
