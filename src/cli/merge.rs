@@ -12,6 +12,7 @@ use super::{
     files::Files,
     merge_args::{MergeArgs, StatusArgs},
     progress::Display,
+    render::exposure_line,
     say::print,
     signals,
     values::extension,
@@ -57,7 +58,10 @@ pub fn run(args: &MergeArgs) -> Result<()> {
     let (frame, attributes) = merge(&found, &check)?;
     for path in &args.outputs {
         match extension(path).as_str() {
-            "png" => write_png(path, &frame, args.exposure, args.tonemap.into())?,
+            "png" => {
+                write_png(path, &frame, args.exposure.of(&frame), args.tonemap.into())?;
+                display.note(&exposure_line(args.exposure, &frame));
+            }
             _ => write_exr_with(path, &frame, &attributes)?,
         }
         display.note(&format!("wrote {}", path.display()));

@@ -10,7 +10,7 @@ use clap::{
 
 use super::{
     options::TonemapArg,
-    values::{exposure, output, passes},
+    values::{Exposure, exposure, output, passes},
 };
 
 const EXAMPLES: &str = "\
@@ -40,9 +40,9 @@ pub struct MergeArgs {
     #[arg(long)]
     pub allow_gaps: bool,
 
-    /// Brightens the PNG by this many stops
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure)]
-    pub exposure: f32,
+    /// Brightens the PNG by this many stops; auto brings what is seen to middle grey
+    #[arg(long, value_name = "auto|EV", default_value = "auto", value_parser = exposure)]
+    pub exposure: Exposure,
 
     /// Tone curve of the PNG
     #[arg(long, value_name = "CURVE", value_enum, default_value = "neutral")]

@@ -25,7 +25,7 @@ use super::{
     files::{Files, identity},
     passes::{self, Inputs, Picture},
     progress::Display,
-    values::extension,
+    values::{Exposure, extension},
 };
 
 /// Refuses wrong usage that no single argument shows: two outputs that are one file.
@@ -97,6 +97,9 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     for path in &args.outputs {
         display.check()?;
         write_picture(path, &frame, &attributes, args)?;
+        if extension(path) == "png" {
+            display.note(&exposure_line(options.shared.exposure, &frame));
+        }
         display.note(&format!("wrote {}", path.display()));
     }
     stats.seconds.load = load_seconds;
@@ -112,9 +115,15 @@ pub(super) const RAW_NOTE: &str = "the kd-tree is the report's: the estimate is 
 
 fn write_picture(path: &Path, frame: &Frame, attributes: &Attributes, args: &RenderArgs) -> Result<()> {
     match extension(path).as_str() {
-        "png" => write_png(path, frame, args.options.shared.exposure, args.options.shared.tonemap.into()),
+        "png" => write_png(path, frame, args.options.shared.exposure.of(frame), args.options.shared.tonemap.into()),
         _ => write_exr_with(path, frame, attributes),
     }
+}
+
+/// The exposure of a PNG in one line.
+pub(super) fn exposure_line(exposure: Exposure, frame: &Frame) -> String {
+    let how = if exposure == Exposure::Auto { " (auto)" } else { "" };
+    format!("exposure: {:+.2} EV{how}", exposure.of(frame))
 }
 
 fn write_stats(path: &Path, stats: &Stats) -> Result<()> {

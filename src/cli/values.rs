@@ -2,6 +2,7 @@
 
 use std::{path::PathBuf, time::Duration};
 
+use caustica::image::{Frame, auto_exposure};
 use caustica::scene::LoadOptions;
 use caustica::settings::{Crop, EstimateSettings, LightSettings, PassRange, PhotonSettings, PictureSettings, Range};
 
@@ -145,9 +146,38 @@ pub fn light_weight(text: &str) -> Result<(String, f64), String> {
     Ok((name.to_string(), weight))
 }
 
-/// Stops of exposure.
-pub fn exposure(text: &str) -> Result<f32, String> {
-    number(text).filter(|e| e.abs() <= 100.0).ok_or_else(|| "a number of stops, -100 to 100".to_string())
+/// Exposure of PNG files.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Exposure {
+    Auto,
+    Stops(f32),
+}
+
+impl Exposure {
+    /// Stops for a frame.
+    pub fn of(self, frame: &Frame) -> f32 {
+        match self {
+            Self::Auto => auto_exposure(frame),
+            Self::Stops(stops) => stops,
+        }
+    }
+
+    /// Stops for pictures that are looked at side by side.
+    pub fn of_all(self) -> f32 {
+        match self {
+            Self::Auto => 0.0,
+            Self::Stops(stops) => stops,
+        }
+    }
+}
+
+/// `auto`, or stops of exposure.
+pub fn exposure(text: &str) -> Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    let stops = number(text).filter(|e| e.abs() <= 100.0).map(Exposure::Stops);
+    stops.ok_or_else(|| "auto, or a number of stops, -100 to 100".to_string())
 }
 
 /// A number in the range. The message begins with `what`, followed by the range.
@@ -242,7 +272,8 @@ mod tests {
         for text in ["", "1", "1,2", "1,2,3,4", "1,2,", "1,-2,3", "1,2,inf", "a,b,c"] {
             assert!(color(text).is_err(), "{text}");
         }
-        assert!(exposure("-2.5").is_ok() && exposure("101").is_err());
+        assert_eq!((exposure("-2.5"), exposure("auto")), (Ok(Exposure::Stops(-2.5)), Ok(Exposure::Auto)));
+        assert!(exposure("101").is_err() && exposure("Auto").is_err());
         assert_eq!(light_weight("a=b=0.5"), Ok(("a=b".to_string(), 0.5)));
         assert!(["lamp", "lamp=", "lamp=0", "lamp=-1", "lamp=inf"].iter().all(|text| light_weight(text).is_err()));
         assert!(output("a.EXR".into()).is_ok() && output("a.jpg".into()).is_err() && output("exr".into()).is_err());

@@ -39,12 +39,19 @@ pub struct Film {
     pub(super) non_finite: u64,
 }
 
-/// Squared radius of the estimates of passes, relative to that of pass 0: its mean over the passes
-/// and the sum of its squared deviations from the mean.
+/// Squared radius of the estimates of passes, relative to that of pass 0: its mean over the passes,
+/// the sum of its squared deviations from the mean, and the mean of its inverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bandwidth {
     pub mean: f64,
     pub deviations: f64,
+    pub inverse: f64,
+}
+
+impl Bandwidth {
+    fn of_pass(factor: f64) -> Self {
+        Self { mean: factor, deviations: 0.0, inverse: 1.0 / factor }
+    }
 }
 
 /// Second moments of the means of passes.
@@ -68,7 +75,7 @@ impl Film {
             passes: 1,
             samples: spp.into(),
             sums: array::from_fn(zeros),
-            bandwidth: Bandwidth { mean: 1.0, deviations: 0.0 },
+            bandwidth: Bandwidth::of_pass(1.0),
             moments: None,
             non_finite: 0,
         }
@@ -77,7 +84,7 @@ impl Film {
     /// Notes the squared radius of the pass's estimates, relative to that of pass 0.
     #[must_use]
     pub fn with_bandwidth(self, factor: f64) -> Self {
-        Self { bandwidth: Bandwidth { mean: factor, deviations: 0.0 }, ..self }
+        Self { bandwidth: Bandwidth::of_pass(factor), ..self }
     }
 
     /// Width and height of the whole picture, pixels.
@@ -168,6 +175,7 @@ impl Film {
         self.bandwidth = Bandwidth {
             mean: self.bandwidth.mean + shift * m / (n + m),
             deviations: self.bandwidth.deviations + other.bandwidth.deviations + shift * shift * weight,
+            inverse: (n * self.bandwidth.inverse + m * other.bandwidth.inverse) / (n + m),
         };
         for (a, b) in self.sums.iter_mut().zip(&other.sums) {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
@@ -208,12 +216,17 @@ impl Film {
         Some(moments.with_bandwidth.iter().map(|product| (f64::from(*product) * scale) as f32).collect())
     }
 
-    /// Standard error of [`Self::bias`] relative to [`Self::standard_error`], if the passes have
-    /// equal variances.
+    /// Standard error of [`Self::bias`] relative to [`Self::standard_error`], if the variance of a
+    /// pass is inverse to its squared radius, as that of a number of photons relative to it is.
     #[must_use]
     pub fn bias_noise(&self) -> Option<f64> {
-        let Bandwidth { mean, deviations } = self.bandwidth;
-        (deviations > 0.0).then(|| mean * (f64::from(self.passes) / deviations).sqrt())
+        let Bandwidth { mean, deviations, inverse } = self.bandwidth;
+        let passes = f64::from(self.passes);
+        // The variance v/f of a pass of squared radius f gives the mean the variance v Σ 1/f / n²,
+        // and the slope v Σ (f − mean)²/f / deviations². The latter sum is n mean (mean inverse −
+        // 1).
+        let ratio = mean * (mean * inverse - 1.0).max(0.0) / inverse;
+        (deviations > 0.0).then(|| mean * passes / deviations * ratio.sqrt())
     }
 
     /// The mean of each number, by its layer's rule.
@@ -324,6 +337,11 @@ mod tests {
         assert!((biased.finish().radiance()[0][0] - bias - 3.0).abs() < 1e-6, "without it, the truth is left");
         assert_eq!(merged(&|_| 3.0).bias().expect("radii differ")[0], 0.0, "control: no bias");
         assert!(film(&[1.0; 6], 4).bias().is_none(), "one pass tells nothing");
+        // Of two passes, the slope is the difference: mean/(f₀ − f₁) times √(v/f₀ + v/f₁), and the
+        // standard error half of that root.
+        let mut two = film(&[1.0; 6], 4);
+        two.merge(&film(&[2.0; 6], 4).with_bandwidth(0.5)).expect("they are of one picture");
+        assert!((two.bias_noise().expect("radii differ") - 2.0 * 0.75 / 0.5).abs() < 1e-12);
     }
 
     #[test]

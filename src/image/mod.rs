@@ -4,6 +4,7 @@
 mod canvas;
 mod convergence;
 pub mod difference;
+mod exposure;
 mod exr;
 mod file;
 pub mod film;
@@ -22,6 +23,7 @@ mod tonemap;
 #[cfg(feature = "report")]
 pub use canvas::{Canvas, Rgb8};
 pub use convergence::ErrorEstimate;
+pub use exposure::auto_exposure;
 pub use exr::{
     Attributes, EnvironmentProvenance, Provenance, read_exr, read_exr_attributes, write_exr, write_exr_with,
 };

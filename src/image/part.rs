@@ -44,8 +44,9 @@ struct BlockRow {
     passes: PassRange,
     samples: u64,
     non_finite: u64,
-    /// Bit patterns of the mean of the squared radii, and of the sum of squared deviations.
-    bandwidth: [u64; 2],
+    /// Bit patterns of the mean of the squared radii, of the sum of their squared deviations, and
+    /// of the mean of their inverses.
+    bandwidth: [u64; 3],
     global: MapStats,
     caustic: MapStats,
 }
@@ -91,12 +92,12 @@ fn before(range: PassRange) -> String {
 }
 
 fn row(block: &Block) -> BlockRow {
-    let Bandwidth { mean, deviations } = block.film.bandwidth;
+    let Bandwidth { mean, deviations, inverse } = block.film.bandwidth;
     BlockRow {
         passes: block.range,
         samples: block.film.samples,
         non_finite: block.film.non_finite,
-        bandwidth: [mean, deviations].map(f64::to_bits),
+        bandwidth: [mean, deviations, inverse].map(f64::to_bits),
         global: block.photons.global,
         caustic: block.photons.caustic,
     }
@@ -165,14 +166,14 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             let with_bandwidth = read(&format!("{before}withBandwidth."), names)?;
             Ok(Moments { deviations: of_layers("deviations")?, with_bandwidth })
         };
-        let [mean, deviations] = row.bandwidth.map(f64::from_bits);
+        let [mean, deviations, inverse] = row.bandwidth.map(f64::from_bits);
         let film = Film {
             whole,
             window,
             passes: row.passes.count(),
             samples: row.samples,
             sums: of_layers("sum")?,
-            bandwidth: Bandwidth { mean, deviations },
+            bandwidth: Bandwidth { mean, deviations, inverse },
             moments: if row.passes.count() > 1 { Some(moments()?) } else { None },
             non_finite: row.non_finite,
         };
@@ -187,9 +188,9 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
     let text = attributes.get("blocks").ok_or_else(|| no_part(path))?;
     let rows: Vec<BlockRow> = serde_json::from_str(text).map_err(|_| no_part(path))?;
     let is_good = |row: &BlockRow| {
-        let [mean, deviations] = row.bandwidth.map(f64::from_bits);
+        let is_finite = row.bandwidth.iter().all(|bits| f64::from_bits(*bits).is_finite());
         let in_reach = row.passes.first < row.passes.end && PassRange::END.contains(row.passes.end);
-        in_reach && is_block(row.passes) && row.samples > 0 && mean.is_finite() && deviations.is_finite()
+        in_reach && is_block(row.passes) && row.samples > 0 && is_finite
     };
     let consecutive = rows.windows(2).all(|pair| pair[0].passes.end == pair[1].passes.first);
     if rows.is_empty() || !consecutive || !rows.iter().all(is_good) {
