@@ -10,7 +10,7 @@ use std::{path::Path, process::Command, time::Instant};
 use caustica::image::{difference::rel_mse, read_exr};
 
 /// Changed options, and whether the reference shows the same picture.
-const CHANGES: [(&str, bool); 17] = [
+const CHANGES: [(&str, bool); 18] = [
     ("", true),
     ("--share 0", true),
     ("--sampler random", true),
@@ -22,7 +22,8 @@ const CHANGES: [(&str, bool); 17] = [
     ("--kernel gaussian", true),
     ("--kernel silverman", true),
     ("--search radius --radius 0.06", true),
-    ("--final-gather 4", true),
+    ("--final-gather 16", true),
+    ("--final-gather 16 --irradiance-cells 0", true),
     ("--spp 1", true),
     ("--spp 16", true),
     ("--pixel-filter gaussian", false),

@@ -684,6 +684,48 @@ pub struct FinalStep {
     pub pad: u32,
 }
 
+/// Arguments of `reuse_irradiance`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct CellGrid {
+    /// Cells of level 0 per metre.
+    pub per_metre: f32,
+    pub levels: u32,
+    /// Number of entries less 1; the number is a power of 2.
+    pub mask: u32,
+    pub points: u32,
+}
+
+/// Irradiance kept for the points of a cell that lie on one surface.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct IrradianceCell {
+    /// Coordinates of the cell, in cells of its level.
+    pub place: [i32; 3],
+    /// Level + 1; 0: no entry.
+    pub level: u32,
+    /// The point that speaks for the cell, metres, and its geometric normal.
+    pub position: [f32; 3],
+    /// Whether the cells of the next level are asked first: [`WHOLE`], [`SPLIT`] or [`TOO_WIDE`].
+    pub split: u32,
+    pub normal: [f32; 3],
+    pub pad0: u32,
+    /// Irradiance at the point, W/m².
+    pub irradiance: [f32; 3],
+    pub pad1: u32,
+}
+
+/// The cell has no parts; it has, and speaks for those without an entry; it has, and is too wide to
+/// speak for them.
+pub const WHOLE: u32 = 0;
+pub const SPLIT: u32 = 1;
+pub const TOO_WIDE: u32 = 2;
+
+/// Distance from the plane of an entry's point, in cells, and cosine to its normal, up to which a
+/// point takes its irradiance.
+pub const CELL_FLATNESS: f32 = 0.25;
+pub const CELL_COSINE: f32 = 0.9;
+
 /// Photons of a cell of the finest level of the photon grid; cells of a coarser cell.
 pub const CELL_PHOTONS: u32 = 16;
 pub const CELL_FAN: u32 = 8;

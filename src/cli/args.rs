@@ -17,7 +17,7 @@ use super::{
     options::{RenderOptions, SearchArg},
     pass_args::PassOptions,
     study_args::StudyArgs,
-    values::{output, radius, share_reach, tolerance, whole},
+    values::{irradiance_cells, output, radius, share_reach, tolerance, whole},
 };
 
 /// Caustica renders glTF scenes by photon mapping on the GPU, without a screen.
@@ -105,6 +105,13 @@ pub struct RenderArgs {
     #[arg(long, value_name = "F", default_value_t = 2.0, value_parser = share_reach, help_heading = "Estimate")]
     pub share: f32,
 
+    #[arg(help = format!(
+        "Ends of final-gather rays share irradiance in cells of this fraction of the estimate's radius, {}; 0 makes an estimate for each",
+        EstimateSettings::IRRADIANCE_CELLS
+    ))]
+    #[arg(long, value_name = "F", default_value_t = 0.5, value_parser = irradiance_cells, help_heading = "Estimate")]
+    pub irradiance_cells: f32,
+
     #[command(flatten)]
     pub passes: PassOptions,
 
@@ -152,6 +159,7 @@ impl RenderArgs {
             s.estimate.search = self.search.into();
             s.estimate.radius = self.radius;
             s.estimate.share_reach = self.share;
+            s.estimate.irradiance_cells = self.irradiance_cells;
         })
     }
 }
@@ -202,7 +210,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_settings() {
         let s = settings(
-            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --share 0.5 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
+            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --share 0.5 --irradiance-cells 0.25 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
              --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
              --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
@@ -213,6 +221,7 @@ mod tests {
             s.estimate.raw = true;
             s.photons.final_gather = 16;
             s.estimate.share_reach = 0.5;
+            s.estimate.irradiance_cells = 0.25;
             s.estimate.cone_constant = 1.5;
             s.estimate.max_radius = Some(0.25);
             s.photons.max_bounces = 0;

@@ -104,6 +104,11 @@ pub fn share_reach(text: &str) -> Result<f32, String> {
     in_range(text, EstimateSettings::SHARE_REACH, "a number ")
 }
 
+/// A fraction of the radius of an estimate, for the width of a cell.
+pub fn irradiance_cells(text: &str) -> Result<f32, String> {
+    in_range(text, EstimateSettings::IRRADIANCE_CELLS, "a number ")
+}
+
 /// A relative difference.
 pub fn tolerance(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|t| *t >= 0.0 && t.is_finite());

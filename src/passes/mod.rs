@@ -7,6 +7,8 @@ pub mod photons;
 pub mod wavefront;
 
 pub use camera::{CameraKernels, CameraTracer, FinalGather, StepCount, Tile};
-pub use estimate::{EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, SharedPoints};
+pub use estimate::{
+    EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, SharedPoints,
+};
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
 pub use photons::{PathRange, PathRanges, PhotonTracer, RawMap, TracedPhotons};

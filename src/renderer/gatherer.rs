@@ -10,7 +10,10 @@ use crate::{
     gpu::Gpu,
     layout::{Gathered, VisiblePoint},
     map_kind::MapKind,
-    passes::{EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, PhotonMap, StepCount, Tile},
+    passes::{
+        EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, PhotonMap, StepCount,
+        Tile,
+    },
     progress::Progress,
     reference::{Estimate, KdMap},
     settings::{EstimateSettings, Search},
@@ -30,6 +33,8 @@ pub(crate) struct MapGatherer<'a> {
     sharing: EstimateSharing,
     estimate: &'a EstimateSettings,
     observer: Option<&'a mut dyn Observer>,
+    /// Light at the ends of final-gather rays.
+    cache: Option<IrradianceCache>,
 }
 
 enum Searches<'a> {
@@ -64,7 +69,7 @@ impl<'a> MapGatherer<'a> {
         // Kernels of few photons are stretched over more: that does not widen what they tell of.
         let stretched = GatherSettings::from(estimate).neighbors as f32 / estimate.neighbors as f32;
         let sharing = EstimateSharing::new(gpu, estimate.share_reach / stretched.sqrt());
-        Ok(Self { maps, search, sharing, estimate, observer })
+        Ok(Self { maps, search, sharing, estimate, observer, cache: None })
     }
 
     /// Adds the light of one map at the tile's visible points. `index` is the index in the photon
@@ -96,26 +101,75 @@ impl<'a> MapGatherer<'a> {
         Ok(())
     }
 
-    /// Traces the rays of final gathering, and adds to each visible point the estimates of all maps
+    /// Traces the rays of final gathering, and adds to each visible point the light of all maps
     /// where its rays end.
     fn gather_finally(&mut self, pass: &CameraPass, tile: &Tile, progress: &dyn Progress) -> Result<StepCount> {
         let shared = pass.tracer.shared_points(tile);
         let mut done = StepCount::default();
+        // Ends that the cache does not light, with the index of their visible point. They are few
+        // for each ray, and a search of few points leaves most of the device idle.
+        let (mut places, mut ends) = (Vec::new(), Vec::new());
         for ray in 0..pass.final_rays() {
             progress.check()?;
             let (points, step) = pass.trace_final(tile, ray)?;
             done += step;
             let (radiance, gathered, count) = (shared.radiance, shared.gathered, pass.tracer.point_count(tile));
-            for index in 0..self.maps.maps().len() {
-                let request = EstimateRequest { points, count, map_number: 1, radiance, gathered };
-                self.search.answer(pass, self.maps, index, self.estimate, &request, progress)?;
+            if let Some(cache) = &self.cache {
+                cache.light(pass.gpu, points, count, radiance);
+                let left: Vec<VisiblePoint> = pass.gpu.read(points, 0, count.into())?;
+                let left = left.into_iter().enumerate().filter(|(_, end)| end.next_map != 0);
+                left.for_each(|(place, end)| {
+                    places.push(place);
+                    ends.push(end);
+                });
+                if ends.len() as u64 >= pass.tracer.room() || ray + 1 == pass.final_rays() {
+                    self.light_ends(pass, tile, &std::mem::take(&mut places), &std::mem::take(&mut ends), progress)?;
+                }
+            } else {
+                for index in 0..self.maps.maps().len() {
+                    let request = EstimateRequest { points, count, map_number: 1, radiance, gathered };
+                    self.search.answer(pass, self.maps, index, self.estimate, &request, progress)?;
+                }
             }
         }
         Ok(done)
     }
+
+    /// Adds the light at ends of rays to the visible points at `places`.
+    fn light_ends(
+        &mut self,
+        pass: &CameraPass,
+        tile: &Tile,
+        places: &[usize],
+        ends: &[VisiblePoint],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let found = self.search.estimates(pass, self.maps, self.estimate, ends, progress)?;
+        let mut radiance = pass.radiance(tile)?;
+        for (&place, (light, _)) in places.iter().zip(found) {
+            (0..3).for_each(|c| radiance[place][c] += light[c]);
+        }
+        pass.set_radiance(&radiance);
+        Ok(())
+    }
 }
 
 impl Gatherer for MapGatherer<'_> {
+    /// Fills the cache of irradiance about the ends of the scout's final-gather rays.
+    fn prepare(&mut self, scout: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
+        let (marks, count) = timed(&mut stats.seconds.camera, || ends_of_rays(scout, progress))?;
+        tally::add_step(stats, count);
+        let Self { maps, search, estimate, .. } = self;
+        let white = |p: &VisiblePoint| VisiblePoint { weight: [1.0; 3], above: 0, ..*p };
+        let mut irradiances = |points: &[VisiblePoint]| {
+            let points: Vec<_> = points.iter().map(white).collect();
+            search.estimates(scout, maps, estimate, &points, progress)
+        };
+        let fill = || IrradianceCache::build(scout.gpu, &marks, estimate.irradiance_cells, &mut irradiances);
+        self.cache = timed(&mut stats.seconds.gather, fill)?;
+        Ok(())
+    }
+
     /// Adds the light of all maps. With final gathering, the visible points gather the caustic map
     /// only, and the ends of the rays gather all maps.
     fn gather(&mut self, pass: &CameraPass, tile: &Tile, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
@@ -135,7 +189,49 @@ impl Gatherer for MapGatherer<'_> {
     }
 }
 
+/// The ends of all final-gather rays of a pass.
+fn ends_of_rays(pass: &CameraPass, progress: &dyn Progress) -> Result<(Vec<VisiblePoint>, StepCount)> {
+    let (mut ends, mut done) = (Vec::new(), StepCount::default());
+    for tile in &pass.tracer.tiles() {
+        done += pass.tracer.trace(pass.gpu, pass.scene, tile)?;
+        for ray in 0..pass.final_rays() {
+            progress.check()?;
+            let (points, count) = pass.trace_final(tile, ray)?;
+            done += count;
+            let found: Vec<VisiblePoint> = pass.gpu.read(points, 0, pass.tracer.point_count(tile).into())?;
+            ends.extend(found.into_iter().filter(|point| point.next_map != 0));
+        }
+    }
+    Ok((ends, done))
+}
+
 impl Searches<'_> {
+    /// Radiance by all maps, and the radius of the narrowest estimate, at each point.
+    fn estimates(
+        &mut self,
+        pass: &CameraPass,
+        maps: &PhotonMaps,
+        settings: &EstimateSettings,
+        points: &[VisiblePoint],
+        progress: &dyn Progress,
+    ) -> Result<Vec<([f32; 3], f32)>> {
+        let (gpu, count) = (pass.gpu, points.len() as u32);
+        let mut found = vec![([0.0; 3], f32::INFINITY); points.len()];
+        let points = gpu.storage_with("single points", points)?;
+        let radiance = gpu.storage_with("radiance of single points", &vec![[0.0_f32; 4]; found.len()])?;
+        let gathered = gpu.storage::<Gathered>("gathered at single points", count.into())?;
+        for index in 0..maps.maps().len() {
+            let request =
+                EstimateRequest { points: &points, count, map_number: 1, radiance: &radiance, gathered: &gathered };
+            self.answer(pass, maps, index, settings, &request, progress)?;
+            let all: Vec<Gathered> = gpu.read(&gathered, 0, count.into())?;
+            found.iter_mut().zip(all).for_each(|((_, radius), one)| *radius = radius.min(one.radius_squared.sqrt()));
+        }
+        let sums: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into())?;
+        found.iter_mut().zip(sums).for_each(|((light, _), [r, g, b, _])| *light = [r, g, b]);
+        Ok(found)
+    }
+
     /// Answers a request for estimates of one map.
     fn answer(
         &mut self,

@@ -19,6 +19,9 @@ use crate::{
     upload::SceneBuffers,
 };
 
+/// Rays of final gathering that the scout of a picture traces at most.
+const SCOUT_RAYS: f64 = (1 << 17) as f64;
+
 /// A finished render.
 #[derive(Clone, Debug)]
 pub struct Render {
@@ -169,7 +172,24 @@ impl<'a> Session<'a> {
         let pass = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, picture)?;
         let pass = pass.of_pass(picture, maps.first_sample)?;
         let mut stats = maps.stats().clone();
+        if estimate.keeps_irradiance() && pass.final_rays() > 0 && !maps.maps().is_empty() {
+            let scouted = scouting(picture, pass.size, pass.final_rays());
+            let scout = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &scouted)?;
+            // The scout of each pass looks at points of its own; that of the first is a single picture's.
+            let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
+            let scout = scout.of_pass(&scouted, index)?;
+            gatherer.prepare(&scout, &mut stats, progress)?;
+        }
         let films = pass.render(gatherer, stage, &mut stats, progress)?;
         Ok((films, stats))
     }
+}
+
+/// Settings of a small version of the whole picture, with about `SCOUT_RAYS` rays of final
+/// gathering. It does not depend on the data window.
+fn scouting(picture: &PictureSettings, size: (u32, u32), rays: u32) -> PictureSettings {
+    let pixels = f64::from(size.0) * f64::from(size.1);
+    let scale = (SCOUT_RAYS / f64::from(rays) / pixels).min(0.25).sqrt();
+    let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(1);
+    PictureSettings { size: Some((side(size.0), side(size.1))), spp: 1, crop: None, ..picture.clone() }
 }

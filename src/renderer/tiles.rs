@@ -19,6 +19,12 @@ pub(crate) trait Gatherer {
     /// Adds the light to the radiance of the tile's points.
     fn gather(&mut self, pass: &CameraPass, tile: &Tile, stats: &mut Stats, progress: &dyn Progress) -> Result<()>;
 
+    /// Receives a pass over a small version of the whole picture, before the picture. The default
+    /// does nothing with it.
+    fn prepare(&mut self, _scout: &CameraPass, _stats: &mut Stats, _progress: &dyn Progress) -> Result<()> {
+        Ok(())
+    }
+
     /// Number of pictures that it makes of the same visible points.
     fn pictures(&self) -> usize {
         1
@@ -31,14 +37,14 @@ pub(crate) trait Gatherer {
 /// Device part of a camera pass: camera paths, direct light, rays of final gathering.
 pub(crate) struct CameraPass<'a> {
     pub gpu: &'a Gpu,
-    scene: &'a SceneBuffers,
+    pub scene: &'a SceneBuffers,
     /// Holds the visible points and the radiance of the tile that was traced last.
     pub tracer: CameraTracer,
     /// `None` if the photons were not traced for final gathering.
     final_gather: Option<FinalGather>,
     /// The radiance estimate that the settings ask for.
     pub estimate: GatherSettings,
-    size: (u32, u32),
+    pub size: (u32, u32),
     window: Crop,
     spp: u32,
     /// Direct light comes from shadow rays.
@@ -153,13 +159,11 @@ impl<'a> CameraPass<'a> {
     }
 
     /// Reads the radiance of the visible points so far.
-    #[cfg(feature = "report")]
     pub fn radiance(&self, tile: &Tile) -> Result<Vec<[f32; 4]>> {
         self.gpu.read(&self.tracer.radiance, 0, self.tracer.point_count(tile).into())
     }
 
     /// Replaces the radiance of the visible points.
-    #[cfg(feature = "report")]
     pub fn set_radiance(&self, radiance: &[[f32; 4]]) {
         self.gpu.write(&self.tracer.radiance, 0, radiance);
     }

@@ -47,6 +47,10 @@ pub struct EstimateSettings {
     /// estimate's radius, in [`Self::SHARE_REACH`]; 0: every camera sample has an estimate of its
     /// own.
     pub share_reach: f32,
+    /// Width of the cells whose points share the irradiance at the ends of final-gather rays, as a
+    /// fraction of the estimate's radius, in [`Self::IRRADIANCE_CELLS`]; 0: every end has an
+    /// estimate of its own.
+    pub irradiance_cells: f32,
 }
 
 impl Default for EstimateSettings {
@@ -60,6 +64,7 @@ impl Default for EstimateSettings {
             radius: None,
             raw: false,
             share_reach: 2.0,
+            irradiance_cells: 0.5,
         }
     }
 }
@@ -74,6 +79,14 @@ impl EstimateSettings {
     pub const RADIUS: Range<f32> = Range::above(0.0, 1e18);
     /// Range of [`Self::share_reach`].
     pub const SHARE_REACH: Range<f32> = Range::closed(0.0, 2.0);
+
+    /// Range of [`Self::irradiance_cells`].
+    pub const IRRADIANCE_CELLS: Range<f32> = Range::closed(0.0, 2.0);
+
+    /// Whether irradiance is kept in cells. Estimates to compare with are made at each point.
+    pub(crate) fn keeps_irradiance(&self) -> bool {
+        self.irradiance_cells > 0.0 && self.search != Search::KdTree && !self.raw
+    }
 
     /// The kernel with its constant.
     #[must_use]
@@ -90,6 +103,7 @@ impl EstimateSettings {
         Self::CONE_CONSTANT.check("estimate.cone_constant", self.cone_constant)?;
         self.max_radius.map_or(Ok(()), |radius| Self::RADIUS.check("estimate.max_radius", radius))?;
         Self::SHARE_REACH.check("estimate.share_reach", self.share_reach)?;
+        Self::IRRADIANCE_CELLS.check("estimate.irradiance_cells", self.irradiance_cells)?;
         match (self.search, self.radius) {
             (Search::Radius, None) => fail("estimate.search", "radius".to_string(), "needs a radius"),
             (Search::Radius, Some(radius)) => Self::RADIUS.check("estimate.radius", radius),

@@ -205,7 +205,10 @@ fn circles_are_found() {
 const ORDERS: [(&str, &[&str]); 5] = [
     ("renderer", &["size", "ray_start", "tally", "maps", "tiles", "gatherer", "session", "render", "progressive"]),
     ("passes", &["maps", "wavefront", "photons", "estimate", "camera"]),
-    ("passes/estimate", &["query_order", "gather_kernels", "gather", "share_estimates"]),
+    (
+        "passes/estimate",
+        &["query_order", "gather_kernels", "gather", "share_estimates", "cell_table", "irradiance_cache"],
+    ),
     (
         "study",
         &[

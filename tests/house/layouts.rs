@@ -60,6 +60,8 @@ fn twins() -> Vec<Twin> {
         Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, pad0, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, pad }
         FinalStep { ray, rays, points, pad }
+        CellGrid { per_metre, levels, mask, points }
+        IrradianceCell { place, level, position, split, normal, pad0, irradiance, pad1 }
         FirstHit { normal, depth, albedo, alpha }
         DirectLight { light, points, pad0, pad1 }
         EmitterSample { points, sample, samples, light_count }
@@ -135,6 +137,11 @@ fn constants() -> Vec<(&'static str, f64)> {
         AIM,
         CAUSTICS_APART,
         MAX_TARGETS,
+        WHOLE,
+        SPLIT,
+        TOO_WIDE,
+        CELL_FLATNESS,
+        CELL_COSINE,
         GLOBAL_MAP,
         CAUSTIC_MAP,
         MAP_KINDS,

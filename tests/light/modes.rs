@@ -6,9 +6,11 @@
 //! | limit | means of modes 0 and 1 agree at 4 sigma over seeds | mode 1 without the weakest lamp, 1 % of the light |
 //! | smooth ball | modes 0 and 1 agree on a coarse smooth-shaded ball | flat-shaded ball |
 //! | final gathering | the same mean as without, whether emission is aimed or not | one lamp fewer; another mode |
+//! | irradiance cells | final gathering makes the picture of an estimate at each end of a ray | wide cells |
 //! | full map | a map full at 1 % of the paths gives the same mean | one lamp fewer |
 
 use caustica::{
+    image::difference::rel_mse,
     progress::Silent,
     renderer::{Render, render},
     scene::{Scene, Triangle},
@@ -90,6 +92,25 @@ fn final_gathering_has_the_mean_of_the_estimate() {
         let refused = render(gpu(), &scene, &wrong, &Silent).map(drop).expect_err("the mode has no final gathering");
         assert!(refused.to_string().contains("photons.final_gather"), "{refused}");
     }
+}
+
+#[test]
+fn irradiance_kept_in_cells_makes_the_picture_of_an_estimate_at_each_end() {
+    let picture = |cells: f32| {
+        let settings = settings(Mode::Hybrid, 50_000, 24).with(|s| {
+            s.photons.final_gather = 8;
+            s.estimate.irradiance_cells = cells;
+        });
+        render_scene(&room(), &settings).frame.radiance().to_vec()
+    };
+    let (full, kept, coarse) = (picture(0.0), picture(0.5), picture(2.0));
+    let mean = |pixels: &[[f32; 3]]| pixels.iter().flatten().map(|c| f64::from(*c)).sum::<f64>();
+    let ratio = mean(&kept) / mean(&full);
+    assert!((ratio - 1.0).abs() < 0.002, "the mean is {ratio} of that of all estimates");
+    let (error, control) = (rel_mse(&kept, &full, None), rel_mse(&coarse, &full, None));
+    assert!(error < 5e-4, "cells add an error of {error}");
+    assert!(error > 0.0, "control: nothing is kept");
+    assert!(control > 2.0 * error, "control: wide cells add {control}, narrow ones {error}");
 }
 
 #[test]

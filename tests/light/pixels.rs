@@ -314,29 +314,34 @@ fn a_crop_has_the_bits_of_the_whole() {
     let scene = room();
     // Two tiles and more: 20 samples with 4 branches leave 512 pixels to a tile.
     let base = settings(Mode::Hybrid, 3000, 40).with(|s| s.picture.spp = 20);
-    let session = Session::open(gpu(), &scene, &base.lights, &Silent).expect("the scene fits");
-    let maps = session.photon_maps(&base.photons, &Silent).expect("photons");
-    let picture = |crop| {
-        let picture = PictureSettings { crop, ..base.picture.clone() };
-        session.picture(&maps, &base.estimate, &picture, &Silent).map(|r| r.frame)
-    };
-    let whole = picture(None).expect("a picture");
+    // Irradiance in cells does not depend on what is cropped either.
+    let gathering = base.clone().with(|s| s.photons.final_gather = 1);
     let part = Crop { column: 5, row: 19, width: 11, height: 9 };
-    let cropped = picture(Some(part)).expect("a part");
-    assert_eq!((cropped.width, cropped.height), (11, 9));
-    assert_eq!(cropped.window, Some(DataWindow { whole: (40, 40), column: 5, row: 19 }));
-    let same = |column: u32| {
-        (0..99).all(|i: u32| {
-            let there = ((19 + i / 11) * 40 + column + i % 11) as usize;
-            let i = i as usize;
-            cropped.radiance()[i] == whole.radiance()[there] && cropped.depth()[i] == whole.depth()[there]
-        })
-    };
-    assert!(same(5), "the part differs from the whole");
-    assert!(!same(6), "control: it agrees one pixel farther too");
-    for (column, row, width, height) in [(30, 0, 11, 1), (0, 40, 1, 1), (0, 0, 1, 0), (u32::MAX, 0, 2, 1)] {
-        let refused = picture(Some(Crop { column, row, width, height }));
-        assert!(matches!(refused, Err(Error::Setting { name: "picture.crop", .. })), "{column},{row},{width},{height}");
+    for settings in [&gathering, &base] {
+        let session = Session::open(gpu(), &scene, &settings.lights, &Silent).expect("the scene fits");
+        let maps = session.photon_maps(&settings.photons, &Silent).expect("photons");
+        let picture = |crop| {
+            let picture = PictureSettings { crop, ..settings.picture.clone() };
+            session.picture(&maps, &settings.estimate, &picture, &Silent).map(|r| r.frame)
+        };
+        let whole = picture(None).expect("a picture");
+        let cropped = picture(Some(part)).expect("a part");
+        assert_eq!((cropped.width, cropped.height), (11, 9));
+        assert_eq!(cropped.window, Some(DataWindow { whole: (40, 40), column: 5, row: 19 }));
+        let same = |column: u32| {
+            (0..99).all(|i: u32| {
+                let there = ((19 + i / 11) * 40 + column + i % 11) as usize;
+                let i = i as usize;
+                cropped.radiance()[i] == whole.radiance()[there] && cropped.depth()[i] == whole.depth()[there]
+            })
+        };
+        assert!(same(5), "the part differs from the whole");
+        assert!(!same(6), "control: it agrees one pixel farther too");
+        for (column, row, width, height) in [(30, 0, 11, 1), (0, 40, 1, 1), (0, 0, 1, 0), (u32::MAX, 0, 2, 1)] {
+            let refused = picture(Some(Crop { column, row, width, height }));
+            let name = format!("{column},{row},{width},{height}");
+            assert!(matches!(refused, Err(Error::Setting { name: "picture.crop", .. })), "{name}");
+        }
     }
 }
 

@@ -6,6 +6,8 @@
 //! | furnace | a ball of each material under a uniform sky is as bright as its albedo says | half of the sky |
 //! | lobes | modes 0 and 1 agree on a room with a ball of each material | a ball of another material |
 //! | rays | light seen in sharp and rough metal is there in all modes that show direct light | the mode that does not |
+//! | blur | the picture of a lamp in metal keeps its energy as it blurs | a smaller lamp |
+//! | final gathering | light off rough lobes counts once in it | a black ball |
 //! | caustic | a rough ball's caustic is in the modes with photons | lamp turned away |
 //! | bound | caustic photons above the roughness bound are those of the global map | a darker ball |
 //! | unlit | an unlit surface has its colour, whatever the sky | a lit one |
@@ -158,6 +160,42 @@ fn caustic(roughness: f32, turned: bool) -> Scene {
     scene.lights.push(light);
     scene.cameras.push(camera(vec3(1.4, 3.0, 0.0), vec3(1.4, 0.0, 0.0), 28.0));
     scene
+}
+
+#[test]
+fn a_lamp_in_metal_keeps_its_energy_as_it_blurs() {
+    // Light directions weigh most where the lobe is wider than the lamp. The metal lies far from the
+    // origin, so that its rays start farther off than the lamp's surface is moved.
+    let energy = |roughness: f32, side: f32| {
+        let mut scene =
+            Scene { materials: vec![metal(roughness), emissive("lamp", 0.0, 20.0, false)], ..Scene::default() };
+        add_quad(&mut scene, vec3(-3.0, -2.0, 3.0), vec3(6.0, 0.0, 0.0), vec3(0.0, 0.0, -6.0), 0);
+        add_quad(&mut scene, vec3(-0.2, 0.0, 0.2), vec3(0.0, 0.0, -side), vec3(side, 0.0, 0.0), 1);
+        scene.cameras.push(camera(vec3(0.6, -0.1, 0.6), vec3(0.3, -2.0, 0.3), 70.0));
+        mean(&render_scene(&scene, &settings(Mode::DirectRays, 1000, 32).with(|s| s.picture.spp = 64)))
+    };
+    let sharp = energy(0.0, 0.4);
+    for roughness in [0.1, 0.25] {
+        let blurred = energy(roughness, 0.4);
+        assert!(within(blurred, sharp, 0.06), "roughness {roughness}: {blurred} instead of {sharp}");
+    }
+    let smaller = energy(0.25, 0.38);
+    assert!(!within(smaller, sharp, 0.06), "control: a smaller lamp has {smaller}, the lamp {sharp}");
+}
+
+#[test]
+fn final_gathering_counts_light_off_rough_lobes_once() {
+    let of = |material: &Material, final_gather: u32| {
+        let settings = settings(Mode::Hybrid, 100_000, 24).with(|s| s.photons.final_gather = final_gather);
+        mean(&render_scene(&room(material.clone()), &settings))
+    };
+    // The first throws a caustic, the second and the coat do not.
+    for material in [metal(0.2), metal(0.6), coated(0.3)] {
+        let (plain, gathered) = (of(&material, 0), of(&material, 12));
+        assert!(within(gathered, plain, 0.015), "{material:?}: {gathered} instead of {plain}");
+    }
+    let black = of(&Material::new("black", diffuse(0.0)), 12);
+    assert!(!within(black, of(&metal(0.2), 0), 0.015), "control: a black ball passes");
 }
 
 #[test]

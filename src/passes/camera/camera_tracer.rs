@@ -219,18 +219,25 @@ impl CameraTracer {
         let own = [("tile", &uniform), ("points", &self.points), ("filter_table", &self.filter_table)];
         let start = Step { kernel: &self.kernels.start, buffers: &own };
         let trace = Step { kernel: &self.kernels.trace, buffers: &own };
-        self.follow(gpu, scene, (&start, tile.pixels * tile.samples + self.view.margin), &trace, true)
+        self.follow(
+            gpu,
+            scene,
+            (&start, tile.pixels * tile.samples + self.view.margin),
+            &trace,
+            self.kernels.lobes.as_ref(),
+        )
     }
 
     /// Starts paths by `start` in that many invocations and traces them by `trace`. Both steps have
-    /// their own buffers besides those of the wavefront and the tile.
+    /// their own buffers besides those of the wavefront and the tile. `lobes` adds direct light at
+    /// rough lobes.
     pub(super) fn follow(
         &self,
         gpu: &Gpu,
         scene: &SceneBuffers,
         (start, invocations): (&Step, u32),
         trace: &Step,
-        sees_lights: bool,
+        lobes: Option<&Kernel>,
     ) -> Result<StepCount> {
         let most_paths = (u64::from(invocations) * u64::from(self.view.branches))
             .min(TILE_POINTS + u64::from(self.view.margin * self.view.branches));
@@ -244,8 +251,7 @@ impl CameraTracer {
         let lit =
             [trace.buffers, &tile, &[("lighting", &lighting), ("choices", &scene.lights.photons.buffer)]].concat();
         let trace = Step { kernel: trace.kernel, buffers: &followed };
-        let light = self.kernels.lobes.as_ref().filter(|_| sees_lights);
-        let light = light.map(|kernel| Step { kernel, buffers: &lit });
+        let light = lobes.map(|kernel| Step { kernel, buffers: &lit });
         let steps: Vec<Step> = light.into_iter().chain([trace]).collect();
         // Without mirrors and glass, the first surface that the camera sees ends every path.
         let surfaces = if scene.has_lobes { layout::CHAIN_LIMIT } else { 1 };

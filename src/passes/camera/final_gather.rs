@@ -22,6 +22,8 @@ use crate::{
 pub struct FinalGather {
     start: Kernel,
     trace: Kernel,
+    /// Direct light at rough lobes, if there are any.
+    lobes: Option<Kernel>,
     rays: u32,
     /// Hits of the current ray: a [`VisiblePoint`] per visible point of the camera. Its weight
     /// includes the camera path. Some slots have no point.
@@ -37,8 +39,11 @@ impl FinalGather {
         let sampler = sampler_constant(sampler);
         Ok(Self {
             start: scene.kernel_with(gpu, "start_final_gather", &[sampler]),
-            // An emitter that a ray hits gives direct light, which the visible point has already.
-            trace: scene.kernel_with(gpu, "trace_camera", &[sampler, ("SEES_LIGHTS", 0.0)]),
+            // An emitter that a ray hits gives direct light, or a caustic by way of lobes that cast
+            // one: the visible point has both already.
+            trace: scene.kernel_with(gpu, "trace_camera", &[sampler, ("SEES_BEYOND_WIDE_LOBES", 1.0)]),
+            lobes: (scene.materials.has_rough)
+                .then(|| scene.kernel_with(gpu, "light_lobes", &[sampler, ("LIGHTS_WIDE_LOBES_ONLY", 1.0)])),
             rays,
             seen: gpu.storage::<VisiblePoint>("points seen in final gathering", tracer.room())?,
         })
@@ -81,6 +86,12 @@ impl FinalGather {
         let started = [("tile", &camera), ("final_step", &step), ("points", &tracer.points), ("seen", &self.seen)];
         let followed = [("tile", &own), ("points", &self.seen)];
         let start = Step { kernel: &self.start, buffers: &started };
-        tracer.follow(gpu, scene, (&start, points), &Step { kernel: &self.trace, buffers: &followed }, true)
+        tracer.follow(
+            gpu,
+            scene,
+            (&start, points),
+            &Step { kernel: &self.trace, buffers: &followed },
+            self.lobes.as_ref(),
+        )
     }
 }

@@ -1,10 +1,13 @@
-//! The radiance estimate: the search for the nearest photons, their sum, and estimates that visible
-//! points share.
+//! The radiance estimate: the search for the nearest photons, their sum, estimates that visible
+//! points share, and those kept for the ends of rays.
 
+mod cell_table;
 pub mod gather;
 mod gather_kernels;
+pub mod irradiance_cache;
 mod query_order;
 pub mod share_estimates;
 
 pub use gather::{Gather, GatherOptions, GatherSettings};
+pub use irradiance_cache::IrradianceCache;
 pub use share_estimates::{EstimateRequest, EstimateSharing, SharedPoints};

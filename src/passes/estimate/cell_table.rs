@@ -1,0 +1,193 @@
+//! Cells of space with one irradiance for each surface in them, chosen and kept in a hash table on
+//! the CPU; `reuse_irradiance` reads it.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+
+use crate::{
+    error::Result,
+    layout::{CELL_COSINE, CELL_FLATNESS, IrradianceCell, SPLIT, TOO_WIDE, VisiblePoint, WHOLE},
+};
+
+/// Levels of cells. Each is half as wide as the one before.
+const LEVELS: u32 = 8;
+/// Surfaces in one cell that are told apart.
+const MAX_SURFACES: usize = 8;
+/// Maximum number of entries, so that the table has at most 2^18 places of 64 bytes.
+const MAX_ENTRIES: usize = 1 << 17;
+/// Marks from whose radii the width of the first level is taken, and the part of them whose
+/// estimates are narrower.
+const PILOTS: usize = 1024;
+const PILOT_QUANTILE: f64 = 0.9;
+
+/// Part of the wanted radius that the estimate of a cell must have to speak for parts of it that
+/// have no entry of their own.
+const SUBSTITUTE: f32 = 0.5;
+
+/// Computes the irradiance, W/m², and the radius of its estimate, metres, at points.
+pub(super) type Irradiances<'a> = dyn FnMut(&[VisiblePoint]) -> Result<Vec<([f32; 3], f32)>> + 'a;
+
+/// Entries by cell.
+#[derive(Debug, PartialEq)]
+pub(super) struct CellTable {
+    /// A power of 2; at least half of them are no entries.
+    pub places: Vec<IrradianceCell>,
+    /// Cells of level 0 per metre.
+    pub per_metre: f32,
+    pub levels: u32,
+}
+
+impl CellTable {
+    /// Chooses a point for each surface in each cell that has a mark, and keeps the irradiance
+    /// there. A cell is at most `spacing` times as wide as the radius of its estimate; where it is
+    /// wider, cells of the next level take its place. `None` without marks.
+    pub fn build(marks: &[VisiblePoint], spacing: f32, irradiances: &mut Irradiances) -> Result<Option<Self>> {
+        let pilots: Vec<_> = marks.iter().step_by(marks.len().div_ceil(PILOTS).max(1)).copied().collect();
+        let mut radii: Vec<f32> = irradiances(&pilots)?.iter().map(|(_, radius)| *radius).collect();
+        radii.sort_by(f32::total_cmp);
+        let Some(radius) = radii.get((radii.len() as f64 * PILOT_QUANTILE) as usize).filter(|r| **r > 0.0) else {
+            return Ok(None);
+        };
+        let per_metre = 1.0 / (spacing * radius);
+        let mut entries = Vec::new();
+        let mut open: Vec<&VisiblePoint> = marks.iter().collect();
+        for level in 0..LEVELS {
+            let per_metre = at_level(per_metre, level);
+            let surfaces = surfaces(&open, per_metre);
+            if entries.len() + surfaces.len() > MAX_ENTRIES {
+                break;
+            }
+            let points: Vec<_> = surfaces.iter().map(|surface| *surface.marks[0]).collect();
+            open.clear();
+            for (surface, (irradiance, radius)) in surfaces.into_iter().zip(irradiances(&points)?) {
+                let cells = radius * spacing * per_metre;
+                let split = [TOO_WIDE, SPLIT, WHOLE][usize::from(cells >= SUBSTITUTE) + usize::from(cells >= 1.0)];
+                let Surface { place, marks } = surface;
+                let VisiblePoint { position, ng: normal, .. } = *marks[0];
+                let level = level + 1;
+                entries.push(IrradianceCell { place, level, position, split, normal, irradiance, pad0: 0, pad1: 0 });
+                if split != WHOLE {
+                    open.extend(marks);
+                }
+            }
+        }
+        Ok(Some(Self { places: placed(&entries), per_metre, levels: LEVELS }))
+    }
+}
+
+/// Cells of that level per metre.
+fn at_level(per_metre: f32, level: u32) -> f32 {
+    per_metre * (1 << level) as f32
+}
+
+/// Marks of one cell that lie on one surface. The first of them is nearest to the cell's centre.
+struct Surface<'a> {
+    place: [i32; 3],
+    marks: Vec<&'a VisiblePoint>,
+}
+
+/// Groups marks by cell and surface.
+fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> Vec<Surface<'a>> {
+    let mut cells: BTreeMap<[i32; 3], Vec<(f32, &VisiblePoint)>> = BTreeMap::new();
+    for mark in marks {
+        let at = Vec3::from(mark.position) * per_metre;
+        let place = at.floor().as_ivec3();
+        let from_centre = at.distance_squared(at.floor() + 0.5);
+        cells.entry(place.to_array()).or_default().push((from_centre, mark));
+    }
+    let mut surfaces = Vec::new();
+    for (place, mut marks) in cells {
+        marks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let first = surfaces.len();
+        for (_, mark) in marks {
+            let found: &mut [Surface] = &mut surfaces[first..];
+            if let Some(surface) = found.iter_mut().find(|s| is_flat(s.marks[0], mark, per_metre)) {
+                surface.marks.push(mark);
+            } else if found.len() < MAX_SURFACES {
+                surfaces.push(Surface { place, marks: vec![mark] });
+            }
+        }
+    }
+    surfaces
+}
+
+/// Whether `point` takes the irradiance at `mark`.
+fn is_flat(mark: &VisiblePoint, point: &VisiblePoint, per_metre: f32) -> bool {
+    let normal = Vec3::from(mark.ng);
+    let height = normal.dot(Vec3::from(point.position) - Vec3::from(mark.position));
+    height.abs() * per_metre <= CELL_FLATNESS && normal.dot(Vec3::from(point.ng)) >= CELL_COSINE
+}
+
+/// Places entries by their hash, each in the first free place from there on.
+fn placed(entries: &[IrradianceCell]) -> Vec<IrradianceCell> {
+    let mut places = vec![IrradianceCell::default(); (2 * entries.len()).next_power_of_two().max(2)];
+    let mask = places.len() - 1;
+    for entry in entries {
+        let mut place = hash(entry.place, entry.level - 1) as usize & mask;
+        while places[place].level != 0 {
+            place = (place + 1) & mask;
+        }
+        places[place] = *entry;
+    }
+    places
+}
+
+/// Hash of a cell. Twin of `cell_hash` in `reuse_irradiance.wesl`.
+fn hash(place: [i32; 3], level: u32) -> u32 {
+    let [x, y, z] = place.map(|c| c as u32);
+    let mut h = x.wrapping_mul(0x9e37_79b1)
+        ^ y.wrapping_mul(0x85eb_ca77)
+        ^ z.wrapping_mul(0xc2b2_ae3d)
+        ^ level.wrapping_mul(0x27d4_eb2f);
+    h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
+    h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
+    h ^ (h >> 16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Marks on the plane y = 0 about x = 0 and x = 100.
+    fn marks() -> Vec<VisiblePoint> {
+        let grid = (0..4096).map(|i| [(i % 64) as f32 / 64.0, 0.0, (i / 64) as f32 / 64.0]);
+        grid.flat_map(|[x, y, z]| [[x, y, z], [x + 100.0, y, z]])
+            .map(|position| VisiblePoint { position, ng: [0.0, 1.0, 0.0], next_map: 1, ..Default::default() })
+            .collect()
+    }
+
+    /// Estimates that are narrow about x = 0.
+    fn found(points: &[VisiblePoint]) -> Result<Vec<([f32; 3], f32)>> {
+        let of = |p: &VisiblePoint| ([p.position[0]; 3], if p.position[0] < 50.0 { 0.1 } else { 0.8 });
+        Ok(points.iter().map(of).collect())
+    }
+
+    #[test]
+    fn cells_are_as_wide_as_their_estimates_allow() {
+        let table = CellTable::build(&marks(), 0.5, &mut found).unwrap().unwrap();
+        let kept: Vec<_> = table.places.iter().filter(|e| e.level > 0 && e.split == WHOLE).collect();
+        let width = |e: &IrradianceCell| 1.0 / at_level(table.per_metre, e.level - 1);
+        for entry in &kept {
+            let most = if entry.position[0] < 50.0 { 0.05 } else { 0.4 };
+            assert!(width(entry) <= most * 1.0001 && width(entry) > most / 2.1, "{entry:?}");
+        }
+        let narrow = kept.iter().filter(|e| e.position[0] < 50.0).count();
+        assert!(narrow > 300 && kept.len() - narrow < 40, "{narrow} of {}", kept.len());
+        assert!(table.places.len() >= 2 * kept.len());
+    }
+
+    #[test]
+    fn surfaces_of_a_cell_have_irradiances_of_their_own() {
+        let at = |y: f32, ng: [f32; 3]| VisiblePoint { position: [0.3, y, 0.3], ng, next_map: 1, ..Default::default() };
+        let marks = [at(0.1, [0.0, 1.0, 0.0]), at(0.1, [0.0, -1.0, 0.0]), at(0.6, [0.0, 1.0, 0.0])];
+        let mut found = |points: &[VisiblePoint]| Ok(points.iter().map(|_| ([1.0; 3], 2.0)).collect());
+        let table = CellTable::build(&marks, 0.5, &mut found).unwrap().unwrap();
+        assert_eq!(table.places.iter().filter(|e| e.level == 1).count(), 3);
+    }
+
+    #[test]
+    fn without_marks_there_is_no_table() {
+        assert_eq!(CellTable::build(&[], 0.5, &mut |_| Ok(Vec::new())).unwrap(), None);
+    }
+}
