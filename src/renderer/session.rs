@@ -175,7 +175,8 @@ impl<'a> Session<'a> {
         if estimate.keeps_irradiance() && pass.final_rays() > 0 && !maps.maps().is_empty() {
             let scouted = scouting(picture, pass.size, pass.final_rays());
             let scout = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &scouted)?;
-            // The scout of each pass looks at points of its own; that of the first is a single picture's.
+            // The scout of each pass looks at points of its own; that of the first is a single
+            // picture's.
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
             let scout = scout.of_pass(&scouted, index)?;
             gatherer.prepare(&scout, &mut stats, progress)?;
