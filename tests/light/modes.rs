@@ -115,7 +115,7 @@ fn irradiance_kept_in_cells_makes_the_picture_of_an_estimate_at_each_end() {
 
 #[test]
 fn hybrid_and_photons_agree_in_the_limit() {
-    const SEEDS: u32 = 6;
+    const SEEDS: u32 = 4;
     // Independent photons. Estimates over photons of a Sobol sequence are up to 1/(2k) darker.
     let picture = |scene: &Scene, mode, seed| {
         let settings = settings(mode, 50_000, 32).with(|s| {

@@ -7,6 +7,10 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    sync::{
+        Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
 };
 
 use caustica::{
@@ -125,20 +129,26 @@ fn outcome(path: &Path, expected: Expected) -> Result<(), String> {
 fn every_scene_behaves_as_the_readme_of_the_assets_says() {
     let Some((folder, assets)) = assets() else { return };
     let most = std::env::var("CAUSTICA_ASSETS_BYTES").map_or(u64::MAX, |n| n.parse().expect("a number of bytes"));
-    let (mut wrong, mut counts, mut left_out) = (Vec::new(), [0; 4], Vec::new());
-    for asset in assets.iter().filter(|asset| text(asset, "group") != "image") {
-        let (path, expected) = (folder.join(text(asset, "file")), expected(asset));
-        if size_with_neighbours(&path) > most {
-            left_out.push(text(asset, "id"));
-            continue;
+    let scenes = assets.iter().filter(|asset| text(asset, "group") != "image");
+    let place = |asset| folder.join(text(asset, "file"));
+    let (small, large): (Vec<_>, Vec<_>) = scenes.partition(|asset| size_with_neighbours(&place(asset)) <= most);
+    let left_out: Vec<_> = large.into_iter().map(|asset| text(asset, "id")).collect();
+    let mut counts = [0; 4];
+    small.iter().for_each(|asset| counts[expected(asset) as usize] += 1);
+    // Each thread takes the next scene: most of the time goes into compiling kernels.
+    let (next, wrong) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let work = || {
+        while let Some(asset) = small.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let (path, expected, start) = (place(asset), expected(asset), std::time::Instant::now());
+            if let Err(what) = outcome(&path, expected) {
+                let what = format!("{} is to {expected:?}: {what}", path.display());
+                wrong.lock().expect("no thread has failed").push(what);
+            }
+            println!("{:6.2} s  {expected:?}  {}", start.elapsed().as_secs_f64(), text(asset, "id"));
         }
-        let start = std::time::Instant::now();
-        counts[expected as usize] += 1;
-        if let Err(what) = outcome(&path, expected) {
-            wrong.push(format!("{} is to {expected:?}: {what}", path.display()));
-        }
-        println!("{:6.2} s  {expected:?}  {}", start.elapsed().as_secs_f64(), text(asset, "id"));
-    }
+    };
+    std::thread::scope(|scope| (0..2).for_each(|_| drop(scope.spawn(work))));
+    let wrong = wrong.into_inner().expect("no thread has failed");
     println!("render, empty, refuse, either: {counts:?}; too large: {left_out:?}");
     assert!(wrong.is_empty(), "{} scenes:\n{}", wrong.len(), wrong.join("\n"));
     assert!(counts.iter().all(|count| *count > 0), "no scene of some kind: {counts:?}");
