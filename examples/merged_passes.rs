@@ -1,14 +1,15 @@
-//! Passes with seeds of their own, merged:
+//! Progressive passes, summed in the order that makes the bits independent of who renders which:
 //! `cargo run --release --example merged_passes [PICTURE.png]`.
 //!
-//! The photons of each pass are gone before the next, so that memory does not grow with the passes.
+//! The photons of each pass are gone before the next, so that memory grows only with the logarithm
+//! of the number of passes.
 
 use std::{env, path::Path};
 
 use caustica::{
-    Gpu, Result, Scene, Session, Settings, Silent,
-    image::{Tonemap, write_png},
-    settings::PhotonSettings,
+    Gpu, Progressive, Result, Scene, Session, Settings, Silent,
+    image::{Block, ErrorEstimate, PassSum, Tonemap, write_png},
+    settings::PassSettings,
 };
 
 const PASSES: u32 = 4;
@@ -24,15 +25,14 @@ fn main() -> Result<()> {
     });
     let gpu = Gpu::open(None)?;
     let session = Session::open(&gpu, &scene, &settings.lights, &Silent)?;
-    let pass = |seed: u32| {
-        let photons = PhotonSettings { seed, ..settings.photons.clone() };
-        let maps = session.photon_maps(&photons, &Silent)?;
-        session.film(&maps, &settings.estimate, &settings.picture, &Silent)
-    };
-    let (mut film, _) = pass(0)?;
-    for seed in 1..PASSES {
-        film.merge(&pass(seed)?.0)?;
+    let progressive = Progressive::new(&session, &settings, PassSettings::default())?;
+    let mut sum = PassSum::default();
+    for index in 0..PASSES {
+        let (film, stats) = progressive.render(index, &Silent)?;
+        sum.push(Block::of_pass(index, film, &stats))?;
     }
-    println!("{} passes, {} samples a pixel", film.passes(), film.samples());
-    write_png(Path::new(&path), &film.finish(), 0.0, Tonemap::Neutral)
+    let total = sum.total()?.expect("there are passes");
+    let error = ErrorEstimate::of(total.film(), None).expect("there are several passes");
+    println!("{PASSES} passes, estimated error {:.1} %", 100.0 * error.total());
+    write_png(Path::new(&path), &total.film().finish(), 0.0, Tonemap::Neutral)
 }

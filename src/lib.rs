@@ -108,7 +108,7 @@ pub use error::{Error, Result};
 pub use gpu::Gpu;
 pub use image::Frame;
 pub use progress::{Progress, Silent, Stage};
-pub use renderer::{PhotonMaps, Render, Session, render};
+pub use renderer::{PhotonMaps, Progressive, Render, Session, render};
 pub use scene::Scene;
 pub use settings::Settings;
 pub use stats::Stats;

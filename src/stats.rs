@@ -34,6 +34,14 @@ pub struct MapStats {
     pub stored: u64,
 }
 
+impl MapStats {
+    /// Adds the map of another pass.
+    pub fn add(&mut self, other: Self) {
+        self.emitted += other.emitted;
+        self.stored += other.stored;
+    }
+}
+
 /// One light. All surfaces of one emissive material count as one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LightStats {
@@ -87,6 +95,16 @@ impl NonFinite {
     }
 }
 
+impl NonFinite {
+    fn add(&mut self, other: Self) {
+        self.photons += other.photons;
+        self.camera += other.camera;
+        self.direct += other.direct;
+        self.gather += other.gather;
+        self.film += other.film;
+    }
+}
+
 /// Adapter and driver.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DeviceStats {
@@ -94,6 +112,20 @@ pub struct DeviceStats {
     pub name: String,
     /// Driver and its version.
     pub driver: String,
+}
+
+/// Passes of a picture, and its estimated relative errors
+/// ([`crate::image::ErrorEstimate`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PassStats {
+    /// First pass.
+    pub first: u32,
+    /// The pass behind the last one.
+    pub end: u32,
+    /// Noise; `None` for one pass.
+    pub noise: Option<f64>,
+    /// Bias; `None` for one pass.
+    pub bias: Option<f64>,
 }
 
 /// Everything that one render reports.
@@ -120,8 +152,45 @@ pub struct Stats {
     pub non_finite: NonFinite,
     /// Peak device memory of buffers, bytes.
     pub peak_device_bytes: u64,
+    /// Passes, of a picture that is rendered in passes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub passes: Option<PassStats>,
     /// Warnings for the user, one line each.
     pub warnings: Vec<String>,
+}
+
+impl Stats {
+    /// Adds the work of a further pass. A warning that differs in numbers only is told once.
+    pub fn add(&mut self, pass: &Self) {
+        let (s, t) = (&mut self.seconds, &pass.seconds);
+        for (sum, seconds) in [
+            (&mut s.photons, t.photons),
+            (&mut s.grid, t.grid),
+            (&mut s.camera, t.camera),
+            (&mut s.direct, t.direct),
+            (&mut s.gather, t.gather),
+        ] {
+            *sum += seconds;
+        }
+        s.total = s.bvh + s.photons + s.grid + s.camera + s.direct + s.gather;
+        let (p, q) = (&mut self.photons, &pass.photons);
+        p.global.add(q.global);
+        p.caustic.add(q.caustic);
+        p.lost_to_bounce_limit += q.lost_to_bounce_limit;
+        p.lights.iter_mut().zip(&q.lights).for_each(|(light, of_pass)| light.photons += of_pass.photons);
+        self.rays += pass.rays;
+        self.lost_camera_paths += pass.lost_camera_paths;
+        self.media_overflows += pass.media_overflows;
+        self.unfinished_rays += pass.unfinished_rays;
+        self.non_finite.add(pass.non_finite);
+        self.peak_device_bytes = self.peak_device_bytes.max(pass.peak_device_bytes);
+        let words = |line: &String| line.chars().filter(|c| !c.is_ascii_digit()).collect::<String>();
+        for warning in &pass.warnings {
+            if self.warnings.iter().all(|told| words(told) != words(warning)) {
+                self.warnings.push(warning.clone());
+            }
+        }
+    }
 }
 
 /// Adds the time that `work` takes to `seconds`.
@@ -130,4 +199,24 @@ pub fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
     let result = work();
     *seconds += Duration::as_secs_f64(&start.elapsed());
     result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_add_up_and_warnings_are_told_once() {
+        let of = |n: u64| Stats {
+            rays: n,
+            photons: PhotonStats { global: MapStats { emitted: n, stored: 1 }, ..PhotonStats::default() },
+            warnings: vec![format!("{n} rays were given up"), "the same".to_owned()],
+            peak_device_bytes: n,
+            ..Stats::default()
+        };
+        let mut sum = of(3);
+        sum.add(&Stats { warnings: vec!["7 rays were given up".into(), "another".into()], ..of(5) });
+        assert_eq!((sum.rays, sum.peak_device_bytes, sum.photons.global.emitted), (8, 5, 8));
+        assert_eq!(sum.warnings, ["3 rays were given up", "the same", "another"]);
+    }
 }

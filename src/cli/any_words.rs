@@ -26,7 +26,7 @@ fn settings(command: &Command) -> Option<Settings> {
         Command::Render(args) => Some(args.settings()),
         Command::Compare(args) => Some(args.options.settings()),
         Command::Study(args) => Some(args.options.settings()),
-        Command::Devices | Command::Info { .. } => None,
+        Command::Merge(_) | Command::Status(_) | Command::Devices | Command::Info { .. } => None,
     }
 }
 

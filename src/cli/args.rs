@@ -13,7 +13,9 @@ use clap::{
 
 use super::{
     loading::LoadingOptions,
+    merge_args::{MergeArgs, StatusArgs},
     options::{RenderOptions, SearchArg},
+    pass_args::PassOptions,
     study_args::StudyArgs,
     values::{irradiance_cells, output, radius, share_reach, tolerance, whole},
 };
@@ -37,6 +39,10 @@ pub enum Command {
     Compare(Box<CompareArgs>),
     /// Render many combinations of photons and neighbours, measure them and report them together
     Study(Box<StudyArgs>),
+    /// Add up parts of a picture, rendered with `render --part`
+    Merge(Box<MergeArgs>),
+    /// Say which passes of a picture there are, and which are missing
+    Status(StatusArgs),
     /// List the adapters: name, driver, kind, limits, usable or why not
     Devices,
     /// Say what a scene holds and how it will be read
@@ -58,7 +64,9 @@ Examples:
   caustica render scene.glb -o out.exr
   caustica render scene.gltf -o out.exr -o out.png --size 1024x1024 --photons 1M
   caustica render scene.gltf -o preview.png --mode direct-rays --spp 1 --exposure 1
-  caustica render scene.glb -o out.exr --stats out.json -q --seed 7";
+  caustica render scene.glb -o out.exr --stats out.json -q --seed 7
+  caustica render scene.glb -o out.exr --target-error 0.01 --checkpoint out.part.exr --resume
+  caustica render scene.glb --passes 16..32 --part part-16.exr";
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
@@ -67,7 +75,8 @@ pub struct RenderArgs {
     pub scene: PathBuf,
 
     /// File to write, .exr or .png; may be given several times
-    #[arg(short, long = "output", value_name = "FILE", required = true, value_parser = PathBufValueParser::new().try_map(output))]
+    #[arg(short, long = "output", value_name = "FILE", value_parser = PathBufValueParser::new().try_map(output))]
+    #[arg(required_unless_present = "part")]
     #[arg(action = ArgAction::Append)]
     pub outputs: Vec<PathBuf>,
 
@@ -102,6 +111,9 @@ pub struct RenderArgs {
     ))]
     #[arg(long, value_name = "F", default_value_t = 0.5, value_parser = irradiance_cells, help_heading = "Estimate")]
     pub irradiance_cells: f32,
+
+    #[command(flatten)]
+    pub passes: PassOptions,
 
     /// Write what happened as JSON: device, seconds by stage, photons, rays, peak device memory,
     /// warnings

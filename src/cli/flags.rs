@@ -3,34 +3,45 @@
 /// Name of a setting or another input in the library's messages, and the flag that sets it.
 type Row = (&'static str, &'static str);
 
-/// Inputs that an error or a warning of the library can name.
-const FLAGS: [Row; 28] = [
+/// Inputs that a message of the library can name.
+const FLAGS: [Row; 39] = [
     ("device", "--device"),
     ("estimate.cone_constant", "--cone-constant"),
+    ("estimate.kernel", "--kernel"),
     ("estimate.max_radius", "--max-radius"),
     ("estimate.neighbors", "-k"),
     ("estimate.radius", "--radius"),
+    ("estimate.raw", "--raw-estimate"),
     ("estimate.search", "--search"),
     ("estimate.share_reach", "--share"),
     ("estimate.irradiance_cells", "--irradiance-cells"),
     ("lights.photon_weights", "--light-photons"),
+    ("lights.sampling", "--light-sampling"),
+    ("lights.unit", "--light-unit"),
     ("load.allow_outside", "--allow-outside"),
     ("load.caustic_roughness", "--caustic-roughness"),
     ("load.ignore_required", "--ignore-required"),
     ("load.scene", "--scene"),
+    ("load.single_scattering", "--single-scattering"),
     ("load.texture_size", "--texture-size"),
     ("load.variant", "--variant"),
+    ("passes.alpha", "--alpha"),
+    ("passes.range", "--passes"),
     ("photons.caustic", "--caustic-photons"),
+    ("photons.emission", "--emission"),
     ("photons.final_gather", "--final-gather"),
     ("photons.global", "--photons"),
     ("photons.max_bounces", "--max-bounces"),
     ("photons.max_paths", "--max-paths"),
     ("photons.mode", "--mode"),
+    ("photons.sampler", "--sampler"),
+    ("photons.seed", "--seed"),
     ("picture.aperture", "--aperture"),
     ("picture.camera", "--camera"),
     ("picture.crop", "--crop"),
     ("picture.focus", "--focus"),
     ("picture.light_samples", "--light-samples"),
+    ("picture.pixel_filter", "--pixel-filter"),
     ("picture.size", "--size"),
     ("picture.spp", "--spp"),
 ];
@@ -104,7 +115,8 @@ mod tests {
     fn every_row_names_a_setting_and_a_flag_of_the_command() {
         let paths: Vec<String> = paths().into_iter().map(|(section, field)| format!("{section}.{field}")).collect();
         let is_input = |name: &str| {
-            let is_other = ["device", "scene.environment"].contains(&name) || name.starts_with("load.");
+            let is_other = ["device", "scene.environment"].contains(&name)
+                || ["load.", "passes."].iter().any(|section| name.starts_with(section));
             is_other || paths.iter().any(|path| path == name)
         };
         let mut command = Args::command();

@@ -11,7 +11,11 @@ mod files;
 mod flags;
 mod info;
 mod loading;
+mod merge;
+mod merge_args;
 mod options;
+mod pass_args;
+mod passes;
 mod progress;
 mod render;
 mod say;
@@ -52,6 +56,8 @@ fn work(command: Command) -> Result<()> {
         Command::Render(args) => render::render(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Study(args) => study::run(&args),
+        Command::Merge(args) => merge::run(&args),
+        Command::Status(args) => merge::status(&args),
         Command::Devices => devices::devices(),
         Command::Info { scene, loading, json } => info::info(&scene, &loading.options(), json),
     }

@@ -18,7 +18,7 @@ use clap::{
 use super::environment::EnvironmentOptions;
 use super::loading::LoadingOptions;
 use super::values::{
-    aperture, cone_constant, count, crop, exposure, focus, light_weight, photons, radius, size, whole,
+    Exposure, aperture, cone_constant, count, crop, exposure, focus, light_weight, photons, radius, size, whole,
 };
 
 /// Range of `--seed`: all numbers.
@@ -144,9 +144,10 @@ pub struct SharedOptions {
     #[arg(long, value_name = "DIST", value_parser = focus, requires = "aperture", help_heading = "Picture")]
     pub focus: Option<f32>,
 
-    /// Brightens the PNG by this many stops
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, help_heading = "Picture")]
-    pub exposure: f32,
+    /// Brightens the PNG by this many stops; auto brings what is seen to middle grey (in a
+    /// comparison or study, auto is 0)
+    #[arg(long, value_name = "auto|EV", default_value = "auto", value_parser = exposure, help_heading = "Picture")]
+    pub exposure: Exposure,
 
     /// Tone curve of the PNG
     #[arg(long, value_name = "CURVE", value_enum, default_value = "neutral", help_heading = "Picture")]
@@ -354,6 +355,8 @@ value_enum!(TonemapArg => Tonemap {
     Aces,
     /// Reinhard's curve on luminance
     Reinhard,
+    /// AgX: colours go to white with rising light
+    Agx,
     /// Clips at 1
     None,
 });

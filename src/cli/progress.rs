@@ -47,16 +47,16 @@ impl Display {
         }
     }
 
-    /// Shows the state of a study in one line. On a terminal it stands beside the bar; elsewhere it
-    /// is printed only if it is `new`.
-    pub fn study(&self, line: &str, done: f64, new: bool) {
+    /// Shows the state of long work in one line. On a terminal it stands beside the bar; elsewhere
+    /// it is printed only if it is `new`.
+    pub fn state(&self, line: &str, done: f64, new: bool) {
         match &self.0 {
             Target::Nowhere => {}
             Target::Lines(_) if new => say(line),
             Target::Lines(_) => {}
             Target::Bar(bar, _) => {
                 bar.set_message(line.to_string());
-                bar.set_style(study_style());
+                bar.set_style(state_style());
                 bar.update(|state| {
                     state.set_len(1000);
                     state.set_pos((1000.0 * done) as u64);
@@ -167,7 +167,7 @@ fn style(unit: &str) -> ProgressStyle {
     })
 }
 
-fn study_style() -> ProgressStyle {
+fn state_style() -> ProgressStyle {
     ProgressStyle::with_template("{bar:24} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 

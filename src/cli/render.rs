@@ -1,11 +1,16 @@
 //! `caustica render`.
 
-use std::{collections::HashSet, io, path::Path, time::Instant};
+use std::{
+    collections::HashSet,
+    io,
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use caustica::{
     Error, Result,
     gpu::Gpu,
-    image::{Frame, Provenance, write_exr, write_file, write_png},
+    image::{Attributes, Frame, write_exr_with, write_file, write_png},
     progress::{Progress, Stage},
     renderer,
     scene::Scene,
@@ -18,19 +23,25 @@ use clap::{CommandFactory, error::ErrorKind};
 use super::{
     args::{Args, RenderArgs},
     files::{Files, identity},
+    passes::{self, Inputs, Picture},
     progress::Display,
-    values::extension,
+    values::{Exposure, extension},
 };
 
 /// Refuses wrong usage that no single argument shows: two outputs that are one file.
 pub fn check(args: &RenderArgs) -> std::result::Result<(), clap::Error> {
     let mut known = HashSet::new();
-    let twice = args.outputs.iter().chain(&args.stats).find(|path| !known.insert(identity(path)));
+    let twice = outputs(args).find(|path| !known.insert(identity(path)));
     let Some(path) = twice else { return Ok(()) };
     let mut command = Args::command();
     command.build();
     let usage_of = command.find_subcommand_mut("render").expect("this is its check");
     Err(usage_of.error(ErrorKind::ArgumentConflict, format!("{} is another output as well", path.display())))
+}
+
+/// All files that the run writes.
+fn outputs(args: &RenderArgs) -> impl Iterator<Item = &PathBuf> {
+    args.outputs.iter().chain(&args.stats).chain(&args.passes.part).chain(&args.passes.checkpoint)
 }
 
 /// Loads the scene, renders it and writes the outputs.
@@ -41,7 +52,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     let mut files = Files::default();
     files.read(&args.scene, "the scene")?;
     options.shared.environment.env.iter().try_for_each(|path| files.read(path, "the environment"))?;
-    args.outputs.iter().chain(&args.stats).try_for_each(|path| files.write(path))?;
+    outputs(args).try_for_each(|path| files.write(path))?;
     let settings = args.settings();
 
     let mut load_seconds = 0.0;
@@ -63,9 +74,19 @@ pub fn render(args: &RenderArgs) -> Result<()> {
 
     let gpu = Gpu::open(options.shared.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
-    let result = renderer::render(&gpu, &scene, &settings, &display);
-    display.finish();
-    let renderer::Render { frame, mut stats } = result?;
+    let write = |frame: &Frame, attributes: &Attributes| {
+        args.outputs.iter().try_for_each(|path| write_picture(path, frame, attributes, args))
+    };
+    let picture = if args.passes.are_given() {
+        let (gpu, scene, settings, display) = (&gpu, &scene, &settings, &display);
+        passes::render(&Inputs { gpu, scene, settings, args, display, write: &write })?
+    } else {
+        let result = renderer::render(&gpu, &scene, &settings, &display);
+        display.finish();
+        let renderer::Render { frame, stats } = result?;
+        Some(Picture { frame, attributes: scene.origin(&settings, &stats).attributes(), stats })
+    };
+    let Some(Picture { frame, attributes, mut stats }) = picture else { return Ok(()) };
     for warning in stats.warnings.iter().filter(|w| !scene.warnings.contains(w)) {
         display.note(&format!("warning: {warning}"));
     }
@@ -73,10 +94,12 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     warnings.extend(stats.warnings.iter().filter(|w| !scene.warnings.contains(w)).cloned());
     stats.warnings = warnings;
 
-    let origin = scene.origin(&settings, &stats);
     for path in &args.outputs {
         display.check()?;
-        write_picture(path, &frame, &origin, args)?;
+        write_picture(path, &frame, &attributes, args)?;
+        if extension(path) == "png" {
+            display.note(&exposure_line(options.shared.exposure, &frame));
+        }
         display.note(&format!("wrote {}", path.display()));
     }
     stats.seconds.load = load_seconds;
@@ -90,11 +113,17 @@ pub fn render(args: &RenderArgs) -> Result<()> {
 /// Note on why a kd-tree's picture differs from the default one.
 pub(super) const RAW_NOTE: &str = "the kd-tree is the report's: the estimate is raw, as with --raw-estimate";
 
-fn write_picture(path: &Path, frame: &Frame, origin: &Provenance, args: &RenderArgs) -> Result<()> {
+fn write_picture(path: &Path, frame: &Frame, attributes: &Attributes, args: &RenderArgs) -> Result<()> {
     match extension(path).as_str() {
-        "png" => write_png(path, frame, args.options.shared.exposure, args.options.shared.tonemap.into()),
-        _ => write_exr(path, frame, origin),
+        "png" => write_png(path, frame, args.options.shared.exposure.of(frame), args.options.shared.tonemap.into()),
+        _ => write_exr_with(path, frame, attributes),
     }
+}
+
+/// The exposure of a PNG in one line.
+pub(super) fn exposure_line(exposure: Exposure, frame: &Frame) -> String {
+    let how = if exposure == Exposure::Auto { " (auto)" } else { "" };
+    format!("exposure: {:+.2} EV{how}", exposure.of(frame))
 }
 
 fn write_stats(path: &Path, stats: &Stats) -> Result<()> {

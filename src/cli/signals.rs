@@ -4,7 +4,7 @@
 use std::{
     sync::{
         Arc, LazyLock,
-        atomic::{AtomicUsize, Ordering},
+        atomic::{AtomicBool, AtomicUsize, Ordering},
     },
     thread,
     time::Duration,
@@ -17,10 +17,20 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 /// Time in which the work may stop by itself. With the polling below, the process ends in under two
 /// seconds.
 const GRACE: Duration = Duration::from_millis(1500);
+/// The same for work that writes a checkpoint first. Slurm and Kubernetes kill after 30 seconds.
+const LONG_GRACE: Duration = Duration::from_secs(25);
 const POLLING: Duration = Duration::from_millis(20);
 
 /// Number of the last signal; 0 before the first.
 static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
+
+/// The work writes a checkpoint when it is asked to stop.
+static KEEPS_WORK: AtomicBool = AtomicBool::new(false);
+
+/// Gives the work the time to write a checkpoint when it is asked to stop.
+pub fn keep_work() {
+    KEEPS_WORK.store(true, Ordering::Relaxed);
+}
 
 /// Starts to listen for signals.
 pub fn watch() {
@@ -37,7 +47,7 @@ pub fn watch() {
             thread::sleep(POLLING);
         }
         // The main thread ends the process before this, unless it waits for the device or the disk.
-        thread::sleep(GRACE);
+        thread::sleep(if KEEPS_WORK.load(Ordering::Relaxed) { LONG_GRACE } else { GRACE });
         caustica::image::close_files();
         // Skips exit handlers: those of drivers hang while the device is busy.
         signal_hook::low_level::exit(exit_code().into());
@@ -62,6 +72,11 @@ fn hangup() -> Option<i32> {
 /// Whether a signal has arrived.
 pub fn stop_requested() -> bool {
     SIGNAL.load(Ordering::Relaxed) != 0
+}
+
+/// Whether the signal was SIGTERM, by which queues take back their machines.
+pub fn is_termination() -> bool {
+    SIGNAL.load(Ordering::Relaxed) == SIGTERM as usize
 }
 
 /// Exit code of a process ended by the signal, as a shell reports it: 130 for SIGINT, 143 for

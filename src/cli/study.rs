@@ -88,7 +88,7 @@ fn verdict(results: &Results, folder: &Path) -> Result<()> {
 
 fn plan(args: &StudyArgs) -> Result<Plan> {
     let options = &args.options;
-    let look = Look { exposure: options.exposure, tonemap: options.tonemap.into() };
+    let look = Look { exposure: options.exposure.of_all(), tonemap: options.tonemap.into() };
     let settings = options.settings();
     if args.preset == Some(PresetArg::Report) {
         if options.loading.options() != LoadOptions::default() {

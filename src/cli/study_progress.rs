@@ -19,7 +19,7 @@ impl Watch for StudyDisplay<'_> {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         let new = state.number != *told;
         *told = state.number;
-        self.display.study(&line(state), state.done, new);
+        self.display.state(&line(state), state.done, new);
     }
 
     fn stop_requested(&self) -> bool {
@@ -35,7 +35,7 @@ fn line(state: &State) -> String {
 }
 
 /// Formats a rounded duration: `40 s`, `12 min`, `3 h 20 min`.
-fn duration(seconds: f64) -> String {
+pub(super) fn duration(seconds: f64) -> String {
     let minutes = (seconds / 60.0).round() as u64;
     match seconds {
         s if s < 90.0 => format!("{s:.0} s"),

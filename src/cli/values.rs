@@ -1,9 +1,10 @@
 //! Parsers of option values. Their error messages name the permitted values.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, time::Duration};
 
+use caustica::image::{Frame, auto_exposure};
 use caustica::scene::LoadOptions;
-use caustica::settings::{Crop, EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Range};
+use caustica::settings::{Crop, EstimateSettings, LightSettings, PassRange, PhotonSettings, PictureSettings, Range};
 
 /// A whole number of at least 1 with an optional suffix: `250`, `200k`, `1.5M`.
 pub fn count(text: &str) -> Result<u64, String> {
@@ -49,6 +50,24 @@ pub fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |s: &str| s.parse::<u32>().ok().filter(|n| range.contains(*n));
     let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
     parts.ok_or_else(|| format!("width x height in pixels, as 1024x768, each {range}"))
+}
+
+/// `N` or `A..B`: passes from 0 to N, or from A to B.
+pub fn passes(text: &str) -> Result<PassRange, String> {
+    let (first, end) = text.split_once("..").unwrap_or(("0", text));
+    let number = |text: &str| text.parse::<u32>().ok();
+    let range = number(first).zip(number(end)).map(|(first, end)| PassRange { first, end });
+    let range = range.filter(|range| range.first < range.end && PassRange::END.contains(range.end));
+    range.ok_or_else(|| format!("a number of passes, as 8, or a range, as 3..8; at most {}", PassRange::END.most()))
+}
+
+/// `90s`, `10m` or `2h`.
+pub fn duration(text: &str) -> Result<Duration, String> {
+    let unit = |suffix: char, seconds: f64| Some((text.strip_suffix(suffix)?.parse::<f64>().ok()?, seconds));
+    let parsed = unit('s', 1.0).or_else(|| unit('m', 60.0)).or_else(|| unit('h', 3600.0));
+    let seconds = parsed.map(|(number, seconds)| number * seconds);
+    let seconds = seconds.filter(|seconds| (0.0..1e9).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "a time, as 90s, 10m or 2h".to_string())
 }
 
 /// Constant of the cone filter.
@@ -132,9 +151,38 @@ pub fn light_weight(text: &str) -> Result<(String, f64), String> {
     Ok((name.to_string(), weight))
 }
 
-/// Stops of exposure.
-pub fn exposure(text: &str) -> Result<f32, String> {
-    number(text).filter(|e| e.abs() <= 100.0).ok_or_else(|| "a number of stops, -100 to 100".to_string())
+/// Exposure of PNG files.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Exposure {
+    Auto,
+    Stops(f32),
+}
+
+impl Exposure {
+    /// Stops for a frame.
+    pub fn of(self, frame: &Frame) -> f32 {
+        match self {
+            Self::Auto => auto_exposure(frame),
+            Self::Stops(stops) => stops,
+        }
+    }
+
+    /// Stops for pictures that are looked at side by side.
+    pub fn of_all(self) -> f32 {
+        match self {
+            Self::Auto => 0.0,
+            Self::Stops(stops) => stops,
+        }
+    }
+}
+
+/// `auto`, or stops of exposure.
+pub fn exposure(text: &str) -> Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    let stops = number(text).filter(|e| e.abs() <= 100.0).map(Exposure::Stops);
+    stops.ok_or_else(|| "auto, or a number of stops, -100 to 100".to_string())
 }
 
 /// A number in the range. The message begins with `what`, followed by the range.
@@ -153,6 +201,11 @@ pub fn output(path: PathBuf) -> Result<PathBuf, String> {
         "exr" | "png" => Ok(path),
         _ => Err("the name ends in neither .exr nor .png".to_string()),
     }
+}
+
+/// A part of a picture.
+pub fn part(path: PathBuf) -> Result<PathBuf, String> {
+    if extension(&path) == "exr" { Ok(path) } else { Err("the name does not end in .exr".to_string()) }
 }
 
 /// Extension in lower case, empty if there is none.
@@ -190,6 +243,21 @@ mod tests {
     }
 
     #[test]
+    fn passes_and_times_are_told_by_their_ends() {
+        assert_eq!(passes("8"), Ok(PassRange { first: 0, end: 8 }));
+        assert_eq!(passes("3..8"), Ok(PassRange { first: 3, end: 8 }));
+        for text in ["", "0", "..8", "3..", "8..8", "8..3", "-1", "1.5", "3..8..9", "1000001", "3 .. 8"] {
+            assert!(passes(text).is_err(), "{text}");
+        }
+        let seconds = |text| duration(text).map(|time| time.as_secs_f64());
+        assert_eq!((seconds("90s"), seconds("1.5m"), seconds("2h")), (Ok(90.0), Ok(90.0), Ok(7200.0)));
+        for text in ["", "90", "s", "-1s", "NaNs", "infh", "1d", "1e9s", "1 0s"] {
+            assert!(duration(text).is_err(), "{text}");
+        }
+        assert!(part("a.exr".into()).is_ok() && part("a.png".into()).is_err());
+    }
+
+    #[test]
     fn sizes_radii_and_names_have_their_ranges() {
         assert_eq!(size("640x480"), Ok((640, 480)));
         for text in ["640", "0x4", "4x0", "x", "4x", "4x-4", "4x4x4", "65536x1", "4.5x4"] {
@@ -209,7 +277,8 @@ mod tests {
         for text in ["", "1", "1,2", "1,2,3,4", "1,2,", "1,-2,3", "1,2,inf", "a,b,c"] {
             assert!(color(text).is_err(), "{text}");
         }
-        assert!(exposure("-2.5").is_ok() && exposure("101").is_err());
+        assert_eq!((exposure("-2.5"), exposure("auto")), (Ok(Exposure::Stops(-2.5)), Ok(Exposure::Auto)));
+        assert!(exposure("101").is_err() && exposure("Auto").is_err());
         assert_eq!(light_weight("a=b=0.5"), Ok(("a=b".to_string(), 0.5)));
         assert!(["lamp", "lamp=", "lamp=0", "lamp=-1", "lamp=inf"].iter().all(|text| light_weight(text).is_err()));
         assert!(output("a.EXR".into()).is_ok() && output("a.jpg".into()).is_err() && output("exr".into()).is_err());

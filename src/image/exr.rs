@@ -13,7 +13,11 @@ use std::{
 
 use exr::{
     math::Vec2,
-    meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text},
+    meta::{
+        MetaData,
+        attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text},
+        header::Header,
+    },
     prelude::{
         AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels,
         ReadLayers, WritableImage,
@@ -28,7 +32,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     settings::{LoadOptions, Settings},
-    stats::Stats,
+    stats::{MapStats, Stats},
 };
 
 /// Provenance of a frame, stored in the file's attributes.
@@ -64,6 +68,16 @@ pub struct EnvironmentProvenance<'a> {
     pub rotation: f32,
 }
 
+/// Text attributes by name, without the prefix `caustica:` that they have in files.
+pub type Attributes = BTreeMap<String, String>;
+pub(super) type Channel = AnyChannel<FlatSamples>;
+type ReadImage = Image<exr::image::Layer<AnyChannels<FlatSamples>>>;
+
+/// Bytes that any file may claim, and those that one byte of a compressed file may: more than
+/// DEFLATE's 1032.
+const UNCHECKED_BYTES: u64 = 1 << 26;
+const MOST_COMPRESSION: u64 = 1100;
+
 /// CIE xy of ITU-R BT.709 primaries and D65.
 const REC709: Chromaticities =
     Chromaticities { red: Vec2(0.64, 0.33), green: Vec2(0.3, 0.6), blue: Vec2(0.15, 0.06), white: Vec2(0.3127, 0.329) };
@@ -73,24 +87,47 @@ const REC709: Chromaticities =
 /// # Errors
 /// [`Error::Io`] if the file cannot be written. An older file is then kept.
 pub fn write_exr(path: &Path, frame: &Frame, provenance: &Provenance) -> Result<()> {
-    let bytes = encode(frame, provenance).map_err(|e| failure(path, e))?;
+    write_exr_with(path, frame, &provenance.attributes())
+}
+
+/// As [`write_exr`], with any attributes.
+///
+/// # Errors
+/// As [`write_exr`].
+pub fn write_exr_with(path: &Path, frame: &Frame, attributes: &Attributes) -> Result<()> {
+    let layers = LAYERS.iter().flat_map(|layer| channels_of(frame.layer(layer.name), layer.channels, ""));
+    let extras = frame.extras().map(|(name, numbers)| channel(name.to_owned(), numbers.to_vec()));
+    let channels = layers.chain(extras).collect();
+    let bytes =
+        encode((frame.width, frame.height), frame.window, channels, attributes).map_err(|e| failure(path, e))?;
     write_file(path, &bytes)
 }
 
-fn encode(frame: &Frame, provenance: &Provenance) -> exr::error::Result<Vec<u8>> {
-    let channel = |name: &str, samples: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(samples));
-    let channels = LAYERS.iter().flat_map(|layer| {
-        let numbers = frame.layer(layer.name);
-        let of = move |c: usize| numbers.iter().skip(c).step_by(layer.channels.len()).copied().collect();
-        layer.channels.iter().enumerate().map(move |(c, name)| channel(name, of(c)))
-    });
+/// One channel.
+pub(super) fn channel(name: String, samples: Vec<f32>) -> Channel {
+    AnyChannel::new(name.as_str(), FlatSamples::F32(samples))
+}
+
+/// Channels of a layer whose numbers are stored pixel by pixel; `before` begins their names.
+pub(super) fn channels_of(numbers: &[f32], names: &[&str], before: &str) -> Vec<Channel> {
+    let of = |c: usize| numbers.iter().skip(c).step_by(names.len()).copied().collect();
+    names.iter().enumerate().map(|(c, name)| channel(format!("{before}{name}"), of(c))).collect()
+}
+
+/// Encodes a file of one part.
+pub(super) fn encode(
+    (width, height): (u32, u32),
+    window: Option<DataWindow>,
+    channels: Vec<Channel>,
+    attributes: &Attributes,
+) -> exr::error::Result<Vec<u8>> {
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
-    let size = (frame.width as usize, frame.height as usize);
-    let mut image = Image::from_encoded_channels(size, encoding, AnyChannels::sort(channels.collect()));
+    let size = (width as usize, height as usize);
+    let mut image = Image::from_encoded_channels(size, encoding, AnyChannels::sort(channels.into()));
     image.attributes.chromaticities = Some(REC709);
-    image.layer_data.attributes = attributes(provenance);
-    if let Some(DataWindow { whole, column, row }) = frame.window {
+    image.layer_data.attributes = layer_attributes(attributes);
+    if let Some(DataWindow { whole, column, row }) = window {
         // The display window is the whole picture, the data window the rendered part.
         image.attributes.display_window = IntegerBounds::from_dimensions((whole.0 as usize, whole.1 as usize));
         image.layer_data.attributes.layer_position = Vec2(column as i32, row as i32);
@@ -102,43 +139,56 @@ fn encode(frame: &Frame, provenance: &Provenance) -> exr::error::Result<Vec<u8>>
     Ok(bytes)
 }
 
-/// Attributes of the file with its provenance. Counts and the seed are stored as text, since the
-/// format's integers end at 2³¹.
-fn attributes(provenance: &Provenance) -> LayerAttributes {
-    let (stats, settings) = (provenance.stats, provenance.settings);
-    let version = env!("CARGO_PKG_VERSION");
-    let maps = &stats.photons;
-    let texts = [
-        ("version", version.to_string()),
-        ("settings", serde_json::to_string(settings).expect("settings hold nothing that JSON cannot")),
-        ("seed", settings.photons.seed.to_string()),
-        ("loading", serde_json::to_string(provenance.options).expect("options hold nothing that JSON cannot")),
-        ("scene", provenance.scene.to_string()),
-        ("sceneHash", provenance.scene_hash.to_string()),
-        ("device", stats.device.name.clone()),
-        ("driver", stats.device.driver.clone()),
-        ("globalEmitted", maps.global.emitted.to_string()),
-        ("globalStored", maps.global.stored.to_string()),
-        ("causticEmitted", maps.caustic.emitted.to_string()),
-        ("causticStored", maps.caustic.stored.to_string()),
-    ];
-    let environment = provenance.environment.iter().flat_map(|environment| {
-        let degrees = (f64::from(environment.rotation).to_degrees() * 1e4).round() / 1e4;
-        let uniform = environment.radiance.map(|[r, g, b]| ("environmentRadiance", format!("{r},{g},{b}")));
-        let file = [
-            ("environment", environment.name.to_string()),
-            ("environmentHash", environment.hash.to_string()),
-            ("environmentStrength", environment.strength.to_string()),
-            ("environmentRotation", degrees.to_string()),
+impl Provenance<'_> {
+    /// The attributes. Counts and the seed are text, since the format's integers end at 2³¹.
+    #[must_use]
+    pub fn attributes(&self) -> Attributes {
+        let (stats, settings) = (self.stats, self.settings);
+        let texts = [
+            ("version", env!("CARGO_PKG_VERSION").to_string()),
+            ("settings", serde_json::to_string(settings).expect("settings hold nothing that JSON cannot")),
+            ("seed", settings.photons.seed.to_string()),
+            ("loading", serde_json::to_string(self.options).expect("options hold nothing that JSON cannot")),
+            ("scene", self.scene.to_string()),
+            ("sceneHash", self.scene_hash.to_string()),
+            ("device", stats.device.name.clone()),
+            ("driver", stats.device.driver.clone()),
         ];
-        file.into_iter().chain(uniform)
-    });
-    let attribute = |(name, value): (&str, String)| {
-        (Text::from(format!("caustica:{name}").as_str()), AttributeValue::Text(text(&value)))
+        let environment = self.environment.iter().flat_map(|environment| {
+            let degrees = (f64::from(environment.rotation).to_degrees() * 1e4).round() / 1e4;
+            let uniform = environment.radiance.map(|[r, g, b]| ("environmentRadiance", format!("{r},{g},{b}")));
+            let file = [
+                ("environment", environment.name.to_string()),
+                ("environmentHash", environment.hash.to_string()),
+                ("environmentStrength", environment.strength.to_string()),
+                ("environmentRotation", degrees.to_string()),
+            ];
+            file.into_iter().chain(uniform)
+        });
+        let all = texts.into_iter().chain(environment);
+        let mut attributes: Attributes = all.map(|(name, value)| (name.to_owned(), value)).collect();
+        count_photons(&mut attributes, stats.photons.global, stats.photons.caustic);
+        attributes
+    }
+}
+
+/// Sets the attributes that count photons.
+pub(super) fn count_photons(attributes: &mut Attributes, global: MapStats, caustic: MapStats) {
+    for (map, of_map) in [("global", global), ("caustic", caustic)] {
+        attributes.insert(format!("{map}Emitted"), of_map.emitted.to_string());
+        attributes.insert(format!("{map}Stored"), of_map.stored.to_string());
+    }
+}
+
+/// The attributes in the form of the file's writer.
+fn layer_attributes(attributes: &Attributes) -> LayerAttributes {
+    let version = attributes.get("version").map_or(env!("CARGO_PKG_VERSION"), String::as_str);
+    let attribute = |(name, value): (&String, &String)| {
+        (Text::from(format!("caustica:{name}").as_str()), AttributeValue::Text(text(value)))
     };
     LayerAttributes {
         software_name: Some(text(&format!("Caustica {version}"))),
-        other: texts.into_iter().chain(environment).map(attribute).collect(),
+        other: attributes.iter().map(attribute).collect(),
         ..LayerAttributes::default()
     }
 }
@@ -194,7 +244,7 @@ pub fn read_exr(path: &Path) -> Result<Frame> {
 }
 
 /// Data window of the image, if it is only a part of the display window.
-fn window_of(image: &Image<exr::image::Layer<AnyChannels<FlatSamples>>>) -> Option<DataWindow> {
+pub(super) fn window_of(image: &ReadImage) -> Option<DataWindow> {
     let (whole, layer) = (image.attributes.display_window, &image.layer_data);
     let from = layer.attributes.layer_position - whole.position;
     let offset = |at: i32, size: usize, whole: usize| u32::try_from(at).ok().filter(|&at| at as usize + size <= whole);
@@ -208,9 +258,17 @@ fn window_of(image: &Image<exr::image::Layer<AnyChannels<FlatSamples>>>) -> Opti
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read or is not OpenEXR.
-pub fn read_exr_attributes(path: &Path) -> Result<BTreeMap<String, String>> {
-    let image = open(path)?;
-    let all = image.attributes.other.iter().chain(&image.layer_data.attributes.other);
+pub fn read_exr_attributes(path: &Path) -> Result<Attributes> {
+    Ok(attributes_of(&open(path)?))
+}
+
+/// Our attributes of an image.
+pub(super) fn attributes_of(image: &ReadImage) -> Attributes {
+    our_attributes(image.attributes.other.iter().chain(&image.layer_data.attributes.other))
+}
+
+/// Our attributes among those of a header.
+pub(super) fn our_attributes<'a>(all: impl Iterator<Item = (&'a Text, &'a AttributeValue)>) -> Attributes {
     let ours = all.filter_map(|(name, value)| match value {
         AttributeValue::Text(value) => {
             let name = name.to_string().strip_prefix("caustica:")?.to_string();
@@ -218,14 +276,15 @@ pub fn read_exr_attributes(path: &Path) -> Result<BTreeMap<String, String>> {
         }
         _ => None,
     });
-    Ok(ours.collect())
+    ours.collect()
 }
 
-fn open(path: &Path) -> Result<Image<exr::image::Layer<AnyChannels<FlatSamples>>>> {
+pub(super) fn open(path: &Path) -> Result<ReadImage> {
     let mut bytes = Vec::new();
     open_regular(path)
         .and_then(|mut file| file.read_to_end(&mut bytes))
         .map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
+    check_claims(&bytes).map_err(|problem| failure(path, problem))?;
     exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -238,7 +297,25 @@ fn open(path: &Path) -> Result<Image<exr::image::Layer<AnyChannels<FlatSamples>>
         .map_err(|e| failure(path, e))
 }
 
-fn failure(path: &Path, problem: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
+/// Refuses a file that claims more numbers than its bytes can hold, before memory is taken for
+/// them.
+fn check_claims(bytes: &[u8]) -> std::result::Result<(), String> {
+    let Ok(meta) = MetaData::read_from_buffered(bytes, false) else { return Ok(()) };
+    let claimed = |header: &Header| {
+        let pixels = header.layer_size.width() as u64 * header.layer_size.height() as u64;
+        pixels.saturating_mul(4 * header.channels.list.len() as u64)
+    };
+    let most = UNCHECKED_BYTES + MOST_COMPRESSION * bytes.len() as u64;
+    match meta.headers.iter().find(|header| claimed(header) > most) {
+        None => Ok(()),
+        Some(header) => {
+            let (width, height) = (header.layer_size.width(), header.layer_size.height());
+            Err(format!("is damaged: {} bytes do not hold {width} x {height} pixels", bytes.len()))
+        }
+    }
+}
+
+pub(super) fn failure(path: &Path, problem: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
     Error::Io { path: path.to_path_buf(), source: std::io::Error::other(problem) }
 }
 

@@ -13,24 +13,54 @@ use crate::{
     settings::Crop,
 };
 
+/// Number of a film's layers.
+const LAYER_COUNT: usize = LAYERS.len();
+
 /// Sums of every layer over the samples of one pass, or of several that were merged.
 ///
 /// A pass is one run over all samples of a picture with photons of its own. Passes are independent,
-/// so the second moments of their means give the standard error of the merged picture.
+/// so the second moments of their means give the standard error of the merged picture. Passes with
+/// smaller radii are less biased, so the regression of their means on the squared radius gives an
+/// estimate of the bias.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
-    whole: (u32, u32),
-    window: Crop,
-    passes: u32,
+    pub(super) whole: (u32, u32),
+    pub(super) window: Crop,
+    pub(super) passes: u32,
     /// Number of samples of each pixel in all passes.
-    samples: u64,
+    pub(super) samples: u64,
     /// Sums of the layers' numbers, pixel by pixel, in the order of [`LAYERS`].
-    sums: [Vec<f32>; LAYERS.len()],
-    /// Sums over the passes of the squares of their means; `None` for one pass, whose means follow
-    /// from the sums.
-    squares: Option<[Vec<f64>; LAYERS.len()]>,
+    pub(super) sums: [Vec<f32>; LAYER_COUNT],
+    /// Squared radii of the passes.
+    pub(super) bandwidth: Bandwidth,
+    /// Second moments over the passes; `None` for one pass, where they are 0.
+    pub(super) moments: Option<Moments>,
     /// Number of samples that were left out, since a sum would not be finite with them.
-    non_finite: u64,
+    pub(super) non_finite: u64,
+}
+
+/// Squared radius of the estimates of passes, relative to that of pass 0: its mean over the passes,
+/// the sum of its squared deviations from the mean, and the mean of its inverse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bandwidth {
+    pub mean: f64,
+    pub deviations: f64,
+    pub inverse: f64,
+}
+
+impl Bandwidth {
+    fn of_pass(factor: f64) -> Self {
+        Self { mean: factor, deviations: 0.0, inverse: 1.0 / factor }
+    }
+}
+
+/// Second moments of the means of passes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Moments {
+    /// Sums of squared deviations of the layers' means, in the order of [`LAYERS`].
+    pub deviations: [Vec<f32>; LAYER_COUNT],
+    /// Sums of the products of the deviations of radiance and bandwidth.
+    pub with_bandwidth: Vec<f32>,
 }
 
 impl Film {
@@ -39,8 +69,34 @@ impl Film {
     pub fn new(whole: (u32, u32), window: Crop, spp: u32) -> Self {
         let pixels = window.width as usize * window.height as usize;
         let zeros = |i: usize| vec![0.0; pixels * LAYERS[i].channels.len()];
-        let sums = array::from_fn(zeros);
-        Self { whole, window, passes: 1, samples: spp.into(), sums, squares: None, non_finite: 0 }
+        Self {
+            whole,
+            window,
+            passes: 1,
+            samples: spp.into(),
+            sums: array::from_fn(zeros),
+            bandwidth: Bandwidth::of_pass(1.0),
+            moments: None,
+            non_finite: 0,
+        }
+    }
+
+    /// Notes the squared radius of the pass's estimates, relative to that of pass 0.
+    #[must_use]
+    pub fn with_bandwidth(self, factor: f64) -> Self {
+        Self { bandwidth: Bandwidth::of_pass(factor), ..self }
+    }
+
+    /// Width and height of the whole picture, pixels.
+    #[must_use]
+    pub fn whole(&self) -> (u32, u32) {
+        self.whole
+    }
+
+    /// The part of the picture that the film holds.
+    #[must_use]
+    pub fn window(&self) -> Crop {
+        self.window
     }
 
     /// Number of passes.
@@ -80,7 +136,10 @@ impl Film {
         }
     }
 
-    /// Adds the passes of another film of the same part of the same picture.
+    /// Adds the passes of another film of the same part of the same picture. Second moments are
+    /// merged without cancellation (Chan, Golub and LeVeque 1983, "Algorithms for Computing the
+    /// Sample Variance", equation 2.1). Sums round, so that the order of merges decides the last
+    /// bits: [`super::PassSum`] fixes it.
     ///
     /// # Errors
     /// [`Error::Differs`] if size or window differ.
@@ -96,12 +155,28 @@ impl Film {
                 part(other)
             )));
         }
-        let mut squares = self.squares();
-        let add = |a: &mut [Vec<f64>; LAYERS.len()], b: [Vec<f64>; LAYERS.len()]| {
-            a.iter_mut().zip(b).for_each(|(a, b)| a.iter_mut().zip(b).for_each(|(a, b)| *a += b));
+        let (n, m) = (f64::from(self.passes), f64::from(other.passes));
+        // Weight of the product of the distances between both means.
+        let weight = n * m / (n + m);
+        let (here, there) = (self.means(), other.means());
+        let shift = other.bandwidth.mean - self.bandwidth.mean;
+        let mut moments = self.moments.take().unwrap_or_else(|| self.no_moments());
+        for i in 0..LAYER_COUNT {
+            let theirs = other.moments.as_ref().map(|moments| moments.deviations[i].as_slice());
+            let distances = here[i].iter().zip(&there[i]).map(|(a, b)| f64::from(*b) - f64::from(*a));
+            let products = distances.map(|d| d * d * weight);
+            add(&mut moments.deviations[i], theirs, products);
+        }
+        let radiance = layer_index("radiance");
+        let theirs = other.moments.as_ref().map(|moments| moments.with_bandwidth.as_slice());
+        let distances = here[radiance].iter().zip(&there[radiance]).map(|(a, b)| f64::from(*b) - f64::from(*a));
+        add(&mut moments.with_bandwidth, theirs, distances.map(|d| d * shift * weight));
+        self.moments = Some(moments);
+        self.bandwidth = Bandwidth {
+            mean: self.bandwidth.mean + shift * m / (n + m),
+            deviations: self.bandwidth.deviations + other.bandwidth.deviations + shift * shift * weight,
+            inverse: (n * self.bandwidth.inverse + m * other.bandwidth.inverse) / (n + m),
         };
-        add(&mut squares, other.squares());
-        self.squares = Some(squares);
         for (a, b) in self.sums.iter_mut().zip(&other.sums) {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         }
@@ -125,16 +200,37 @@ impl Film {
     #[must_use]
     pub fn standard_error(&self, layer: &str) -> Option<Vec<f32>> {
         let (i, passes) = (layer_index(layer), f64::from(self.passes));
-        let squares = &self.squares.as_ref()?[i];
-        let error = |(mean, squares): (&f32, &f64)| {
-            let variance = (squares / passes - f64::from(*mean).powi(2)).max(0.0) / (passes - 1.0);
-            variance.sqrt() as f32
-        };
-        Some(self.means()[i].iter().zip(squares).map(error).collect())
+        let deviations = &self.moments.as_ref()?.deviations[i];
+        let error = |deviations: &f32| (f64::from(*deviations) / (passes - 1.0) / passes).sqrt() as f32;
+        Some(deviations.iter().map(error).collect())
+    }
+
+    /// Estimate of the bias of each of the means of radiance, by linear regression of the passes'
+    /// means on their squared radii, to which the bias is proportional at first order (Silverman
+    /// 1986, "Density Estimation", section 3.3); `None` unless passes differ in radius. It has a
+    /// noise of its own, [`Self::bias_noise`] times the standard error.
+    #[must_use]
+    pub fn bias(&self) -> Option<Vec<f32>> {
+        let moments = self.moments.as_ref().filter(|_| self.bandwidth.deviations > 0.0)?;
+        let scale = self.bandwidth.mean / self.bandwidth.deviations;
+        Some(moments.with_bandwidth.iter().map(|product| (f64::from(*product) * scale) as f32).collect())
+    }
+
+    /// Standard error of [`Self::bias`] relative to [`Self::standard_error`], if the variance of a
+    /// pass is inverse to its squared radius, as that of a number of photons relative to it is.
+    #[must_use]
+    pub fn bias_noise(&self) -> Option<f64> {
+        let Bandwidth { mean, deviations, inverse } = self.bandwidth;
+        let passes = f64::from(self.passes);
+        // The variance v/f of a pass of squared radius f gives the mean the variance v Σ 1/f / n²,
+        // and the slope v Σ (f − mean)²/f / deviations². The latter sum is n mean (mean inverse −
+        // 1).
+        let ratio = mean * (mean * inverse - 1.0).max(0.0) / inverse;
+        (deviations > 0.0).then(|| mean * passes / deviations * ratio.sqrt())
     }
 
     /// The mean of each number, by its layer's rule.
-    fn means(&self) -> [Vec<f32>; LAYERS.len()] {
+    fn means(&self) -> [Vec<f32>; LAYER_COUNT] {
         let per_sample = 1.0 / self.samples as f32;
         let hits = &self.sums[layer_index("alpha")];
         array::from_fn(|i| {
@@ -148,10 +244,20 @@ impl Film {
         })
     }
 
-    /// Sums over the passes of the squares of their means.
-    fn squares(&self) -> [Vec<f64>; LAYERS.len()] {
-        let of_one = || self.means().map(|means| means.into_iter().map(|mean| f64::from(mean).powi(2)).collect());
-        self.squares.clone().unwrap_or_else(of_one)
+    /// The moments of one pass.
+    fn no_moments(&self) -> Moments {
+        Moments {
+            deviations: array::from_fn(|i| vec![0.0; self.sums[i].len()]),
+            with_bandwidth: vec![0.0; self.sums[layer_index("radiance")].len()],
+        }
+    }
+}
+
+/// Adds the moments of another film, and the products of the distances between both means.
+fn add(moments: &mut [f32], theirs: Option<&[f32]>, products: impl Iterator<Item = f64>) {
+    for (i, (moment, product)) in moments.iter_mut().zip(products).enumerate() {
+        let theirs = theirs.map_or(0.0, |moments| f64::from(moments[i]));
+        *moment = (f64::from(*moment) + theirs + product) as f32;
     }
 }
 
@@ -213,6 +319,29 @@ mod tests {
         let mut equal = film(&[1.0; 6], 4);
         equal.merge(&film(&[1.0; 6], 4)).expect("they are of one picture");
         assert_eq!(equal.standard_error("radiance").expect("two passes")[0], 0.0, "control: equal passes");
+    }
+
+    #[test]
+    fn passes_of_smaller_radii_tell_the_bias() {
+        // Means 3 + 2 f of squared radii f: a bias of 2 times the mean of f.
+        let bandwidths = [1.0, 0.5, 0.25, 0.125];
+        let merged = |value: &dyn Fn(f64) -> f32| {
+            let pass = |f: f64| film(&[value(f); 6], 4).with_bandwidth(f);
+            let mut merged = pass(bandwidths[0]);
+            bandwidths[1..].iter().for_each(|f| merged.merge(&pass(*f)).expect("they are of one picture"));
+            merged
+        };
+        let biased = merged(&|f| (3.0 + 2.0 * f) as f32);
+        let bias = biased.bias().expect("radii differ")[0];
+        assert!((bias - 2.0 * 1.875 / 4.0).abs() < 1e-6, "{bias}");
+        assert!((biased.finish().radiance()[0][0] - bias - 3.0).abs() < 1e-6, "without it, the truth is left");
+        assert_eq!(merged(&|_| 3.0).bias().expect("radii differ")[0], 0.0, "control: no bias");
+        assert!(film(&[1.0; 6], 4).bias().is_none(), "one pass tells nothing");
+        // Of two passes, the slope is the difference: mean/(f₀ − f₁) times √(v/f₀ + v/f₁), and the
+        // standard error half of that root.
+        let mut two = film(&[1.0; 6], 4);
+        two.merge(&film(&[2.0; 6], 4).with_bandwidth(0.5)).expect("they are of one picture");
+        assert!((two.bias_noise().expect("radii differ") - 2.0 * 0.75 / 0.5).abs() < 1e-12);
     }
 
     #[test]

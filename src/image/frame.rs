@@ -34,6 +34,8 @@ pub struct Frame {
     pub window: Option<DataWindow>,
     /// The numbers of each layer of [`LAYERS`], pixel by pixel.
     layers: [Vec<f32>; LAYERS.len()],
+    /// Further channels of files: name, and a number for each pixel.
+    extras: Vec<(String, Vec<f32>)>,
 }
 
 impl Frame {
@@ -45,7 +47,7 @@ impl Frame {
     pub fn new(width: u32, height: u32, radiance: &[[f32; 3]]) -> Self {
         assert_eq!(radiance.len(), width as usize * height as usize, "a pixel for each place");
         let zeros = |i: usize| vec![0.0; radiance.len() * LAYERS[i].channels.len()];
-        let mut frame = Self { width, height, window: None, layers: std::array::from_fn(zeros) };
+        let mut frame = Self { width, height, window: None, layers: std::array::from_fn(zeros), extras: Vec::new() };
         frame.radiance_mut().copy_from_slice(radiance);
         frame
     }
@@ -56,7 +58,7 @@ impl Frame {
         window: Option<DataWindow>,
         layers: [Vec<f32>; LAYERS.len()],
     ) -> Self {
-        Self { width, height, window, layers }
+        Self { width, height, window, layers, extras: Vec::new() }
     }
 
     /// Number of pixels.
@@ -80,6 +82,21 @@ impl Frame {
     /// As [`Self::layer`].
     pub fn layer_mut(&mut self, name: &str) -> &mut [f32] {
         &mut self.layers[layer_index(name)]
+    }
+
+    /// Further channels that files get: name, and a number for each pixel.
+    pub fn extras(&self) -> impl Iterator<Item = (&str, &[f32])> {
+        self.extras.iter().map(|(name, numbers)| (name.as_str(), numbers.as_slice()))
+    }
+
+    /// Adds a channel to those that files get. OpenEXR takes the part of the name before the last
+    /// dot as the layer.
+    ///
+    /// # Panics
+    /// If there is not one number for each pixel.
+    pub fn add_extra(&mut self, name: &str, numbers: Vec<f32>) {
+        assert_eq!(numbers.len(), self.pixels(), "a number for each pixel");
+        self.extras.push((name.to_owned(), numbers));
     }
 
     /// Radiance in W/(m² sr) per channel, linear Rec.709.

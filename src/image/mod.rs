@@ -2,24 +2,38 @@
 
 #[cfg(feature = "report")]
 mod canvas;
+mod convergence;
 pub mod difference;
+mod exposure;
 mod exr;
 mod file;
 pub mod film;
 pub mod flip;
 mod frame;
 pub mod layers;
+mod merge;
 mod orientation;
+mod part;
+mod part_identity;
+mod pass_sum;
 mod png;
 mod radiance;
 mod tonemap;
 
 #[cfg(feature = "report")]
 pub use canvas::{Canvas, Rgb8};
-pub use exr::{EnvironmentProvenance, Provenance, read_exr, read_exr_attributes, write_exr};
+pub use convergence::ErrorEstimate;
+pub use exposure::auto_exposure;
+pub use exr::{
+    Attributes, EnvironmentProvenance, Provenance, read_exr, read_exr_attributes, write_exr, write_exr_with,
+};
 pub use file::{check_output, close_files, write_file};
 pub use film::Film;
 pub use frame::{DataWindow, Frame};
+pub use merge::{Survey, WindowParts, merge, survey};
+pub use part::{PartHeader, read_part, read_part_header, write_part};
+pub use part_identity::differences;
+pub use pass_sum::{Block, Fold, PassSum};
 pub use png::{encode_png, write_png};
 pub(crate) use radiance::{decode_radiance, read_radiance_bytes};
 pub use tonemap::{Tonemap, srgb_decode, srgb_encode};

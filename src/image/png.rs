@@ -17,12 +17,29 @@ pub fn write_png(path: &Path, frame: &Frame, exposure: f32, curve: Tonemap) -> R
     write_file(path, &bytes)
 }
 
-/// Encodes the bytes that [`write_png`] writes.
+/// Encodes the bytes that [`write_png`] writes. The file's text `caustica:exposure` holds the
+/// stops.
 ///
 /// # Errors
 /// If the frame has no pixel.
 pub fn encode_png(frame: &Frame, exposure: f32, curve: Tonemap) -> io::Result<Vec<u8>> {
-    encode_rgb8(&to_srgb8(frame, exposure, curve), frame.width, frame.height)
+    let mut bytes = encode_rgb8(&to_srgb8(frame, exposure, curve), frame.width, frame.height)?;
+    let text = text_chunk("caustica:exposure", &format!("{exposure} EV"));
+    bytes.splice(AFTER_HEADER..AFTER_HEADER, text);
+    Ok(bytes)
+}
+
+/// Bytes of a PNG file up to the end of its header, after which texts may stand.
+const AFTER_HEADER: usize = 8 + 4 + 4 + 13 + 4;
+
+/// Chunk of text of a PNG file (ISO/IEC 15948, 11.3.4.3): length, type, keyword, 0, text, CRC of
+/// all but the length.
+fn text_chunk(keyword: &str, text: &str) -> Vec<u8> {
+    let data = [b"tEXt", keyword.as_bytes(), &[0], text.as_bytes()].concat();
+    let bits = |crc: u32| (0..8).fold(crc, |crc, _| (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 });
+    let crc = !data.iter().fold(u32::MAX, |crc, byte| (crc >> 8) ^ bits((crc ^ u32::from(*byte)) & 0xff));
+    let length = data.len() as u32 - 4;
+    [&length.to_be_bytes()[..], &data, &crc.to_be_bytes()].concat()
 }
 
 /// Encodes a PNG file from three bytes per pixel, rows from the top.
@@ -60,6 +77,11 @@ mod tests {
         // One stop more: 18 % grey becomes 118, one half becomes 188, and values above 1 are
         // clipped.
         assert_eq!(read.into_raw(), [0, 0, 0, 118, 188, 255]);
+        let bytes = std::fs::read(&path).unwrap();
+        let text = b"tEXtcaustica:exposure\x001 EV";
+        let at = bytes.windows(text.len()).position(|w| w == text).expect("the exposure");
+        // CRC by another implementation.
+        assert_eq!(bytes[at + text.len()..][..4], 0x68e9_a62f_u32.to_be_bytes());
         write_png(&path, &frame, 0.0, Tonemap::None).unwrap();
         assert_ne!(image::open(&path).unwrap().into_rgb8().into_raw()[3], 118);
     }

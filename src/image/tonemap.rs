@@ -16,6 +16,8 @@ pub enum Tonemap {
     /// Reinhard et al. 2002, eq. 3, on Rec.709 luminance Y: the colour is divided by 1 + Y, then
     /// clipped.
     Reinhard,
+    /// AgX (Sobotka 2022): all colours go to white with rising light, without shifts of hue.
+    Agx,
     /// Clips to 0..1.
     None,
 }
@@ -36,6 +38,7 @@ impl Tonemap {
                 let luminance = 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
                 c.map(|x| x / (1.0 + luminance))
             }
+            Self::Agx => agx(c),
             Self::None => c,
         };
         mapped.map(|x| x.clamp(0.0, 1.0))
@@ -76,6 +79,39 @@ fn aces(color: [f32; 3]) -> [f32; 3] {
     times(&ACES_OUTPUT, times(&ACES_INPUT, color).map(fit))
 }
 
+/// Weights of the channels in AgX's inset: 0.8 of a colour, and a fifth of its weighted mean.
+const AGX_WEIGHTS: [f32; 3] = [0.042_401_07, 0.078_436_5, 0.079_162_43];
+const AGX_INSET: f32 = 0.8;
+/// Stops that the curve spans, below and above middle grey, and that grey.
+const AGX_STOPS: [f32; 2] = [10.0, 6.5];
+const AGX_GREY: f32 = 0.18;
+/// Slope of the curve at middle grey, which becomes 0.5, and the powers of its toe and shoulder.
+const AGX_SLOPE: f32 = 2.0;
+const AGX_POWERS: [f32; 2] = [3.0, 3.25];
+/// Exponent of the display that the curve's values are meant for.
+const AGX_DISPLAY: f32 = 2.2;
+
+/// The base of AgX by its formulas (Sobotka's `AgX` configuration for `OpenColorIO`), without a
+/// look.
+fn agx(color: [f32; 3]) -> [f32; 3] {
+    let weighted = |c: [f32; 3]| c.iter().zip(AGX_WEIGHTS).map(|(x, w)| x * w).sum::<f32>();
+    let mean = weighted(color);
+    let curve = |x: f32| {
+        let stops = ((AGX_INSET * x + mean) / AGX_GREY).max(f32::MIN_POSITIVE).log2();
+        let span = AGX_STOPS[0] + AGX_STOPS[1];
+        let grey = AGX_STOPS[0] / span;
+        let at = ((stops + AGX_STOPS[0]) / span).clamp(0.0, 1.0) - grey;
+        let (end, power) = if at < 0.0 { (grey, AGX_POWERS[0]) } else { (1.0 - grey, AGX_POWERS[1]) };
+        // A line through grey that bends so that the curve ends in 0 and in 1.
+        let bend = ((AGX_SLOPE * end / 0.5).powf(power) - 1.0) / end.powf(power);
+        0.5 + AGX_SLOPE * at * (1.0 + bend * at.abs().powf(power)).powf(-1.0 / power)
+    };
+    let curved = color.map(curve);
+    // The inverse of the inset: the weights and 0.8 sum to 1, so that the weighted mean is kept.
+    let mean = weighted(curved);
+    curved.map(|x| ((x - mean) / AGX_INSET).clamp(0.0, 1.0).powf(AGX_DISPLAY))
+}
+
 /// Linear value of one encoded by the sRGB transfer function, 0 to 1 (IEC 61966-2-1).
 #[must_use]
 pub fn srgb_decode(encoded: f32) -> f32 {
@@ -108,12 +144,18 @@ mod tests {
         assert_near(Tonemap::Aces.apply([1.0; 3]), [0.6191; 3]);
         assert_near(Tonemap::Reinhard.apply([1.0; 3]), [0.5; 3]);
         assert_near(Tonemap::Reinhard.apply([0.0, 1.0, 0.0]), [0.0, 1.0 / 1.7152, 0.0]);
+        // AgX: middle grey becomes half of what a display of exponent 2.2 shows; the ends; and a
+        // colour by the published matrices and curve, in f64.
+        assert_near(Tonemap::Agx.apply([0.18; 3]), [0.5_f32.powf(2.2); 3]);
+        assert_near(Tonemap::Agx.apply([0.0; 3]), [0.0; 3]);
+        assert_near(Tonemap::Agx.apply([20.0; 3]), [1.0; 3]);
+        assert_near(Tonemap::Agx.apply([1.0, 0.2, 0.05]), [0.65281, 0.25572, 0.11113]);
         assert_near(Tonemap::None.apply([0.25, 1.5, -1.0]), [0.25, 1.0, 0.0]);
     }
 
     #[test]
     fn every_curve_stays_in_range_and_rises() {
-        for curve in [Tonemap::Neutral, Tonemap::Aces, Tonemap::Reinhard, Tonemap::None] {
+        for curve in [Tonemap::Neutral, Tonemap::Aces, Tonemap::Reinhard, Tonemap::Agx, Tonemap::None] {
             assert_eq!(curve.apply([f32::NAN; 3]), curve.apply([0.0; 3]));
             assert!(curve.apply([f32::INFINITY; 3]).iter().all(|&x| x > 0.98), "{curve:?}");
             let greys: Vec<_> = (0..200).map(|i| curve.apply([i as f32 * 0.02; 3])[0]).collect();

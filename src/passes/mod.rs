@@ -11,4 +11,4 @@ pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, SharedPoints,
 };
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
-pub use photons::{PhotonTracer, RawMap, TracedPhotons};
+pub use photons::{PathRange, PathRanges, PhotonTracer, RawMap, TracedPhotons};

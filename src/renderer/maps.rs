@@ -6,7 +6,7 @@ use crate::{
     error::Result,
     gpu::Gpu,
     map_kind::MapKind,
-    passes::{MapKernels, PhotonMap, PhotonTracer},
+    passes::{MapKernels, PathRanges, PhotonMap, PhotonTracer},
     progress::{Progress, Stage},
     settings::PhotonSettings,
     stats::{Stats, timed},
@@ -20,6 +20,9 @@ pub struct PhotonMaps {
     kinds: Vec<MapKind>,
     /// Settings of the tracing.
     pub(super) settings: PhotonSettings,
+    /// Index of the first camera sample of pictures, if the photons are those of one of several
+    /// passes.
+    pub(super) first_sample: Option<u32>,
     pub(super) stats: Stats,
 }
 
@@ -59,21 +62,21 @@ impl PhotonMaps {
 }
 
 /// Traces the photons of a scene and sorts them into maps. `caustics`: the scene has a specular
-/// surface.
+/// surface. `paths`: indices of the photons' paths.
 pub(super) fn trace_maps(
     gpu: &Gpu,
     scene: &SceneBuffers,
     settings: &PhotonSettings,
-    caustics: bool,
+    (caustics, paths): (bool, &PathRanges),
     mut stats: Stats,
     progress: &dyn Progress,
 ) -> Result<PhotonMaps> {
     let settings = settings.clone();
     if !settings.mode.traces_photons() {
-        return Ok(PhotonMaps { maps: Vec::new(), kinds: Vec::new(), settings, stats });
+        return Ok(PhotonMaps { maps: Vec::new(), kinds: Vec::new(), settings, first_sample: None, stats });
     }
     let traced = timed(&mut stats.seconds.photons, || {
-        PhotonTracer::new(gpu, scene, settings.sampler).trace(gpu, scene, &settings, caustics, progress)
+        PhotonTracer::new(gpu, scene, settings.sampler).trace_range(gpu, scene, &settings, (caustics, paths), progress)
     })?;
     stats.rays += traced.rays;
     stats.photons.global = tally::map_stats(&traced.maps.global);
@@ -93,5 +96,5 @@ pub(super) fn trace_maps(
         }
         Result::Ok(())
     })?;
-    Ok(PhotonMaps { maps, kinds, settings, stats })
+    Ok(PhotonMaps { maps, kinds, settings, first_sample: None, stats })
 }

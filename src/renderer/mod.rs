@@ -5,6 +5,7 @@
 
 mod gatherer;
 mod maps;
+mod progressive;
 mod ray_start;
 mod render;
 mod session;
@@ -13,8 +14,10 @@ mod tally;
 mod tiles;
 
 pub use maps::PhotonMaps;
+pub use progressive::Progressive;
 pub use render::render;
 pub use session::{Render, Session};
+pub use size::size_of;
 
 #[cfg(feature = "report")]
 pub(crate) use {

@@ -11,7 +11,7 @@ use crate::{
     error::Result,
     gpu::Gpu,
     image::{Film, Frame},
-    passes::{CameraKernels, EstimateSharing, MapKernels, PhotonTracer},
+    passes::{CameraKernels, EstimateSharing, MapKernels, PathRanges, PhotonTracer},
     progress::{Progress, Stage},
     scene::Scene,
     settings::{EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Search, Settings, check_samples},
@@ -89,8 +89,19 @@ impl<'a> Session<'a> {
     /// # Errors
     /// As [`super::render`].
     pub fn photon_maps(&self, settings: &PhotonSettings, progress: &dyn Progress) -> Result<PhotonMaps> {
+        self.photon_maps_of(settings, &PathRanges::default(), progress)
+    }
+
+    /// As [`Self::photon_maps`], with the photon paths of the given indices.
+    pub(super) fn photon_maps_of(
+        &self,
+        settings: &PhotonSettings,
+        paths: &PathRanges,
+        progress: &dyn Progress,
+    ) -> Result<PhotonMaps> {
         settings.check()?;
-        trace_maps(self.gpu, &self.buffers, settings, self.scene.has_specular(), self.stats.clone(), progress)
+        let photons = (self.scene.has_specular(), paths);
+        trace_maps(self.gpu, &self.buffers, settings, photons, self.stats.clone(), progress)
     }
 
     /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode,
@@ -159,10 +170,15 @@ impl<'a> Session<'a> {
         let camera = (&self.scene.cameras[number], self.camera_media[number]);
         let scene = (self.scene, &self.buffers);
         let pass = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, picture)?;
+        let pass = pass.of_pass(picture, maps.first_sample)?;
         let mut stats = maps.stats().clone();
         if estimate.keeps_irradiance() && pass.final_rays() > 0 && !maps.maps().is_empty() {
             let scouted = scouting(picture, pass.size, pass.final_rays());
             let scout = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &scouted)?;
+            // The scout of each pass looks at points of its own; that of the first is a single
+            // picture's.
+            let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
+            let scout = scout.of_pass(&scouted, index)?;
             gatherer.prepare(&scout, &mut stats, progress)?;
         }
         let films = pass.render(gatherer, stage, &mut stats, progress)?;

@@ -3,7 +3,7 @@
 use crate::{
     error::{Error, Result},
     memory::available,
-    scene::Camera,
+    scene::{Camera, Scene},
     settings::{Crop, PictureSettings},
 };
 
@@ -14,6 +14,14 @@ const MAX_PIXELS: u64 = 1 << 28;
 /// Host memory per pixel, bytes: the sums of all layers, their means, and the encoded file before
 /// it is written.
 const BYTES_PER_PIXEL: u64 = 160;
+
+/// Size of the whole picture of a scene.
+///
+/// # Errors
+/// [`Error::Setting`] if there is no such camera, or the size or the crop are out of range.
+pub fn size_of(scene: &Scene, picture: &PictureSettings) -> Result<(u32, u32)> {
+    picture_size(scene.camera(picture.camera.as_deref())?, picture)
+}
 
 /// Size of the whole picture: that of the settings, or the default height at the camera's aspect
 /// ratio. Checks the number of pixels, the crop and the free memory.

@@ -81,6 +81,12 @@ impl<'a> CameraPass<'a> {
         })
     }
 
+    /// Takes the samples of one of several passes, from index `first_sample` on, if there is one.
+    pub fn of_pass(self, picture: &PictureSettings, first_sample: Option<u32>) -> Result<Self> {
+        let Some(first) = first_sample else { return Ok(self) };
+        Ok(Self { tracer: self.tracer.of_pass(self.gpu, picture, first)?, ..self })
+    }
+
     /// Renders tile by tile: camera rays to visible points, direct light, the light of photons,
     /// sums over the samples of each pixel. Returns one film for each of the gatherer's pictures.
     pub fn render(

@@ -3,6 +3,7 @@
 mod estimate;
 mod lights;
 mod loading;
+mod passes;
 mod photons;
 mod picture;
 mod range;
@@ -11,6 +12,7 @@ mod render_settings;
 pub use estimate::{EstimateSettings, Search};
 pub use lights::{LightSampling, LightSettings, LightUnit};
 pub use loading::LoadOptions;
+pub use passes::{PassRange, PassSettings};
 pub use photons::{Emission, MAX_BOUNCES, Mode, PhotonSettings, Sampler};
 pub use picture::{Crop, PictureSettings};
 pub use range::{Number, Range};

@@ -53,13 +53,30 @@ impl Settings {
 /// all samples of a pixel and, within a sample, over its four paths, light samples or rays of final
 /// gathering.
 pub(crate) fn check_samples(photons: &PhotonSettings, picture: &PictureSettings) -> Result<()> {
-    let each = picture.light_samples.max(photons.final_gather).max(4);
-    let most = (1_u64 << 32) / u64::from(each);
-    if u64::from(picture.spp) > most {
-        let problem = format!("must be at most {most} with these light samples and rays of final gathering");
-        return fail("picture.spp", picture.spp.to_string(), &problem);
+    check_sample_count(photons, picture, picture.spp.into(), ("picture.spp", picture.spp.to_string()))
+}
+
+/// As [`check_samples`], for a number of samples of all passes together. `setting` is refused: its
+/// name and value.
+pub(super) fn check_sample_count(
+    photons: &PhotonSettings,
+    picture: &PictureSettings,
+    samples: u64,
+    (setting, value): (&'static str, String),
+) -> Result<()> {
+    let most = most_samples(photons, picture);
+    if samples > most {
+        let samples = if setting == "picture.spp" { "" } else { " samples of a pixel" };
+        let problem = format!("must be at most {most}{samples} with these light samples and rays of final gathering");
+        return fail(setting, value, &problem);
     }
     Ok(())
+}
+
+/// Maximum number of samples of a pixel.
+pub(super) fn most_samples(photons: &PhotonSettings, picture: &PictureSettings) -> u64 {
+    let each = picture.light_samples.max(photons.final_gather).max(4);
+    (1_u64 << 32) / u64::from(each)
 }
 
 #[cfg(test)]

@@ -5,5 +5,7 @@ mod cli;
 mod compare;
 mod compare_page;
 mod drivers;
+mod farm;
+mod passes;
 mod study;
 mod study_page;

@@ -6,7 +6,7 @@ use std::{
 };
 
 /// Folders: a word in backquotes that begins with one of them is a path from the root.
-const FOLDERS: [&str; 8] = ["src", "shaders", "tests", "docs", "scripts", "scenes", "examples", "benches"];
+const FOLDERS: [&str; 9] = ["src", "deploy", "shaders", "tests", "docs", "scripts", "scenes", "examples", "benches"];
 
 /// Targets of links that are not URLs, without their anchors.
 fn links(text: &str) -> impl Iterator<Item = &str> {

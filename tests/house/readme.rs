@@ -5,7 +5,8 @@ const README: &str = include_str!("../../README.md");
 const CI: &str = include_str!("../../.ci/run");
 const RELIABILITY: &str = include_str!("../../docs/reliability.md");
 
-const TEST_COMMAND: &str = "scripts/install-vulkan && scripts/install-chromium && cargo test --release --locked";
+const TEST_COMMAND: &str =
+    "scripts/install-vulkan && scripts/install-chromium && scripts/install-farm-tools && cargo test --release --locked";
 
 /// Lines of the n-th fenced block.
 fn block(text: &str, n: usize) -> Vec<&str> {

@@ -164,8 +164,8 @@ fn caustic(roughness: f32, turned: bool) -> Scene {
 
 #[test]
 fn a_lamp_in_metal_keeps_its_energy_as_it_blurs() {
-    // Light directions weigh most where the lobe is wider than the lamp. The metal lies far from the
-    // origin, so that its rays start farther off than the lamp's surface is moved.
+    // Light directions weigh most where the lobe is wider than the lamp. The metal lies far from
+    // the origin, so that its rays start farther off than the lamp's surface is moved.
     let energy = |roughness: f32, side: f32| {
         let mut scene =
             Scene { materials: vec![metal(roughness), emissive("lamp", 0.0, 20.0, false)], ..Scene::default() };

@@ -141,6 +141,17 @@ impl CameraTracer {
         Self { view: CameraTile { start_depth: depth, near_depth, ..self.view }, ..self }
     }
 
+    /// Takes the samples of a pass from index `first` on. All passes together have many samples a
+    /// pixel, so that even a single one is spread over the pixel filter.
+    ///
+    /// # Errors
+    /// Limits of the adapter.
+    pub fn of_pass(self, gpu: &Gpu, picture: &PictureSettings, first: u32) -> Result<Self> {
+        let offsets = picture.pixel_filter.offsets();
+        let view = CameraTile { first_sample: first, filter_steps: offsets.len() as u32 - 1, ..self.view };
+        Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, view, ..self })
+    }
+
     /// The tiles of the whole picture that overlap the data window, in order. A tile is the same
     /// for every data window, to the last bit.
     #[must_use]
@@ -155,6 +166,7 @@ impl CameraTracer {
                 }
                 for first_sample in (0..self.view.spp).step_by(samples as usize) {
                     let samples = samples.min(self.view.spp - first_sample);
+                    let first_sample = self.view.first_sample + first_sample;
                     tiles.push(Tile { pixels: width * height, first_column, first_row, first_sample, samples });
                 }
             }

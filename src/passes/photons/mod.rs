@@ -4,5 +4,5 @@ mod photon_batch;
 pub mod photon_tracer;
 pub mod raw_map;
 
-pub use photon_tracer::{PhotonTracer, TracedPhotons};
+pub use photon_tracer::{PathRange, PathRanges, PhotonTracer, TracedPhotons};
 pub use raw_map::RawMap;

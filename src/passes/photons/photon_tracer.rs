@@ -4,6 +4,9 @@
 //! at mirrors and glass fill the caustic map, which then holds L S+ D only. Without it, the same
 //! paths fill both maps. The photons of a map and their order depend only on the indices of the
 //! paths: never on the size of the batches or on the order in which the device runs them.
+//!
+//! The first of several passes is traced like a single one. Later passes emit a given number of
+//! paths, whose indices follow those of the passes before them ([`PathRanges`]).
 
 use super::{
     photon_batch::{BatchBuffers, PhotonKernels},
@@ -28,6 +31,17 @@ const MAX_BATCH: u64 = layout::PATH_MASK as u64 + 1;
 const GROWTH_WINDOW: u64 = 1 << 17;
 /// Fixed-point unit of lost flux, as a fraction of a path's mean flux.
 const LOST_UNIT: f64 = 1.0 / 4096.0;
+
+/// Indices of the paths of one emission: `count` of them from `first` on; `None`: until the maps
+/// are full, hardly grow, or the setting's maximum of paths is emitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PathRange {
+    pub first: u64,
+    pub count: Option<u64>,
+}
+
+/// Indices of the paths of both emissions, by the map that they are for.
+pub type PathRanges = ByKind<PathRange>;
 
 /// Result of the photon pass.
 #[derive(Debug)]
@@ -62,6 +76,7 @@ struct EmissionPlan<'a> {
     /// that apply to these paths.
     rules: u32,
     fills: &'static [MapKind],
+    paths: PathRange,
 }
 
 impl PhotonTracer {
@@ -88,6 +103,21 @@ impl PhotonTracer {
         caustics: bool,
         progress: &dyn Progress,
     ) -> Result<TracedPhotons> {
+        self.trace_range(gpu, scene, settings, (caustics, &PathRanges::default()), progress)
+    }
+
+    /// As [`Self::trace`], with the paths of the given indices.
+    ///
+    /// # Errors
+    /// As [`Self::trace`].
+    pub fn trace_range(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        settings: &PhotonSettings,
+        (caustics, paths): (bool, &PathRanges),
+        progress: &dyn Progress,
+    ) -> Result<TracedPhotons> {
         let wants_global = settings.stores_direct() || settings.mode.follows_diffuse();
         let mut traced = TracedPhotons {
             maps: ByKind {
@@ -107,7 +137,8 @@ impl PhotonTracer {
         let batch_limit = (largest / 4).clamp(MIN_BATCH, MAX_BATCH).min(max_paths.max(1));
         let groups = scene.lights.table.groups.len();
         let buffers = BatchBuffers::new(gpu, batch_limit, groups)?;
-        for plan in plans(scene, settings, caustics) {
+        for plan in plans(scene, settings, caustics, paths) {
+            let max_paths = plan.paths.count.unwrap_or(max_paths);
             self.run(gpu, scene, &plan, settings, (&buffers, batch_limit, max_paths), &mut traced, progress)?;
         }
         traced.of_lights = gpu.read(&buffers.light_photons, 0, groups as u64)?;
@@ -132,14 +163,17 @@ impl PhotonTracer {
         while first_path < max_paths && plan.fills.iter().any(|kind| traced.maps[*kind].open) {
             progress.check()?;
             let until_check = growth_window - first_path % growth_window;
-            let wanted = plan.fills.iter().map(|kind| traced.maps[*kind].paths_wanted(first_path)).max().unwrap_or(0);
+            let wanted = match plan.paths.count {
+                Some(count) => count,
+                None => plan.fills.iter().map(|kind| traced.maps[*kind].paths_wanted(first_path)).max().unwrap_or(0),
+            };
             let paths = wanted.min(batch_limit).min(max_paths - first_path).min(until_check);
             let batch = PhotonBatch {
                 paths: paths as u32,
                 staging_capacity: buffers.staging_capacity as u32,
                 ..plan.batch(scene, settings, traced)
             }
-            .starting_at(first_path);
+            .starting_at(plan.paths.first + first_path);
             let result = self.kernels.run(gpu, scene, &plan.choices.buffer, buffers, &batch)?;
             let staged = u64::from(result.counters.staged);
             if staged > buffers.staging_capacity {
@@ -155,7 +189,7 @@ impl PhotonTracer {
             traced.unfinished += u64::from(result.counters.unfinished);
             traced.non_finite += u64::from(result.counters.non_finite);
             lost_units += result.counters.all_lost();
-            if first_path.is_multiple_of(growth_window) {
+            if plan.paths.count.is_none() && first_path.is_multiple_of(growth_window) {
                 for &kind in plan.fills {
                     traced.warnings.extend(traced.maps[kind].close_if_idle(kind.name(), growth_window));
                 }
@@ -172,7 +206,12 @@ impl PhotonTracer {
 }
 
 /// The emissions that fill the maps, without those that have no light to choose.
-fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool) -> Vec<EmissionPlan<'a>> {
+fn plans<'a>(
+    scene: &'a SceneBuffers,
+    settings: &PhotonSettings,
+    caustics: bool,
+    paths: &PathRanges,
+) -> Vec<EmissionPlan<'a>> {
     let lights = &scene.lights;
     let rule = |holds: bool, bit: u32| if holds { bit } else { 0 };
     let aimed = settings.emission == Emission::Aimed;
@@ -189,6 +228,7 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool)
             | rule(settings.stores_direct(), layout::STORE_DIRECT)
             | rule(settings.mode.follows_diffuse(), layout::FOLLOW_DIFFUSE),
         fills: if aimed { &[MapKind::Global] } else { &MapKind::ALL },
+        paths: paths.global,
     };
     let caustic = EmissionPlan {
         choices: &lights.aimed,
@@ -197,6 +237,7 @@ fn plans<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings, caustics: bool)
         target_count: lights.specular_targets,
         rules: layout::AIM | layout::CAUSTICS_APART,
         fills: &[MapKind::Caustic],
+        paths: paths.caustic,
     };
     let wanted = [Some(general), (aimed && caustics).then_some(caustic)];
     wanted.into_iter().flatten().filter(|plan| plan.choices.strata > 0).collect()

@@ -1,0 +1,126 @@
+//! `caustica merge` and `caustica status`.
+
+use std::{fmt::Write as _, time::Instant};
+
+use caustica::{
+    Error, Result,
+    image::{Survey, WindowParts, merge, survey, write_exr_with, write_png},
+};
+use serde_json::json;
+
+use super::{
+    files::Files,
+    merge_args::{MergeArgs, StatusArgs},
+    progress::Display,
+    render::exposure_line,
+    say::print,
+    signals,
+    values::extension,
+};
+
+/// Lines of what is missing or twice there that one message has at most.
+const MOST_LISTED: usize = 20;
+
+/// Adds up the parts and writes the picture.
+pub fn run(args: &MergeArgs) -> Result<()> {
+    let started = Instant::now();
+    let display = Display::new(args.quiet, true);
+    let mut files = Files::default();
+    args.parts.iter().try_for_each(|path| files.read(path, "a part"))?;
+    args.outputs.iter().try_for_each(|path| files.write(path))?;
+    let found = survey(&args.parts)?;
+    if !found.overlaps.is_empty() {
+        return Err(Error::Differs(format!("parts overlap: {}", listed(&found.overlaps))));
+    }
+    let missing = found.missing(args.passes.unwrap_or(found.passes()));
+    match (missing.is_empty(), args.allow_gaps) {
+        (true, _) => {}
+        (false, true) => display.note(&format!("missing: {}", listed(&missing))),
+        (false, false) => {
+            let missing = listed(&missing);
+            return Err(Error::Incomplete(format!("parts are missing: {missing}; --allow-gaps merges what there is")));
+        }
+    }
+    if found.devices.len() > 1 {
+        let names: Vec<_> = found.devices.iter().map(|(device, driver)| format!("{device} ({driver})")).collect();
+        display.note(&format!(
+            "the parts are of {} adapters, which round differently: {}",
+            names.len(),
+            names.join(", ")
+        ));
+    }
+    let total = args.parts.len();
+    let check = |done: usize| {
+        let tenth = |done: usize| 10 * done / total;
+        display.state(&format!("merge: {done} of {total} parts"), 0.0, done == 0 || tenth(done) > tenth(done - 1));
+        if signals::stop_requested() { Err(Error::Stopped) } else { Ok(()) }
+    };
+    let (frame, attributes) = merge(&found, &check)?;
+    for path in &args.outputs {
+        match extension(path).as_str() {
+            "png" => {
+                write_png(path, &frame, args.exposure.of(&frame), args.tonemap.into())?;
+                display.note(&exposure_line(args.exposure, &frame));
+            }
+            _ => write_exr_with(path, &frame, &attributes)?,
+        }
+        display.note(&format!("wrote {}", path.display()));
+    }
+    display.note(&format!("merged {total} parts in {:.1} s", started.elapsed().as_secs_f64()));
+    Ok(())
+}
+
+/// Says what there is.
+pub fn status(args: &StatusArgs) -> Result<()> {
+    let found = survey(&args.parts)?;
+    let wanted = args.passes.unwrap_or(found.passes());
+    let missing = found.missing(wanted);
+    if args.json {
+        let mut text = serde_json::to_string_pretty(&report(&found, &missing)).expect("it is JSON");
+        text.push('\n');
+        print(&text);
+        return Ok(());
+    }
+    let (width, height) = found.whole;
+    let mut text = format!("picture: {width}x{height}\n");
+    let mut line = |label: &str, value: &str| writeln!(text, "{label}: {value}").expect("a String can be written");
+    for parts in &found.windows {
+        let window = parts.window;
+        let passes: Vec<_> = parts.passes().iter().map(ToString::to_string).collect();
+        let place = format!("{},{},{},{}", window.column, window.row, window.width, window.height);
+        line("pixels", &format!("{place}: passes {} in {} parts", passes.join(", "), parts.parts.len()));
+    }
+    missing.iter().for_each(|missing| line("missing", missing));
+    found.overlaps.iter().for_each(|overlap| line("twice", overlap));
+    found.devices.iter().for_each(|(device, driver)| line("device", &format!("{device} ({driver})")));
+    print(&text);
+    Ok(())
+}
+
+fn report(found: &Survey, missing: &[String]) -> serde_json::Value {
+    let window = |parts: &WindowParts| {
+        let passes: Vec<_> = parts.passes().iter().map(ToString::to_string).collect();
+        json!({ "crop": parts.window, "passes": passes, "parts": parts.parts.len() })
+    };
+    let windows: Vec<_> = found.windows.iter().map(window).collect();
+    let devices: Vec<_> =
+        found.devices.iter().map(|(name, driver)| json!({ "name": name, "driver": driver })).collect();
+    json!({
+        "complete": missing.is_empty() && found.overlaps.is_empty(),
+        "size": found.whole,
+        "windows": windows,
+        "missing": missing,
+        "overlaps": found.overlaps,
+        "devices": devices,
+    })
+}
+
+/// Lines in one.
+fn listed(lines: &[String]) -> String {
+    let more = lines.len().saturating_sub(MOST_LISTED);
+    let mut text = lines[..lines.len() - more].join(", ");
+    if more > 0 {
+        let _ = write!(text, ", and {more} more, which `caustica status` lists");
+    }
+    text
+}

@@ -1,0 +1,121 @@
+//! Estimated error of a picture of several passes: noise and bias.
+
+use super::{film::Film, layers::layer_index};
+use crate::settings::Crop;
+
+/// Part of the mean radiance of all pixels that is added to each pixel's own, so that dark pixels
+/// do not decide. Where the mean is 1, the square of the error estimates relMSE.
+const FLOOR: f64 = 0.1;
+
+/// Relative errors of a picture, root mean squares over pixels and channels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorEstimate {
+    /// Standard error of the means.
+    pub noise: f64,
+    /// Bias of the estimate's kernel, beyond what its own noise explains; 0 if radii do not shrink.
+    pub bias: f64,
+}
+
+impl ErrorEstimate {
+    /// Estimates the errors of a film, or of the pixels of a part of the picture; `None` for one
+    /// pass, and for a part without pixels in the film.
+    #[must_use]
+    pub fn of(film: &Film, region: Option<Crop>) -> Option<Self> {
+        let frame = film.finish();
+        let errors = film.standard_error("radiance")?;
+        let biases = film.bias();
+        let width = film.window.width as usize;
+        let is_in = |pixel: usize| {
+            let (column, row) = ((pixel % width) as u32 + film.window.column, (pixel / width) as u32 + film.window.row);
+            region.is_none_or(|region| region.touches((column, row), (1, 1)))
+        };
+        let count = 3 * (0..frame.pixels()).filter(|pixel| is_in(*pixel)).count();
+        let numbers =
+            || frame.layer("radiance").iter().map(|x| f64::from(*x)).enumerate().filter(|(i, _)| is_in(i / 3));
+        let floor = (FLOOR * numbers().map(|(_, x)| x).sum::<f64>() / count.max(1) as f64).powi(2);
+        let mean_square = |of: &[f32]| {
+            let terms = numbers().map(|(i, x)| f64::from(of[i]).powi(2) / (x * x + floor).max(f64::MIN_POSITIVE));
+            terms.sum::<f64>() / count as f64
+        };
+        let noise = (count > 0).then(|| mean_square(&errors))?;
+        let unexplained = |biases: Vec<f32>| {
+            let ratio = film.bias_noise().unwrap_or(0.0);
+            (mean_square(&biases) - ratio * ratio * noise).max(0.0)
+        };
+        Some(Self { noise: noise.sqrt(), bias: biases.map_or(0.0, unexplained).sqrt() })
+    }
+
+    /// Both errors together.
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        self.noise.hypot(self.bias)
+    }
+}
+
+impl Film {
+    /// Means as by [`Film::finish`], with the channels `standardError.C` and `bias.C` of radiance
+    /// if the passes tell them.
+    #[must_use]
+    pub fn finish_with_errors(&self) -> super::Frame {
+        let mut frame = self.finish();
+        let names = super::layers::LAYERS[layer_index("radiance")].channels;
+        for (layer, numbers) in [("standardError", self.standard_error("radiance")), ("bias", self.bias())] {
+            for (c, name) in names.iter().enumerate() {
+                let Some(numbers) = &numbers else { continue };
+                let of_channel = numbers.iter().skip(c).step_by(names.len()).copied().collect();
+                frame.add_extra(&format!("{layer}.{name}"), of_channel);
+            }
+        }
+        frame
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two pixels; the second varies between passes.
+    fn film(passes: &[(f32, f64)]) -> Film {
+        let window = Crop { column: 4, row: 2, width: 2, height: 1 };
+        let one = |(value, bandwidth): &(f32, f64)| {
+            let mut film = Film::new((8, 8), window, 1).with_bandwidth(*bandwidth);
+            film.add((0, 0), &[[1.0, 1.0, 1.0, 0.0], [0.0; 4], [0.0; 4]], 1);
+            film.add((1, 0), &[[*value, *value, *value, 0.0], [0.0; 4], [0.0; 4]], 1);
+            film
+        };
+        let mut merged = one(&passes[0]);
+        passes[1..].iter().for_each(|pass| merged.merge(&one(pass)).expect("of one picture"));
+        merged
+    }
+
+    #[test]
+    fn noise_is_relative_and_bias_is_what_follows_the_radius() {
+        let noisy = ErrorEstimate::of(&film(&[(0.5, 1.0), (1.5, 1.0), (0.5, 1.0), (1.5, 1.0)]), None).expect("passes");
+        // Standard error (1/√3)/2 of one of two pixels, relative to 1 + 0.1².
+        let expected = (1.0 / 12.0 / 2.0 / 1.01_f64).sqrt();
+        assert!((noisy.noise - expected).abs() < 1e-6 && noisy.bias == 0.0, "{noisy:?}");
+        let biased = [(2.0, 1.0), (1.5, 0.5), (1.25, 0.25), (1.125, 0.125)];
+        let estimate = ErrorEstimate::of(&film(&biased), None).expect("passes");
+        assert!(estimate.bias > 0.1 && estimate.total() > estimate.noise, "{estimate:?}");
+        assert_eq!(ErrorEstimate::of(&film(&biased[..1]), None), None, "one pass");
+    }
+
+    #[test]
+    fn a_region_counts_its_own_pixels() {
+        let film = film(&[(0.5, 1.0), (1.5, 1.0)]);
+        let of = |column| ErrorEstimate::of(&film, Some(Crop { column, row: 0, width: 1, height: 8 }));
+        assert_eq!(of(4).expect("a pixel").noise, 0.0);
+        assert!(of(5).expect("a pixel").noise > 0.4);
+        assert_eq!(of(6), None);
+    }
+
+    #[test]
+    fn errors_are_channels_of_files() {
+        let names =
+            |film: &Film| film.finish_with_errors().extras().map(|(name, _)| name.to_owned()).collect::<Vec<_>>();
+        let of = |layer: &str| ["R", "G", "B"].map(|c| format!("{layer}.{c}"));
+        assert_eq!(names(&film(&[(1.0, 1.0), (2.0, 0.5)])), [of("standardError"), of("bias")].concat());
+        assert_eq!(names(&film(&[(1.0, 1.0), (2.0, 1.0)])), of("standardError"));
+        assert_eq!(names(&film(&[(1.0, 1.0)])), [""; 0]);
+    }
+}

@@ -1,0 +1,292 @@
+//! Parts: the sums of some passes of a picture, or of a part of its pixels, in an OpenEXR file.
+//!
+//! A part shows as a picture: `R G B A` are the means of its passes. Each block of passes has the
+//! channels `passesA-B.sum.C`, the sums over all samples of each channel C of [`LAYERS`], and if it
+//! has several passes, `passesA-B.deviations.C` and `passesA-B.withBandwidth.C`, their second
+//! moments. All are 32-bit floats as they are in memory. `caustica:blocks` holds the rest as JSON.
+
+use std::{io::BufReader, path::Path};
+
+use exr::meta::MetaData;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    exr::{Attributes, attributes_of, channels_of, count_photons, encode, failure, open, our_attributes, window_of},
+    file::{open_regular, write_file},
+    film::{Bandwidth, Film, Moments},
+    frame::DataWindow,
+    layers::{LAYERS, layer_index},
+    pass_sum::{Block, PassSum, is_block},
+};
+use crate::{
+    error::{Error, Result},
+    map_kind::ByKind,
+    settings::{Crop, PassRange},
+    stats::MapStats,
+};
+
+/// What a part says of itself, without its pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartHeader {
+    /// Attributes of the file.
+    pub attributes: Attributes,
+    /// Width and height of the whole picture, pixels.
+    pub whole: (u32, u32),
+    /// The part of the picture that it holds.
+    pub window: Crop,
+    /// The passes that it holds.
+    pub passes: PassRange,
+}
+
+/// A block in the attribute `blocks`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct BlockRow {
+    passes: PassRange,
+    samples: u64,
+    non_finite: u64,
+    /// Bit patterns of the mean of the squared radii, of the sum of their squared deviations, and
+    /// of the mean of their inverses.
+    bandwidth: [u64; 3],
+    global: MapStats,
+    caustic: MapStats,
+}
+
+/// Writes a part. `attributes` are those of a picture.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be written. An older file is then kept.
+///
+/// # Panics
+/// If there is no pass, or passes are not consecutive.
+pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result<()> {
+    let total = sum.total()?.expect("a part has a pass");
+    let mut attributes = attributes.clone();
+    count_photons(&mut attributes, total.photons.global, total.photons.caustic);
+    let rows: Vec<BlockRow> = sum.blocks.iter().map(row).collect();
+    attributes.insert("blocks".to_owned(), serde_json::to_string(&rows).expect("blocks hold numbers only"));
+    attributes.insert("passes".to_owned(), range(&rows).to_string());
+    let frame = total.film.finish();
+    let shown = ["radiance", "alpha"].map(|name| LAYERS[layer_index(name)]);
+    let mut channels: Vec<_> =
+        shown.iter().flat_map(|layer| channels_of(frame.layer(layer.name), layer.channels, "")).collect();
+    for Block { range, film, .. } in &sum.blocks {
+        let before = before(*range);
+        for (i, layer) in LAYERS.iter().enumerate() {
+            channels.extend(channels_of(&film.sums[i], layer.channels, &format!("{before}sum.")));
+            let Some(moments) = &film.moments else { continue };
+            channels.extend(channels_of(&moments.deviations[i], layer.channels, &format!("{before}deviations.")));
+        }
+        if let Some(moments) = &film.moments {
+            let names = LAYERS[layer_index("radiance")].channels;
+            channels.extend(channels_of(&moments.with_bandwidth, names, &format!("{before}withBandwidth.")));
+        }
+    }
+    let size = (frame.width, frame.height);
+    let bytes = encode(size, frame.window, channels, &attributes).map_err(|e| failure(path, e))?;
+    write_file(path, &bytes)
+}
+
+/// Beginning of the names of a block's channels.
+fn before(range: PassRange) -> String {
+    format!("passes{}-{}.", range.first, range.end)
+}
+
+fn row(block: &Block) -> BlockRow {
+    let Bandwidth { mean, deviations, inverse } = block.film.bandwidth;
+    BlockRow {
+        passes: block.range,
+        samples: block.film.samples,
+        non_finite: block.film.non_finite,
+        bandwidth: [mean, deviations, inverse].map(f64::to_bits),
+        global: block.photons.global,
+        caustic: block.photons.caustic,
+    }
+}
+
+/// The passes of consecutive blocks, of which there is one at least.
+fn range(rows: &[BlockRow]) -> PassRange {
+    PassRange { first: rows[0].passes.first, end: rows[rows.len() - 1].passes.end }
+}
+
+/// Reads what a part says of itself, without its pixels.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read or is not a part.
+pub fn read_part_header(path: &Path) -> Result<PartHeader> {
+    let file = open_regular(path).map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
+    let meta = MetaData::read_from_buffered(BufReader::new(file), false).map_err(|e| failure(path, e))?;
+    let [header] = meta.headers.as_slice() else { return Err(no_part(path)) };
+    let attributes = our_attributes(header.shared_attributes.other.iter().chain(&header.own_attributes.other));
+    let size = (header.layer_size.width() as u32, header.layer_size.height() as u32);
+    let whole = header.shared_attributes.display_window;
+    let position = header.own_attributes.layer_position - whole.position;
+    let at = |n: i32| u32::try_from(n).map_err(|_| no_part(path));
+    let window = Crop { column: at(position.x())?, row: at(position.y())?, width: size.0, height: size.1 };
+    let whole = (whole.size.width() as u32, whole.size.height() as u32);
+    let rows = rows(path, &attributes)?;
+    Ok(PartHeader { passes: range(&rows), attributes, whole, window })
+}
+
+/// Reads a part.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read or is not a part.
+pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
+    let image = open(path)?;
+    let attributes = attributes_of(&image);
+    let rows = rows(path, &attributes)?;
+    let layer = &image.layer_data;
+    let size = (layer.size.width() as u32, layer.size.height() as u32);
+    let DataWindow { whole, column, row } = window_of(&image).unwrap_or(DataWindow { whole: size, column: 0, row: 0 });
+    let window = Crop { column, row, width: size.0, height: size.1 };
+    let pixels = layer.size.area();
+    let read = |before: &str, names: &[&str]| -> Result<Vec<f32>> {
+        let channel = |name: &&str| {
+            let name = format!("{before}{name}");
+            let channel = layer.channel_data.list.iter().find(|c| c.name == *name.as_str());
+            let samples = channel.map(|c| c.sample_data.values_as_f32().collect::<Vec<_>>());
+            let missing = || failure(path, format!("the part has no channel {name}"));
+            samples.filter(|samples| samples.len() == pixels).ok_or_else(missing)
+        };
+        let channels: Vec<Vec<f32>> = names.iter().map(channel).collect::<Result<_>>()?;
+        Ok((0..pixels).flat_map(|i| channels.iter().map(move |channel| channel[i])).collect())
+    };
+    let mut blocks = Vec::new();
+    for row in &rows {
+        let before = before(row.passes);
+        let of_layers = |kind: &str| -> Result<[Vec<f32>; LAYERS.len()]> {
+            let mut all = [const { Vec::new() }; LAYERS.len()];
+            for (numbers, layer) in all.iter_mut().zip(&LAYERS) {
+                *numbers = read(&format!("{before}{kind}."), layer.channels)?;
+            }
+            Ok(all)
+        };
+        let moments = || -> Result<Moments> {
+            let names = LAYERS[layer_index("radiance")].channels;
+            let with_bandwidth = read(&format!("{before}withBandwidth."), names)?;
+            Ok(Moments { deviations: of_layers("deviations")?, with_bandwidth })
+        };
+        let [mean, deviations, inverse] = row.bandwidth.map(f64::from_bits);
+        let film = Film {
+            whole,
+            window,
+            passes: row.passes.count(),
+            samples: row.samples,
+            sums: of_layers("sum")?,
+            bandwidth: Bandwidth { mean, deviations, inverse },
+            moments: if row.passes.count() > 1 { Some(moments()?) } else { None },
+            non_finite: row.non_finite,
+        };
+        let photons = ByKind { global: row.global, caustic: row.caustic };
+        blocks.push(Block { range: row.passes, film, photons });
+    }
+    Ok((PartHeader { passes: range(&rows), attributes, whole, window }, PassSum { blocks }))
+}
+
+/// The attribute `blocks`, checked.
+fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
+    let text = attributes.get("blocks").ok_or_else(|| no_part(path))?;
+    let rows: Vec<BlockRow> = serde_json::from_str(text).map_err(|_| no_part(path))?;
+    let is_good = |row: &BlockRow| {
+        let is_finite = row.bandwidth.iter().all(|bits| f64::from_bits(*bits).is_finite());
+        let in_reach = row.passes.first < row.passes.end && PassRange::END.contains(row.passes.end);
+        in_reach && is_block(row.passes) && row.samples > 0 && is_finite
+    };
+    let consecutive = rows.windows(2).all(|pair| pair[0].passes.end == pair[1].passes.first);
+    if rows.is_empty() || !consecutive || !rows.iter().all(is_good) {
+        return Err(no_part(path));
+    }
+    Ok(rows)
+}
+
+fn no_part(path: &Path) -> Error {
+    failure(path, "is no part of a picture: `render --part` or `--checkpoint` did not write it, or it is damaged")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        image::{read_exr, write_exr_with},
+        stats::Stats,
+    };
+
+    const WINDOW: Crop = Crop { column: 1, row: 2, width: 3, height: 2 };
+
+    /// Passes of a crop of 3 x 2 pixels.
+    fn sum(passes: std::ops::Range<u32>) -> PassSum {
+        let mut sum = PassSum::default();
+        for index in passes {
+            let mut film = Film::new((5, 7), WINDOW, 4);
+            for pixel in 0..6 {
+                let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
+                film.add((pixel % 3, pixel / 3), &[[value, value * 1e-9, 1e9, 0.0], [value; 4], [2.0; 4]], 4);
+            }
+            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3));
+            sum.push(Block::of_pass(index, film, &Stats::default())).expect("of one picture");
+        }
+        sum
+    }
+
+    fn attributes() -> Attributes {
+        [("version", "1"), ("sceneHash", "ab")].map(|(a, b)| (a.to_owned(), b.to_owned())).into()
+    }
+
+    #[test]
+    fn a_part_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        for passes in [0..1, 3..8, 0..8, 999_990..1_000_000] {
+            let written = sum(passes.clone());
+            write_part(&path, &written, &attributes()).unwrap();
+            let (header, read) = read_part(&path).unwrap();
+            assert_eq!(read, written, "{passes:?}");
+            assert_eq!(read_part_header(&path).unwrap(), header);
+            assert_eq!((header.whole, header.window), ((5, 7), WINDOW));
+            assert_eq!(header.passes, PassRange { first: passes.start, end: passes.end });
+            assert_eq!(header.attributes["sceneHash"], "ab");
+            assert_ne!(read, sum(0..2), "control");
+        }
+    }
+
+    #[test]
+    fn a_part_shows_the_means_as_a_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let written = sum(3..8);
+        write_part(&path, &written, &attributes()).unwrap();
+        let shown = read_exr(&path).unwrap();
+        let expected = written.total().unwrap().unwrap().film.finish();
+        assert_eq!((shown.radiance(), shown.alpha()), (expected.radiance(), expected.alpha()));
+        assert_eq!(shown.window, expected.window);
+    }
+
+    #[test]
+    fn other_files_are_no_parts() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let said = |path: &Path| {
+            let message = read_part(path).unwrap_err().to_string();
+            assert_eq!(read_part_header(path).unwrap_err().to_string(), message);
+            message
+        };
+        write_exr_with(&path, &sum(0..1).blocks[0].film.finish(), &attributes()).unwrap();
+        assert!(said(&path).contains("is no part of a picture"), "{}", said(&path));
+        // A header alone, of 16 gigapixels.
+        write_part(&path, &sum(0..1), &attributes()).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+            let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4;
+            bytes[at..at + 16].copy_from_slice(&[[0; 4], [0; 4], [255, 255, 1, 0], [255, 255, 1, 0]].concat());
+        }
+        std::fs::write(&path, &bytes).unwrap();
+        let message = read_part(&path).unwrap_err().to_string();
+        assert!(message.contains("is damaged: ") && message.ends_with("131072 x 131072 pixels"), "{message}");
+        for blocks in ["[]", "{}", "7", r#"[{"passes":{"first":3,"end":9}}]"#] {
+            let mut attributes = attributes();
+            attributes.insert("blocks".to_owned(), blocks.to_owned());
+            write_exr_with(&path, &sum(0..1).blocks[0].film.finish(), &attributes).unwrap();
+            assert!(said(&path).contains("is no part of a picture"), "{blocks}");
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! The recipes of `deploy/`, run for real, with renders that are killed.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | engines | GNU parallel, Open Job Description and Slurm give the bytes of one run, whatever is killed or requeued meanwhile | fewer passes |
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    sync::LazyLock,
+    thread,
+    time::{Duration, Instant},
+};
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const PROGRAM: &str = env!("CARGO_BIN_EXE_caustica");
+const OPTIONS: &str = "--size 16x16 --spp 1 --photons 1k -k 20 --every 0s";
+const PASSES: u32 = 12;
+
+fn left_out() -> bool {
+    std::env::var_os("CAUSTICA_NO_FARM").is_some_and(|value| value == "1")
+}
+
+/// A folder with the pictures of one run, and of one of fewer passes.
+static ONE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, passes) in [("one.exr", PASSES), ("fewer.exr", PASSES - 1)] {
+        let line = format!("render {} {} --passes {passes} -q -o {name}", scene(), OPTIONS.replace("--every 0s", ""));
+        let status = Command::new(PROGRAM).current_dir(&folder).args(line.split_whitespace()).status();
+        assert!(status.expect("it starts").success());
+    }
+    folder
+});
+
+fn scene() -> String {
+    format!("{ROOT}/scenes/mirror-and-glass.gltf")
+}
+
+fn assert_same(folder: &Path, name: &str) {
+    let read = |path: &Path| fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let made = read(&folder.join(name));
+    assert!(made == read(&ONE.path().join("one.exr")), "{name}");
+    assert!(made != read(&ONE.path().join("fewer.exr")), "control: fewer passes");
+}
+
+/// Waits for something that depends on other processes.
+fn waits<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        match found() {
+            Some(found) => return found,
+            None => assert!(start.elapsed() < Duration::from_secs(100), "{what}"),
+        }
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// A checkpoint in the folder of the parts.
+fn kept(parts: &Path) -> Option<PathBuf> {
+    let mut entries = fs::read_dir(parts).ok()?.filter_map(|entry| Some(entry.ok()?.path()));
+    entries.find(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("kept-")))
+}
+
+/// A render whose arguments name the folder, which no other process has.
+fn render_of(parts: &Path) -> Option<String> {
+    let name = parts.to_str().expect("text");
+    fs::read_dir("/proc").ok()?.filter_map(|entry| Some(entry.ok()?.path())).find_map(|path| {
+        let line = fs::read_to_string(path.join("cmdline")).ok()?;
+        let is_render = line.starts_with(PROGRAM) && line.contains("\0render\0") && line.contains(name);
+        is_render.then(|| path.file_name().map(|pid| pid.to_string_lossy().into_owned())).flatten()
+    })
+}
+
+fn kill_a_render(parts: &Path) {
+    waits("a checkpoint", || kept(parts));
+    let pid = waits("a render", || render_of(parts));
+    Command::new("kill").args(["-KILL", &pid]).status().expect("kill runs");
+}
+
+#[test]
+fn gnu_parallel_renders_what_one_machine_does() {
+    if left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out.exr");
+    let mut run = Command::new(format!("{ROOT}/deploy/parallel/render"));
+    run.arg(scene()).arg(&out).args([PASSES.to_string().as_str(), "6"]).args(OPTIONS.split_whitespace());
+    let mut child = run.env("CAUSTICA", PROGRAM).env("JOBS", "2").stderr(Stdio::null()).spawn().expect("it starts");
+    kill_a_render(&folder.path().join("out.exr.parts"));
+    assert!(child.wait().expect("it ends").success(), "scripts/install-farm-tools installs GNU parallel");
+    assert_same(folder.path(), "out.exr");
+}
+
+#[test]
+fn open_job_description_renders_what_one_machine_does() {
+    if left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (parts, out) = (folder.path().join("parts"), folder.path().join("out.exr"));
+    fs::create_dir(&parts).expect("a folder");
+    let program = format!("{ROOT}/target/farm/bin/openjd");
+    let template = format!("{ROOT}/deploy/openjd/template.yaml");
+    let check = Command::new(&program).args(["check", &template]).output();
+    assert!(check.expect("scripts/install-farm-tools installs openjd").status.success());
+    let mut run = Command::new(&program);
+    run.args(["run", &template, "--step", "Merge", "--run-dependencies"]);
+    for (name, value) in [
+        ("Scene", scene()),
+        ("Parts", parts.display().to_string()),
+        ("Out", out.display().to_string()),
+        ("LastPass", (PASSES - 1).to_string()),
+        ("PassesPerTask", "5".to_string()),
+        ("Options", OPTIONS.to_string()),
+        ("Caustica", PROGRAM.to_string()),
+    ] {
+        run.args(["-p", &format!("{name}={value}")]);
+    }
+    let output = run.output().expect("it starts");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && said.contains("openjd_progress: 100.0"), "{said}");
+    assert_same(folder.path(), "out.exr");
+}
+
+#[test]
+fn slurm_renders_what_one_machine_does() {
+    if left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out.exr");
+    let parts = folder.path().join("out.exr.parts");
+    // Requeues the second task once it has a checkpoint, and waits for the picture.
+    let script = format!(
+        "set -eu; '{ROOT}/deploy/slurm/submit' '{}' '{}' {PASSES} 6 {OPTIONS}
+         until [ -e '{parts}/kept-0000006.exr' ]; do sleep 0.02; done
+         scontrol requeue 1_1 || true
+         until [ -e '{}' ]; do sleep 0.2; done",
+        scene(),
+        out.display(),
+        out.display(),
+        parts = parts.display()
+    );
+    let mut run = Command::new("timeout");
+    run.arg("100").arg(format!("{ROOT}/deploy/slurm/localhost")).arg(folder.path().join("slurm"));
+    let run = run.args(["bash", "-c", &script]).env("CAUSTICA", PROGRAM).env("SBATCH_OPTIONS", "--cpus-per-task=1");
+    let mut child = run.stdout(Stdio::null()).spawn().expect("it starts");
+    kill_a_render(&parts);
+    assert!(child.wait().expect("it ends").success(), "scripts/install-farm-tools installs Slurm");
+    assert_same(folder.path(), "out.exr");
+}

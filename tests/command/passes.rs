@@ -1,0 +1,166 @@
+//! Pictures of several passes: parts, merging, checkpoints and signals.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | splits | parts of passes and of pixels merge to the bytes of one run, and the first pass is the single picture | fewer passes |
+//! | refusals | gaps, overlaps, other settings and other scenes are refused by name, in one line | the same with what is right |
+//! | checkpoints | a run that goes on has the bytes of one that never stopped; other runs are refused | |
+//! | killed | after SIGKILL and SIGTERM, nothing is lost but the running pass | SIGTERM without a checkpoint |
+
+use std::{
+    fs,
+    io::{BufRead as _, BufReader},
+    path::Path,
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use caustica::image::{difference::rel_mse, read_exr, read_exr_attributes};
+use serde_json::Value;
+
+const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/mirror-and-glass.gltf");
+const OTHER_SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/area-light.gltf");
+
+fn command(folder: &Path, line: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_caustica"));
+    command.current_dir(folder).args(line.split_whitespace()).env_remove("CAUSTICA_DEVICE");
+    command
+}
+
+/// Arguments of a small render.
+fn small(words: &str) -> String {
+    format!("render {SCENE} --size 16x16 --spp 1 --photons 1k -k 20 -q {words}")
+}
+
+fn succeeds(folder: &Path, line: &str) -> String {
+    let output = command(folder, line).output().expect("it starts");
+    let text = |bytes| String::from_utf8(bytes).expect("messages are text");
+    assert!(output.status.success(), "{line}: {}", text(output.stderr));
+    text(output.stdout)
+}
+
+/// The one line of a failure.
+fn fails(folder: &Path, line: &str) -> String {
+    let output = command(folder, line).output().expect("it starts");
+    let said = String::from_utf8(output.stderr).expect("messages are text");
+    assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+    assert!(said.starts_with("error: ") && said.lines().count() == 1, "{line}: {said}");
+    said
+}
+
+fn bytes(folder: &Path, name: &str) -> Vec<u8> {
+    fs::read(folder.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+#[test]
+fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    succeeds(folder, &small("--passes 5 -o one.exr -o one.png"));
+    succeeds(folder, &small("--passes 2 --part a.exr -o two.exr"));
+    succeeds(folder, &small("--passes 2..5 --part b.exr"));
+    succeeds(folder, "merge b.exr a.exr -o merged.exr -o merged.png -q");
+    assert!(bytes(folder, "merged.exr") == bytes(folder, "one.exr"), "passes");
+    assert!(bytes(folder, "merged.png") == bytes(folder, "one.png"), "PNG");
+    assert!(bytes(folder, "two.exr") != bytes(folder, "one.exr"), "control: two passes");
+    succeeds(folder, &small("--passes 5 --crop 0,0,5,16 --part left.exr"));
+    succeeds(folder, &small("--passes 5 --crop 5,0,11,16 --part right.exr"));
+    succeeds(folder, "merge left.exr right.exr -o crops.exr -q");
+    assert!(bytes(folder, "crops.exr") == bytes(folder, "one.exr"), "pixels");
+    let attributes = read_exr_attributes(&folder.join("one.exr")).expect("it reads");
+    assert_eq!((attributes["passes"].as_str(), attributes["alpha"].starts_with("0.66")), ("0..5", true));
+    // Two samples a pixel: a single one of a single picture lies at the pixel's centre.
+    succeeds(folder, &small("-o single.exr").replace("--spp 1", "--spp 2"));
+    succeeds(folder, &small("--passes 1 -o first.exr").replace("--spp 1", "--spp 2"));
+    let read = |name: &str| read_exr(&folder.join(name)).expect("it reads");
+    assert_eq!(read("first.exr"), read("single.exr"), "the first pass is the single picture");
+    assert!(rel_mse(read("two.exr").radiance(), read("single.exr").radiance(), None) > 0.0, "control");
+    let status: Value = serde_json::from_str(&succeeds(folder, "status b.exr --passes 7 --json")).expect("JSON");
+    assert_eq!(status["missing"], serde_json::json!(["--passes 0..2", "--passes 5..7"]));
+    assert_eq!((&status["complete"], &status["windows"][0]["passes"][0]), (&Value::from(false), &Value::from("2..5")));
+    // What must not be merged.
+    let gap = fails(folder, "merge b.exr -o x.exr");
+    assert!(gap.contains("parts are missing: --passes 0..2;") && gap.contains("--allow-gaps"), "{gap}");
+    succeeds(folder, "merge b.exr -o x.exr -q --allow-gaps");
+    succeeds(folder, "merge b.exr -o x.exr -q --passes 2..5");
+    let twice = fails(folder, "merge a.exr a.exr b.exr -o y.exr");
+    assert!(twice.contains("the passes 0..2 are in a.exr and a.exr"), "{twice}");
+    succeeds(folder, &small("--passes 5..6 --part spp.exr --seed 3 --alpha 0.5").replace("--spp 1", "--spp 2"));
+    let other = fails(folder, "merge a.exr b.exr spp.exr -o y.exr");
+    for part in ["spp.exr: is a part of another picture than a.exr", "--alpha is 0.5, not 0.66", "--seed is 3, not 0"] {
+        assert!(other.contains(part), "{other}");
+    }
+    succeeds(folder, &small("--passes 5..6 --part scene.exr").replace(SCENE, OTHER_SCENE));
+    assert!(fails(folder, "merge a.exr b.exr scene.exr -o y.exr").contains("sceneHash is "));
+    assert!(fails(folder, "merge one.exr -o y.exr").contains("one.exr: is no part of a picture"));
+    assert!(fails(folder, "merge a.exr b.exr -o a.exr").contains("is a part as well"));
+    assert!(!folder.join("y.exr").exists());
+}
+
+#[test]
+fn a_run_that_goes_on_has_the_bytes_of_one_that_never_stopped() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    succeeds(folder, &small("--passes 3 -o one.exr"));
+    succeeds(folder, &small("--passes 1 --checkpoint kept --resume -o more.exr"));
+    assert!(fails(folder, &small("--passes 3 --checkpoint kept -o more.exr")).contains("--resume goes on with it"));
+    let other = fails(folder, &small("--passes 3 --checkpoint kept --resume -o more.exr --light-samples 2"));
+    assert!(other.contains("checkpoint of another run: --light-samples is 4, not 2"), "{other}");
+    assert!(
+        fails(folder, &small("--passes 1..3 --checkpoint kept --resume -o more.exr")).contains("1..3 are asked for")
+    );
+    succeeds(folder, &small("--passes 3 --checkpoint kept --resume -o more.exr"));
+    assert!(bytes(folder, "more.exr") == bytes(folder, "one.exr"));
+    succeeds(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr"));
+    assert!(bytes(folder, "again.exr") == bytes(folder, "one.exr"), "nothing was left to do");
+    fs::write(folder.join("kept"), &bytes(folder, "kept")[..2000]).expect("it can be written");
+    assert!(fails(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr")).contains("kept: "));
+}
+
+/// Starts a run without an end and waits for the file of that name.
+fn started(folder: &Path, words: &str, file: &str) -> Child {
+    let mut child = command(folder, &small(words)).stderr(Stdio::piped()).spawn().expect("it starts");
+    let start = Instant::now();
+    while !folder.join(file).exists() {
+        assert!(start.elapsed() < Duration::from_secs(100) && child.try_wait().expect("it runs").is_none(), "{file}");
+        thread::sleep(Duration::from_millis(10));
+    }
+    child
+}
+
+#[cfg(unix)]
+#[test]
+fn killed_runs_lose_nothing_but_the_running_pass() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let endless = "--passes 100000 --checkpoint kept --every 0s --resume -o picture.exr";
+    let mut child = started(folder, endless, "picture.exr");
+    child.kill().expect("it runs");
+    child.wait().expect("it ended");
+    let end = || {
+        let status: Value = serde_json::from_str(&succeeds(folder, "status kept --json")).expect("JSON");
+        let passes = status["windows"][0]["passes"][0].as_str().expect("passes").to_owned();
+        passes.strip_prefix("0..").expect("from the first").parse::<u32>().expect("a number")
+    };
+    let killed_at = end();
+    fs::remove_file(folder.join("picture.exr")).expect("a whole file");
+    let mut child = started(folder, endless, "picture.exr");
+    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill runs");
+    assert_eq!(child.wait().expect("it ended").code(), Some(0), "with a checkpoint, SIGTERM is no failure");
+    let stopped_at = end();
+    assert!(killed_at >= 1 && stopped_at >= killed_at, "{killed_at}, {stopped_at}");
+    let all = stopped_at + 1;
+    succeeds(folder, &small(&format!("--passes {all} --checkpoint kept --resume -o more.exr")));
+    succeeds(folder, &small(&format!("--passes {all} -o one.exr")));
+    assert!(bytes(folder, "more.exr") == bytes(folder, "one.exr"));
+    assert!(bytes(folder, "picture.exr") != bytes(folder, "one.exr"), "control: fewer passes");
+    // Without a checkpoint.
+    let line = small("--passes 100000 -o none.exr").replace(" -q", "");
+    let mut child = command(folder, &line).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut said = BufReader::new(child.stderr.take().expect("a pipe")).lines();
+    assert!(said.any(|line| line.expect("text").starts_with("passes: 1 of")), "it renders");
+    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill runs");
+    assert_eq!(child.wait().expect("it ended").code(), Some(143));
+    assert!(!folder.join("none.exr").exists());
+}
