@@ -708,7 +708,8 @@ pub struct IrradianceCell {
     pub level: u32,
     /// The point that speaks for the cell, metres, and its geometric normal.
     pub position: [f32; 3],
-    /// Whether the cells of the next level are asked first: [`WHOLE_CELL`], [`SPLIT_CELL`] or [`WIDE_CELL`].
+    /// Whether the cells of the next level are asked first: [`WHOLE_CELL`], [`SPLIT_CELL`] or
+    /// [`WIDE_CELL`].
     pub split: u32,
     pub normal: [f32; 3],
     pub pad0: u32,

@@ -295,8 +295,8 @@ value_enum!(LightSamplingArg => LightSampling {
 });
 
 value_enum!(EmissionArg => Emission {
-    /// Towards the scene for the global map, and apart from that towards mirrors and glass for the
-    /// caustic map
+    /// Towards the scene and what its cameras see for the global map, and apart from that towards
+    /// mirrors and glass for the caustic map
     Aimed,
     /// Wherever the lights shine, for both maps at once
     Unaimed,

@@ -22,8 +22,8 @@ const MIN_POINTS: usize = 64;
 const QUANTILE: f64 = 0.5;
 /// Factor on its radius, for what lies at the border.
 const MARGIN: f32 = 1.2;
-/// Radius of each sphere over that of the next smaller one. The density of paths then falls with the
-/// square of the distance, as what a surface far away adds to the light does.
+/// Radius of each sphere over that of the next smaller one. The density of paths then falls with
+/// the square of the distance, as what a surface far away adds to the light does.
 const RATIO: f32 = 3.0;
 /// Maximum number of spheres: the last is then smaller than the scene by more than the ratio.
 const MAX_SPHERES: usize = 12;

@@ -74,8 +74,8 @@ impl Mode {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Emission {
-    /// Paths for the global map are aimed at the scene. Other paths, for the caustic map, are aimed
-    /// at mirrors and glass.
+    /// Paths for the global map are aimed at the scene and at what its cameras see. Other paths,
+    /// for the caustic map, are aimed at mirrors and glass.
     #[default]
     Aimed,
     /// Paths go wherever the lights shine. They serve both maps at once.

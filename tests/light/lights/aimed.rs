@@ -1,9 +1,10 @@
-//! Emission aimed at mirrors and glass.
+//! Emission aimed at mirrors and glass, and at what the camera sees.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | flux | aimed and unaimed caustic maps hold the same flux, everywhere in the scene, for every kind of light | one ball fewer |
 //! | picture | aimed and unaimed give the same picture | general paths keep L S+ D as well |
+//! | ground | a wall on a wide ground has the indirect light of one on a small ground | unaimed emission; a darker ground |
 //! | paths | aimed, a caustic photon takes far fewer paths | the unaimed count |
 
 use caustica::{
@@ -162,4 +163,39 @@ fn aimed_paths_make_the_picture_of_unaimed_ones() {
     let paths = |stats: &Stats| stats.photons.caustic.emitted as f64 / stats.photons.caustic.stored as f64;
     let (few, many) = (paths(&aimed_stats), paths(&unaimed_stats));
     assert!(few < 0.4 * many, "{few} paths a caustic photon aimed, {many} unaimed");
+}
+
+/// A wall of 1 m on a ground of half side `reach`, under the sun or a sky that shines from above.
+fn wall_on_ground(reach: f32, albedo: f32, sky: bool) -> Scene {
+    let mut scene = scene(&[diffuse(albedo), diffuse(0.7)]);
+    add_quad(&mut scene, vec3(-reach, 0.0, reach), vec3(2.0 * reach, 0.0, 0.0), vec3(0.0, 0.0, -2.0 * reach), 0);
+    add_box(&mut scene, vec3(-0.5, 0.0, -0.4), vec3(0.5, 1.0, 0.0), 1);
+    let direction = vec3(0.2, -2.0, -0.3).normalize();
+    if sky {
+        scene.environment = Some(Environment::uniform(Vec3::ONE));
+    } else {
+        scene.lights.push(Light { kind: LightKind::Directional, direction, ..point_light(Vec3::ZERO, 3.0) });
+    }
+    scene.cameras.push(camera(vec3(0.0, 0.5, 1.6), vec3(0.0, 0.5, 0.0), 25.0));
+    scene
+}
+
+#[test]
+fn a_wall_on_a_wide_ground_has_the_indirect_light_of_one_on_a_small_ground() {
+    let of = |reach: f32, albedo: f32, sky: bool, emission: Emission| {
+        let settings = settings(Mode::IndirectPhotons, 20_000, 12).with(|s| {
+            s.photons.emission = emission;
+            s.photons.max_paths = Some(1_000_000);
+        });
+        mean(&render_scene(&wall_on_ground(reach, albedo, sky), &settings))
+    };
+    for sky in [false, true] {
+        let right = of(20.0, 0.6, sky, Emission::Aimed);
+        let wide = of(500.0, 0.6, sky, Emission::Aimed);
+        assert!(within(wide, right, 0.06), "sky {sky}: {wide} instead of {right}");
+        let unaimed = of(500.0, 0.6, sky, Emission::Unaimed);
+        assert!(!within(unaimed, right, 0.06), "control: sky {sky}: unaimed paths find {unaimed} of {right}");
+        let darker = of(500.0, 0.5, sky, Emission::Aimed);
+        assert!(!within(darker, right, 0.06), "control: sky {sky}: a darker ground passes");
+    }
 }
