@@ -98,11 +98,8 @@ mod tests {
     #[test]
     fn the_nearest_surface_is_hit() {
         let materials = [0.2, 0.4].map(|a| Material::new("", Surface::Diffuse { albedo: Vec3::splat(a) })).to_vec();
-        let triangle = Triangle {
-            positions: [vec3(-9.0, 0.0, 9.0), vec3(9.0, 0.0, 9.0), vec3(0.0, 0.0, -9.0)],
-            material: 0,
-            ..Triangle::default()
-        };
+        let corners = [vec3(-9.0, 0.0, 9.0), vec3(9.0, 0.0, 9.0), vec3(0.0, 0.0, -9.0)];
+        let triangle = Triangle::new(corners, [Vec3::Y; 3], 0);
         let spheres = vec![Sphere { center: vec3(0.0, 3.0, 0.0), radius: 1.0, material: 1 }];
         let scene = Scene { materials, triangles: vec![triangle], spheres, ..Scene::default() };
         let bvh = Bvh::build(&scene);

@@ -129,7 +129,7 @@ mod tests {
     /// A ball of radius 1 on a floor of half side `reach`, seen from 6 m.
     fn seen(reach: f32) -> Vec<Target> {
         let corner = |x: f32, z: f32| vec3(x * reach, 0.0, z * reach);
-        let triangle = |positions| Triangle { positions, material: 0, ..Triangle::default() };
+        let triangle = |corners| Triangle::new(corners, [Vec3::Y; 3], 0);
         let floor = [
             triangle([corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)]),
             triangle([corner(-1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)]),
