@@ -10,6 +10,8 @@ use crate::{
     scene::{Camera, Material, Projection, Scene, Surface},
 };
 
+/// Maximum number of cameras, taken at equal steps, that have rays.
+const MAX_CAMERAS: usize = 16;
 /// Camera rays along the longer side of the picture, and cosine-distributed rays from each point
 /// that they see.
 const RAYS: u32 = 64;
@@ -31,11 +33,12 @@ const MAX_SPHERES: usize = 12;
 /// Effectiveness of Quasirandom Sequences").
 const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
 
-/// Spheres around what the cameras see and what lies around that, from the smallest to the largest;
+/// Spheres around what the scene's cameras see and what lies around that, from the smallest to the largest;
 /// none if that is most of the scene.
 #[must_use]
-pub fn seen_targets(scene: &Scene, bvh: &Bvh, cameras: &[&Camera]) -> Vec<Target> {
-    let points = cameras.iter().flat_map(|camera| points_seen(scene, bvh, camera)).collect();
+pub fn seen_targets(scene: &Scene, bvh: &Bvh) -> Vec<Target> {
+    let step = scene.cameras.len().div_ceil(MAX_CAMERAS).max(1);
+    let points = scene.cameras.iter().step_by(step).flat_map(|camera| points_seen(scene, bvh, camera)).collect();
     spheres_around(points, &scene_target(scene))
 }
 
@@ -134,7 +137,7 @@ mod tests {
             triangle([corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)]),
             triangle([corner(-1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)]),
         ];
-        let scene = Scene {
+        let mut scene = Scene {
             materials: vec![Material::new("", Surface::Diffuse { albedo: Vec3::splat(0.5) })],
             triangles: floor.to_vec(),
             spheres: vec![Sphere { center: Vec3::Y, radius: 1.0, material: 0 }],
@@ -142,15 +145,15 @@ mod tests {
         };
         let forward = vec3(0.0, -0.4, -1.0).normalize();
         let right = Vec3::X;
-        let camera = Camera {
+        scene.cameras = vec![Camera {
             position: vec3(0.0, 3.4, 6.0),
             forward,
             right,
             up: right.cross(forward),
             projection: Projection::Perspective { yfov: 0.7 },
             ..Camera::framing(scene.bounds())
-        };
-        seen_targets(&scene, &Bvh::build(&scene), &[&camera])
+        }];
+        seen_targets(&scene, &Bvh::build(&scene))
     }
 
     #[test]

@@ -60,7 +60,7 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, (scene, bvh): (&Scene, &Bvh), probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = specular_targets(scene);
-        let seen = seen_targets(scene, bvh, &scene.cameras.iter().collect::<Vec<_>>());
+        let seen = seen_targets(scene, bvh);
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
