@@ -183,19 +183,22 @@ fn wall_on_ground(reach: f32, albedo: f32, sky: bool) -> Scene {
 #[test]
 fn a_wall_on_a_wide_ground_has_the_indirect_light_of_one_on_a_small_ground() {
     let of = |reach: f32, albedo: f32, sky: bool, emission: Emission| {
-        let settings = settings(Mode::IndirectPhotons, 100_000, 12).with(|s| {
+        // Rays of final gathering see how bright the ground is: few photons of the far ground hit the
+        // wall itself, each with much flux.
+        let settings = settings(Mode::IndirectPhotons, 20_000, 12).with(|s| {
             s.photons.emission = emission;
-            s.photons.max_paths = Some(4_000_000);
+            s.photons.final_gather = 16;
+            s.photons.max_paths = Some(500_000);
         });
         mean(&render_scene(&wall_on_ground(reach, albedo, sky), &settings))
     };
     for sky in [false, true] {
         let right = of(20.0, 0.6, sky, Emission::Aimed);
-        let wide = of(200.0, 0.6, sky, Emission::Aimed);
+        let wide = of(500.0, 0.6, sky, Emission::Aimed);
         assert!(within(wide, right, 0.07), "sky {sky}: {wide} instead of {right}");
-        let unaimed = of(200.0, 0.6, sky, Emission::Unaimed);
+        let unaimed = of(500.0, 0.6, sky, Emission::Unaimed);
         assert!(!within(unaimed, right, 0.07), "control: sky {sky}: unaimed paths find {unaimed} of {right}");
-        let darker = of(200.0, 0.45, sky, Emission::Aimed);
+        let darker = of(500.0, 0.45, sky, Emission::Aimed);
         assert!(!within(darker, right, 0.07), "control: sky {sky}: a darker ground passes");
     }
 }
