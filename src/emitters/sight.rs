@@ -33,8 +33,8 @@ const MAX_SPHERES: usize = 12;
 /// Effectiveness of Quasirandom Sequences").
 const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
 
-/// Spheres around what the scene's cameras see and what lies around that, from the smallest to the largest;
-/// none if that is most of the scene.
+/// Spheres around what the scene's cameras see and what lies around that, from the smallest to the
+/// largest; none if that is most of the scene.
 #[must_use]
 pub fn seen_targets(scene: &Scene, bvh: &Bvh) -> Vec<Target> {
     let step = scene.cameras.len().div_ceil(MAX_CAMERAS).max(1);
