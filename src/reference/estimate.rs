@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::Found;
+use super::{Found, above::mean_part};
 use crate::{
     density::Density,
     layout::{MAX_NORMAL_WEIGHT, PhotonFlux, PhotonPlace, VisiblePoint, from_octahedral},
@@ -47,5 +47,6 @@ pub fn estimate(
         }
     }
     let area = density.mean() * std::f64::consts::PI * r2 * emitted as f64;
-    std::array::from_fn(|c| f64::from(point.weight[c]) * sum[c] / area)
+    let part = f64::from(mean_part(point));
+    std::array::from_fn(|c| f64::from(point.weight[c]) * part * sum[c] / area)
 }

@@ -1,6 +1,7 @@
 //! Reference implementation of the radiance estimate on the CPU, written for readability. Tests and
 //! `caustica compare` hold the kernels against it.
 
+mod above;
 mod brute_force;
 mod estimate;
 mod kd_map;

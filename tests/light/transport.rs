@@ -10,12 +10,13 @@
 //! | final gathering | light off rough lobes counts once in it | a black ball |
 //! | caustic | a rough ball's caustic is in the modes with photons | lamp turned away |
 //! | bound | caustic photons above the roughness bound are those of the global map | a darker ball |
+//! | trees | grid and kd-tree give the same picture of every lobe | another material |
 //! | unlit | an unlit surface has its colour, whatever the sky | a lit one |
 //! | transmission | a leaf lights what is behind it, and photons and rays agree | a leaf that transmits less |
 
 use caustica::{
     scene::{Environment, LightKind, Material, Scene, Surface},
-    settings::Mode,
+    settings::{Mode, Search},
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -196,6 +197,23 @@ fn final_gathering_counts_light_off_rough_lobes_once() {
     }
     let black = of(&Material::new("black", diffuse(0.0)), 12);
     assert!(!within(black, of(&metal(0.2), 0), 0.015), "control: a black ball passes");
+}
+
+#[test]
+fn grid_and_tree_agree_on_every_lobe() {
+    let of = |material: &Material, search| {
+        let settings = settings(Mode::Photons, 5000, 16).with(|s| {
+            s.estimate.search = search;
+            s.estimate.raw = true;
+        });
+        mean(&render_scene(&room(material.clone()), &settings))
+    };
+    for (name, material) in lobes() {
+        let (grid, tree) = (of(&material, Search::Grid), of(&material, Search::KdTree));
+        assert!(within(grid, tree, 1e-4), "{name}: {grid} by the grid, {tree} by the tree");
+    }
+    let (coat, bare) = (of(&coated(0.3), Search::Grid), of(&Material::new("", diffuse(0.5)), Search::KdTree));
+    assert!(!within(coat, bare, 1e-4), "control: the coat takes nothing");
 }
 
 #[test]
