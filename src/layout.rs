@@ -515,6 +515,9 @@ pub struct PhotonBatch {
     /// Surfaces that a path meets at most.
     pub max_surfaces: u32,
     pub pad1: u32,
+    /// Sphere that diffuse surfaces outside of it send more photons to, centre and radius; radius
+    /// 0: none.
+    pub aim: [f32; 4],
 }
 
 impl PhotonBatch {

@@ -1,5 +1,5 @@
-//! What a coat or a sheen above a diffuse base leaves of the light, as the kernels have it: twins of
-//! functions in `shaders/lib/transport/coat.wesl` and `sheen.wesl`.
+//! What a coat or a sheen above a diffuse base leaves of the light, as the kernels have it: twins
+//! of functions in `shaders/lib/transport/coat.wesl` and `sheen.wesl`.
 
 use glam::Vec3;
 

@@ -40,6 +40,8 @@ pub struct LightBuffers {
     /// Number of spheres around what the cameras see, and around mirrors and glass. In `targets`,
     /// the sphere around the scene lies between them.
     pub seen_targets: u32,
+    /// The smallest sphere around what the cameras see, centre and radius, metres; radius 0: none.
+    pub seen: [f32; 4],
     pub specular_targets: u32,
     pub has_environment: bool,
     pub warnings: Vec<String>,
@@ -86,6 +88,7 @@ impl LightBuffers {
             aimed: upload("aimed light choices", &table.for_aimed_photons(&targets, &around, settings))?,
             direct: upload("direct light choices", &table.for_direct_light())?,
             seen_targets: seen.len() as u32,
+            seen: seen.first().map_or([0.0; 4], |target| target.center.extend(target.radius).to_array()),
             specular_targets: targets.len() as u32,
             has_environment: map.is_some(),
             warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),

@@ -56,7 +56,7 @@ fn twins() -> Vec<Twin> {
         LobeLight { light_count, pad0, pad1, pad2 }
         LobePoint { position, offset, beta, eta, ng, ns, view, tangent, f0, f90, compensation, sheen, alpha, clearcoat, clearcoat_normal, pad }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays, reads }
-        PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, pad1 }
+        PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, pad1, aim }
         Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, pad0, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, pad }
         FinalStep { ray, rays, points, pad }

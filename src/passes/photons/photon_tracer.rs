@@ -76,6 +76,8 @@ struct EmissionPlan<'a> {
     /// that apply to these paths.
     rules: u32,
     fills: &'static [MapKind],
+    /// Sphere that diffuse surfaces send more photons to.
+    aim: [f32; 4],
     paths: PathRange,
 }
 
@@ -228,6 +230,7 @@ fn plans<'a>(
             | rule(settings.stores_direct(), layout::STORE_DIRECT)
             | rule(settings.mode.follows_diffuse(), layout::FOLLOW_DIFFUSE),
         fills: if aimed { &[MapKind::Global] } else { &MapKind::ALL },
+        aim: if aimed { lights.seen } else { [0.0; 4] },
         paths: paths.global,
     };
     let caustic = EmissionPlan {
@@ -237,6 +240,7 @@ fn plans<'a>(
         target_count: lights.specular_targets,
         rules: layout::AIM | layout::CAUSTICS_APART,
         fills: &[MapKind::Caustic],
+        aim: [0.0; 4],
         paths: paths.caustic,
     };
     let wanted = [Some(general), (aimed && caustics).then_some(caustic)];
@@ -266,6 +270,7 @@ impl EmissionPlan<'_> {
             stream: self.stream,
             first_target: self.first_target,
             target_count: self.target_count,
+            aim: self.aim,
             ..Default::default()
         }
     }
