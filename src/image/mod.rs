@@ -6,6 +6,7 @@ mod convergence;
 pub mod difference;
 mod exposure;
 mod exr;
+mod exr_read;
 mod file;
 pub mod film;
 pub mod flip;
@@ -24,9 +25,8 @@ mod tonemap;
 pub use canvas::{Canvas, Rgb8};
 pub use convergence::ErrorEstimate;
 pub use exposure::auto_exposure;
-pub use exr::{
-    Attributes, EnvironmentProvenance, Provenance, read_exr, read_exr_attributes, write_exr, write_exr_with,
-};
+pub use exr::{Attributes, EnvironmentProvenance, Provenance, write_exr, write_exr_with};
+pub use exr_read::{read_exr, read_exr_attributes};
 pub use file::{check_output, close_files, write_file};
 pub use film::Film;
 pub use frame::{DataWindow, Frame};

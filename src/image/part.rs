@@ -11,7 +11,8 @@ use exr::meta::MetaData;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    exr::{Attributes, attributes_of, channels_of, count_photons, encode, failure, open, our_attributes, window_of},
+    exr::{Attributes, channels_of, count_photons, encode, failure},
+    exr_read::{attributes_of, open, our_attributes, window_of},
     file::{open_regular, write_file},
     film::{Bandwidth, Film, Moments},
     frame::DataWindow,

@@ -101,7 +101,7 @@ fn open_job_description_renders_what_one_machine_does() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (parts, out) = (folder.path().join("parts"), folder.path().join("out.exr"));
     fs::create_dir(&parts).expect("a folder");
-    let program = format!("{ROOT}/target/farm/bin/openjd");
+    let program = format!("{ROOT}/target/openjd/bin/openjd");
     let template = format!("{ROOT}/deploy/openjd/template.yaml");
     let check = Command::new(&program).args(["check", &template]).output();
     assert!(check.expect("scripts/install-farm-tools installs openjd").status.success());

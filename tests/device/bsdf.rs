@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | diffuse | directions follow the density (chi-square at 1e-4), which integrates to 1 | another normal |
 //! | flux | directions follow the cosine with the geometric normal, whatever the other is | that with the other |
+//! | aimed flux | weighted, directions aimed at a sphere carry what the cosine does, there and elsewhere | without the weights |
 //! | reciprocity | of light and flux: weight times cosine is the value, the other way round | another normal |
 //! | albedo | is the integral of the BRDF times the cosine | another material |
 //! | specular | lobes are drawn by Fresnel, in the directions of Snell | denser glass |
@@ -70,6 +71,44 @@ fn flux_leaves_by_the_geometric_cosine() {
     let (found, light) = (test("probe_diffuse_flux"), test("probe_diffuse"));
     assert!(found.fits(), "{found:?}");
     assert!(!light.fits(), "control: directions of light, about the other normal: {light:?}");
+}
+
+#[test]
+fn aimed_flux_carries_what_the_cosine_does() {
+    let (center, radius) = (vec3(1.0, 1.5, 0.0), 0.5);
+    let drawn = |radius: f32| Probe::new("probe_aimed_flux").run(&rows(SAMPLES, center.extend(radius).to_array()));
+    // Whether a direction meets the sphere.
+    let meets = |d: Vec3| d.dot(center) > 0.0 && center.cross(d).length() <= radius;
+    // Form factor of a sphere above the horizon.
+    let to_sphere = f64::from(radius.powi(2) * center.y) / f64::from(center.length()).powi(3);
+    let quantities: [(&str, &dyn Fn(Vec3) -> f64, f64); 4] = [
+        ("all", &|_| 1.0, 1.0),
+        ("height", &|d| d.y.into(), 2.0 / 3.0),
+        ("aside", &|d| d.x.into(), 0.0),
+        ("to the sphere", &|d| f64::from(u8::from(meets(d))), to_sphere),
+    ];
+    // Deviation of a mean from what the cosine gives, in standard errors.
+    let deviation = |drawn: &[[f32; 4]], of: &dyn Fn(Vec3) -> f64, right: f64, weighted: bool| {
+        let value = |d: &[f32; 4]| of(Vec3::from_slice(d)) * if weighted { f64::from(d[3]) } else { 1.0 };
+        let count = drawn.len() as f64;
+        let mean = drawn.iter().map(value).sum::<f64>() / count;
+        let variance = drawn.iter().map(|d| (value(d) - mean).powi(2)).sum::<f64>() / count;
+        (mean - right) / (variance / count).sqrt().max(1e-9)
+    };
+    let aimed = drawn(radius);
+    for (name, of, right) in quantities {
+        let off = deviation(&aimed, of, right, true);
+        assert!(off.abs() < 4.5, "{name}: {off} standard errors");
+    }
+    let (_, to, right) = quantities[3];
+    assert!(deviation(&aimed, to, right, false) > 4.5, "control: without the weights");
+    let met = aimed.iter().filter(|d| meets(Vec3::from_slice(*d))).count();
+    assert!(met > SAMPLES / 4, "{met} of {SAMPLES} meet the sphere");
+    assert!(aimed.iter().all(|d| (0.0..1.334).contains(&d[3])), "no weight is above 4/3");
+    // From within the sphere, and without one, flux leaves by the cosine.
+    for radius in [3.0, 0.0] {
+        assert!(drawn(radius).iter().all(|d| d[3] == 1.0), "radius {radius}");
+    }
 }
 
 #[test]
