@@ -66,7 +66,8 @@ pub(super) fn window_of(image: &ReadImage) -> Option<DataWindow> {
     (layer.size != whole.size).then_some(DataWindow { whole: size, column, row })
 }
 
-/// Reads the text attributes that [`write_exr`](super::write_exr) wrote, by name without the prefix `caustica:`.
+/// Reads the text attributes that [`write_exr`](super::write_exr) wrote, by name without the prefix
+/// `caustica:`.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read or is not OpenEXR.
