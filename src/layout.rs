@@ -677,16 +677,23 @@ pub struct EmitterSample {
     pub light_count: u32,
 }
 
-/// Arguments of `start_final_gather`: one ray of each visible point.
+/// Arguments of `start_final_gather` and `sum_final_gather`: some rays of the chosen points.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct FinalStep {
-    /// Index of the ray, and number of rays per visible point.
-    pub ray: u32,
+    /// Index of the first ray of each point, how many follow each other in this step, and how many
+    /// each point has in all.
+    pub first_ray: u32,
+    pub rays_now: u32,
     pub rays: u32,
-    /// Visible points.
-    pub points: u32,
-    pub pad: u32,
+    /// Chosen points.
+    pub chosen: u32,
+    /// 1: the rays of all points of the picture are one set of numbers, those of neighbours follow
+    /// each other. 0: the rays of a pixel are a set.
+    pub joint: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// Arguments of `reuse_irradiance`.

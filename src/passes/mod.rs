@@ -6,7 +6,7 @@ pub mod maps;
 pub mod photons;
 pub mod wavefront;
 
-pub use camera::{CameraKernels, CameraTracer, FinalGather, StepCount, Tile};
+pub use camera::{CameraKernels, CameraTracer, FinalGather, FinalRays, StepCount, Tile};
 pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, SharedPoints,
 };

@@ -104,53 +104,35 @@ impl<'a> MapGatherer<'a> {
     /// Traces the rays of final gathering, and adds to each visible point the light of all maps
     /// where its rays end.
     fn gather_finally(&mut self, pass: &CameraPass, tile: &Tile, progress: &dyn Progress) -> Result<StepCount> {
-        let shared = pass.tracer.shared_points(tile);
-        let mut done = StepCount::default();
         // Ends that the cache does not light, with the index of their visible point. They are few
-        // for each ray, and a search of few points leaves most of the device idle.
-        let (mut places, mut ends) = (Vec::new(), Vec::new());
-        for ray in 0..pass.final_rays() {
-            progress.check()?;
-            let (points, step) = pass.trace_final(tile, ray)?;
-            done += step;
-            let (radiance, gathered, count) = (shared.radiance, shared.gathered, pass.tracer.point_count(tile));
-            if let Some(cache) = &self.cache {
+        // in each step, and a search of few points leaves most of the device idle.
+        let mut left = (Vec::new(), Vec::new());
+        let Self { maps, search, estimate, cache, .. } = self;
+        let done = pass.gather_finally(tile, progress, &mut |gather, rays, chosen| {
+            let (points, radiance, count) = (&gather.ends, &gather.found, rays.all());
+            if let Some(cache) = cache {
                 cache.light(pass.gpu, points, count, radiance);
-                let left: Vec<VisiblePoint> = pass.gpu.read(points, 0, count.into())?;
-                let left = left.into_iter().enumerate().filter(|(_, end)| end.next_map != 0);
-                left.for_each(|(place, end)| {
-                    places.push(place);
-                    ends.push(end);
-                });
-                if ends.len() as u64 >= pass.tracer.room() || ray + 1 == pass.final_rays() {
-                    self.light_ends(pass, tile, &std::mem::take(&mut places), &std::mem::take(&mut ends), progress)?;
+                let ends: Vec<VisiblePoint> = pass.gpu.read(points, 0, count.into())?;
+                for (ray, end) in (0..).zip(ends).filter(|(_, end)| end.next_map != 0) {
+                    left.0.push(chosen[(ray / rays.count) as usize] as usize);
+                    left.1.push(end);
                 }
-            } else {
-                for index in 0..self.maps.maps().len() {
-                    let request = EstimateRequest { points, count, map_number: 1, radiance, gathered };
-                    self.search.answer(pass, self.maps, index, self.estimate, &request, progress)?;
+                if left.0.len() as u64 >= pass.tracer.room() {
+                    search.light_ends(pass, (maps, estimate), tile, &std::mem::take(&mut left), progress)?;
                 }
+                return Ok(());
             }
+            for index in 0..maps.maps().len() {
+                let gathered = &pass.tracer.gathered;
+                let request = EstimateRequest { points, count, map_number: 1, radiance, gathered };
+                search.answer(pass, maps, index, estimate, &request, progress)?;
+            }
+            Ok(())
+        })?;
+        if !left.0.is_empty() {
+            search.light_ends(pass, (maps, estimate), tile, &left, progress)?;
         }
         Ok(done)
-    }
-
-    /// Adds the light at ends of rays to the visible points at `places`.
-    fn light_ends(
-        &mut self,
-        pass: &CameraPass,
-        tile: &Tile,
-        places: &[usize],
-        ends: &[VisiblePoint],
-        progress: &dyn Progress,
-    ) -> Result<()> {
-        let found = self.search.estimates(pass, self.maps, self.estimate, ends, progress)?;
-        let mut radiance = pass.radiance(tile)?;
-        for (&place, (light, _)) in places.iter().zip(found) {
-            (0..3).for_each(|c| radiance[place][c] += light[c]);
-        }
-        pass.set_radiance(&radiance);
-        Ok(())
     }
 }
 
@@ -194,13 +176,11 @@ fn ends_of_rays(pass: &CameraPass, progress: &dyn Progress) -> Result<(Vec<Visib
     let (mut ends, mut done) = (Vec::new(), StepCount::default());
     for tile in &pass.tracer.tiles() {
         done += pass.tracer.trace(pass.gpu, pass.scene, tile)?;
-        for ray in 0..pass.final_rays() {
-            progress.check()?;
-            let (points, count) = pass.trace_final(tile, ray)?;
-            done += count;
-            let found: Vec<VisiblePoint> = pass.gpu.read(points, 0, pass.tracer.point_count(tile).into())?;
+        done += pass.gather_finally(tile, progress, &mut |gather, rays, _| {
+            let found: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
             ends.extend(found.into_iter().filter(|point| point.next_map != 0));
-        }
+            Ok(())
+        })?;
     }
     Ok((ends, done))
 }
@@ -230,6 +210,25 @@ impl Searches<'_> {
         let sums: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into())?;
         found.iter_mut().zip(sums).for_each(|((light, _), [r, g, b, _])| *light = [r, g, b]);
         Ok(found)
+    }
+
+    /// Adds the light at ends of rays to the visible points that the rays come from. The two lists
+    /// are the indices of the points and the ends.
+    fn light_ends(
+        &mut self,
+        pass: &CameraPass,
+        (maps, settings): (&PhotonMaps, &EstimateSettings),
+        tile: &Tile,
+        (places, ends): &(Vec<usize>, Vec<VisiblePoint>),
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let found = self.estimates(pass, maps, settings, ends, progress)?;
+        let mut radiance = pass.radiance(tile)?;
+        for (&place, (light, _)) in places.iter().zip(found) {
+            (0..3).for_each(|c| radiance[place][c] += light[c]);
+        }
+        pass.set_radiance(&radiance);
+        Ok(())
     }
 
     /// Answers a request for estimates of one map.

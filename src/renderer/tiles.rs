@@ -4,9 +4,10 @@ use super::{ray_start::ray_start, size::picture_size, tally};
 use crate::{
     bvh::Media,
     error::Result,
-    gpu::{Buffer, Gpu},
+    gpu::Gpu,
     image::Film,
-    passes::{CameraTracer, FinalGather, GatherSettings, StepCount, Tile},
+    layout::VisiblePoint,
+    passes::{CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::{Crop, EstimateSettings, PhotonSettings, PictureSettings},
@@ -145,16 +146,37 @@ impl<'a> CameraPass<'a> {
         self.final_gather.as_ref().map_or(0, FinalGather::rays)
     }
 
-    /// Traces one ray of final gathering from each of the tile's visible points; returns what they
-    /// see.
-    pub fn trace_final(&self, tile: &Tile, ray: u32) -> Result<(&Buffer, StepCount)> {
-        let gather = self.final_gather.as_ref().expect("the settings ask for it");
-        Ok((&gather.seen, gather.trace(self.gpu, self.scene, &self.tracer, tile, ray)?))
+    /// Traces rays of final gathering of all of the tile's visible points that still wait, in steps
+    /// of as many as there is room for. After each step, `light` receives the rays, and adds the
+    /// light at their ends to what they have found. The result is then in the points' radiance.
+    pub fn gather_finally(
+        &self,
+        tile: &Tile,
+        progress: &dyn Progress,
+        light: &mut dyn FnMut(&FinalGather, FinalRays, &[u32]) -> Result<()>,
+    ) -> Result<StepCount> {
+        let mut done = StepCount::default();
+        let Some(gather) = &self.final_gather else { return Ok(done) };
+        let points = (0..).zip(self.points(tile)?);
+        let chosen: Vec<u32> = points.filter(|(_, point)| point.next_map != 0).map(|(i, _)| i).collect();
+        if chosen.is_empty() {
+            return Ok(done);
+        }
+        gather.choose(self.gpu, &chosen);
+        let at_once = (self.tracer.room() as u32 / chosen.len() as u32).min(gather.rays());
+        for first in (0..gather.rays()).step_by(at_once as usize) {
+            progress.check()?;
+            let rays =
+                FinalRays { first, count: at_once.min(gather.rays() - first), chosen: chosen.len() as u32 };
+            done += gather.trace(self.gpu, self.scene, &self.tracer, tile, rays)?;
+            light(gather, rays, &chosen)?;
+            gather.add(self.gpu, &self.tracer, rays);
+        }
+        Ok(done)
     }
 
     /// Reads the tile's visible points; some slots have no point.
-    #[cfg(feature = "report")]
-    pub fn points(&self, tile: &Tile) -> Result<Vec<crate::layout::VisiblePoint>> {
+    pub fn points(&self, tile: &Tile) -> Result<Vec<VisiblePoint>> {
         self.gpu.read(&self.tracer.points, 0, self.tracer.point_count(tile).into())
     }
 

@@ -224,24 +224,24 @@ impl CameraTracer {
             scene,
             (&start, tile.pixels * tile.samples + self.view.margin),
             &trace,
-            self.kernels.lobes.as_ref(),
+            (self.kernels.lobes.as_ref(), &self.radiance),
         )
     }
 
     /// Starts paths by `start` in that many invocations and traces them by `trace`. Both steps have
     /// their own buffers besides those of the wavefront and the tile. `lobes` adds direct light at
-    /// rough lobes.
+    /// rough lobes. All add light to `radiance`, by the slots of paths.
     pub(super) fn follow(
         &self,
         gpu: &Gpu,
         scene: &SceneBuffers,
         (start, invocations): (&Step, u32),
         trace: &Step,
-        lobes: Option<&Kernel>,
+        (lobes, radiance): (Option<&Kernel>, &Buffer),
     ) -> Result<StepCount> {
         let most_paths = (u64::from(invocations) * u64::from(self.view.branches))
             .min(TILE_POINTS + u64::from(self.view.margin * self.view.branches));
-        let tile = [("first_hits", &self.first_hits), ("radiance", &self.radiance), ("lobe_points", &self.lobe_points)];
+        let tile = [("first_hits", &self.first_hits), ("radiance", radiance), ("lobe_points", &self.lobe_points)];
         let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
         let start = Step { kernel: start.kernel, buffers: &started };
         let lighting = gpu.uniform(

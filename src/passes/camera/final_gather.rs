@@ -16,18 +16,42 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Kernels, and a buffer for the hits of one ray of each visible point. Memory does not grow with
-/// the number of rays.
+/// Kernels, and buffers for as many rays as a tile has points. Memory does not grow with the number
+/// of rays.
 #[derive(Debug)]
 pub struct FinalGather {
     start: Kernel,
     trace: Kernel,
+    sum: Kernel,
     /// Direct light at rough lobes, if there are any.
     lobes: Option<Kernel>,
     rays: u32,
-    /// Hits of the current ray: a [`VisiblePoint`] per visible point of the camera. Its weight
+    /// Whether the rays of all points are one set of numbers.
+    joint: bool,
+    /// Indices of the points that rays start from.
+    chosen: Buffer,
+    /// Where rays end: a [`VisiblePoint`] per ray, in the order of the chosen points. Its weight
     /// includes the camera path. Some slots have no point.
-    pub seen: Buffer,
+    pub ends: Buffer,
+    /// Light that each ray finds, `vec4f`.
+    pub found: Buffer,
+}
+
+/// Rays from each of the chosen points that are traced at once.
+#[derive(Clone, Copy, Debug)]
+pub struct FinalRays {
+    pub first: u32,
+    pub count: u32,
+    /// Number of chosen points.
+    pub chosen: u32,
+}
+
+impl FinalRays {
+    /// Rays in all.
+    #[must_use]
+    pub fn all(self) -> u32 {
+        self.count * self.chosen
+    }
 }
 
 impl FinalGather {
@@ -42,11 +66,22 @@ impl FinalGather {
             // An emitter that a ray hits gives direct light, or a caustic by way of lobes that cast
             // one: the visible point has both already.
             trace: scene.kernel_with(gpu, "trace_camera", &[sampler, ("SEES_BEYOND_WIDE_LOBES", 1.0)]),
+            sum: Kernel::new(gpu, "sum_final_gather", &[]),
             lobes: (scene.materials.has_rough)
                 .then(|| scene.kernel_with(gpu, "light_lobes", &[sampler, ("LIGHTS_WIDE_LOBES_ONLY", 1.0)])),
             rays,
-            seen: gpu.storage::<VisiblePoint>("points seen in final gathering", tracer.room())?,
+            joint: false,
+            chosen: gpu.storage::<u32>("points of final gathering", tracer.room())?,
+            ends: gpu.storage::<VisiblePoint>("ends of final-gather rays", tracer.room())?,
+            found: gpu.storage::<[f32; 4]>("light of final-gather rays", tracer.room())?,
         })
+    }
+
+    /// Makes the rays of all points of the picture one set of numbers: those of neighbours are then
+    /// spread as evenly as those of one point.
+    #[must_use]
+    pub fn joint(self) -> Self {
+        Self { joint: true, ..self }
     }
 
     /// Rays of each visible point.
@@ -55,7 +90,12 @@ impl FinalGather {
         self.rays
     }
 
-    /// Traces the `ray`-th ray of each visible point of the tile to the first diffuse surface.
+    /// Chooses the points of the tile that rays start from.
+    pub fn choose(&self, gpu: &Gpu, chosen: &[u32]) {
+        gpu.write(&self.chosen, 0, chosen);
+    }
+
+    /// Traces rays of the chosen points to the first diffuse surface.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -65,33 +105,65 @@ impl FinalGather {
         scene: &SceneBuffers,
         tracer: &CameraTracer,
         tile: &Tile,
-        ray: u32,
+        rays: FinalRays,
     ) -> Result<StepCount> {
         let view = tracer.tile_view(tile);
-        let points = tracer.point_count(tile);
-        let step = gpu.uniform("final step", &FinalStep { ray, rays: self.rays, points, pad: 0 });
+        let step = self.step(gpu, rays);
         let camera = gpu.uniform("camera tile", &view);
-        // Each visible point is a sample of its own. At glass, each of its rays chooses reflection
-        // or refraction at random.
+        // Each ray is a sample of its own, at a pixel of a large square. At glass, it chooses
+        // reflection or refraction at random.
+        let tile_seed = mix(view.first_row << 16 | view.first_column) ^ mix(view.first_sample);
         let own = gpu.uniform(
             "final gather tile",
             &CameraTile {
-                seed: mix(view.seed ^ mix(ray.wrapping_add(1))),
+                seed: mix(view.seed ^ mix(rays.first.wrapping_add(1))) ^ tile_seed,
                 branches: 1,
-                samples: view.samples * view.branches,
-                first_sample: view.first_sample * view.branches,
+                samples: 1,
+                pixels: 1 << 16,
+                first_column: 0,
+                first_row: 0,
+                first_sample: 0,
+                width: 1 << 16,
                 ..view
             },
         );
-        let started = [("tile", &camera), ("final_step", &step), ("points", &tracer.points), ("seen", &self.seen)];
-        let followed = [("tile", &own), ("points", &self.seen)];
+        let started = [
+            ("tile", &camera),
+            ("final_step", &step),
+            ("points", &tracer.points),
+            ("seen", &self.ends),
+            ("chosen", &self.chosen),
+        ];
+        let followed = [("tile", &own), ("points", &self.ends)];
         let start = Step { kernel: &self.start, buffers: &started };
         tracer.follow(
             gpu,
             scene,
-            (&start, points),
+            (&start, rays.all()),
             &Step { kernel: &self.trace, buffers: &followed },
-            self.lobes.as_ref(),
+            (self.lobes.as_ref(), &self.found),
         )
+    }
+
+    /// Adds what the rays of a step found to the radiance of their points.
+    pub fn add(&self, gpu: &Gpu, tracer: &CameraTracer, rays: FinalRays) {
+        let step = self.step(gpu, rays);
+        let buffers =
+            [("final_step", &step), ("chosen", &self.chosen), ("found", &self.found), ("radiance", &tracer.radiance)];
+        let mut encoder = gpu.encoder();
+        self.sum.dispatch(&mut encoder, &self.sum.bind(gpu, &buffers), rays.chosen.into());
+        gpu.submit(encoder);
+    }
+
+    fn step(&self, gpu: &Gpu, rays: FinalRays) -> Buffer {
+        let step = FinalStep {
+            first_ray: rays.first,
+            rays_now: rays.count,
+            rays: self.rays,
+            chosen: rays.chosen,
+            joint: self.joint.into(),
+            ..Default::default()
+        };
+        gpu.uniform("final step", &step)
     }
 }

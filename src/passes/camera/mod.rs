@@ -7,5 +7,5 @@ pub mod tile;
 mod view;
 
 pub use camera_tracer::{CameraKernels, CameraTracer};
-pub use final_gather::FinalGather;
+pub use final_gather::{FinalGather, FinalRays};
 pub use tile::{StepCount, Tile};
