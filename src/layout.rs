@@ -708,6 +708,41 @@ pub struct CellGrid {
     pub points: u32,
 }
 
+/// Irradiance at a visible point of one of the pixels of a record grid.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct IrradianceRecord {
+    /// Metres.
+    pub position: [f32; 3],
+    /// Interpolated and geometric normal, octahedral.
+    pub ns: u32,
+    /// W/m²; negative: no point.
+    pub irradiance: [f32; 3],
+    pub ng: u32,
+}
+
+/// Arguments of `filter_irradiance`: records by rows of a grid that is coarser than the picture,
+/// each pixel of it with as many slots as a camera sample has branches.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct RecordGrid {
+    /// The part of the grid that has records: its first pixel, and pixels along its sides.
+    pub first_column: u32,
+    pub first_row: u32,
+    pub columns: u32,
+    pub rows: u32,
+    /// Pixels of the grid per pixel of the picture, along both sides.
+    pub columns_per_pixel: f32,
+    pub rows_per_pixel: f32,
+    /// Radius of the filter per metre between camera and point; metres if rays are parallel.
+    pub reach: f32,
+    /// Visible points.
+    pub points: u32,
+}
+
+/// Pixels of the record grid on each side of a point among which the filter looks for records.
+pub const RECORD_REACH: u32 = 4;
+
 /// Irradiance kept for the points of a cell that lie on one surface.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

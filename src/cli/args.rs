@@ -112,6 +112,13 @@ pub struct RenderArgs {
     #[arg(long, value_name = "F", default_value_t = 0.5, value_parser = irradiance_cells, help_heading = "Estimate")]
     pub irradiance_cells: f32,
 
+    #[arg(help = format!(
+        "Pixels between the points of final gathering, {}; the picture's points take the light of those around them; 0 gathers at every sample",
+        EstimateSettings::GATHER_SPACING
+    ))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole(EstimateSettings::GATHER_SPACING), help_heading = "Estimate")]
+    pub gather_spacing: u32,
+
     #[command(flatten)]
     pub passes: PassOptions,
 
@@ -160,6 +167,7 @@ impl RenderArgs {
             s.estimate.radius = self.radius;
             s.estimate.share_reach = self.share;
             s.estimate.irradiance_cells = self.irradiance_cells;
+            s.estimate.gather_spacing = self.gather_spacing;
         })
     }
 }
@@ -210,7 +218,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_settings() {
         let s = settings(
-            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --share 0.5 --irradiance-cells 0.25 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
+            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --share 0.5 --irradiance-cells 0.25 --gather-spacing 3 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
              --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
              --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
@@ -222,6 +230,7 @@ mod tests {
             s.photons.final_gather = 16;
             s.estimate.share_reach = 0.5;
             s.estimate.irradiance_cells = 0.25;
+            s.estimate.gather_spacing = 3;
             s.estimate.cone_constant = 1.5;
             s.estimate.max_radius = Some(0.25);
             s.photons.max_bounces = 0;

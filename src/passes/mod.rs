@@ -8,7 +8,8 @@ pub mod wavefront;
 
 pub use camera::{CameraKernels, CameraTracer, FinalGather, FinalRays, StepCount, Tile};
 pub use estimate::{
-    EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, SharedPoints,
+    EstimateRequest, EstimateSharing, FILTER_RADIUS, Gather, GatherOptions, GatherSettings, IrradianceCache,
+    IrradianceRecords, NO_RECORD, SharedPoints,
 };
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
 pub use photons::{PathRange, PathRanges, PhotonTracer, RawMap, TracedPhotons};

@@ -8,11 +8,11 @@ use super::{
 use crate::{
     error::Result,
     gpu::Gpu,
-    layout::{Gathered, VisiblePoint},
+    layout::{Gathered, IrradianceRecord, RecordGrid, VisiblePoint, octahedral},
     map_kind::MapKind,
     passes::{
-        EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, PhotonMap, StepCount,
-        Tile,
+        EstimateRequest, EstimateSharing, FILTER_RADIUS, Gather, GatherOptions, GatherSettings, IrradianceCache,
+        IrradianceRecords, NO_RECORD, PhotonMap, StepCount, Tile,
     },
     progress::Progress,
     reference::{Estimate, KdMap},
@@ -35,6 +35,8 @@ pub(crate) struct MapGatherer<'a> {
     observer: Option<&'a mut dyn Observer>,
     /// Light at the ends of final-gather rays.
     cache: Option<IrradianceCache>,
+    /// Irradiance at some of the picture's points.
+    records: Option<IrradianceRecords>,
 }
 
 enum Searches<'a> {
@@ -69,7 +71,7 @@ impl<'a> MapGatherer<'a> {
         // Kernels of few photons are stretched over more: that does not widen what they tell of.
         let stretched = GatherSettings::from(estimate).neighbors as f32 / estimate.neighbors as f32;
         let sharing = EstimateSharing::new(gpu, estimate.share_reach / stretched.sqrt());
-        Ok(Self { maps, search, sharing, estimate, observer, cache: None })
+        Ok(Self { maps, search, sharing, estimate, observer, cache: None, records: None })
     }
 
     /// Adds the light of one map at the tile's visible points. `index` is the index in the photon
@@ -142,13 +144,63 @@ impl Gatherer for MapGatherer<'_> {
         let (marks, count) = timed(&mut stats.seconds.camera, || ends_of_rays(scout, progress))?;
         tally::add_step(stats, count);
         let Self { maps, search, estimate, .. } = self;
-        let white = |p: &VisiblePoint| VisiblePoint { weight: [1.0; 3], above: 0, ..*p };
         let mut irradiances = |points: &[VisiblePoint]| {
-            let points: Vec<_> = points.iter().map(white).collect();
+            let points: Vec<_> = points.iter().map(bare).collect();
             search.estimates(scout, maps, estimate, &points, progress)
         };
         let fill = || IrradianceCache::build(scout.gpu, &marks, estimate.irradiance_cells, &mut irradiances);
         self.cache = timed(&mut stats.seconds.gather, fill)?;
+        Ok(())
+    }
+
+    /// Final gathering at the visible points of the coarse picture.
+    fn keep_records(
+        &mut self,
+        coarse: &CameraPass,
+        size: (u32, u32),
+        stats: &mut Stats,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let (window, branches) = (coarse.window, coarse.tracer.branches() as usize);
+        let mut records = vec![NO_RECORD; window.width as usize * window.height as usize * branches];
+        for tile in &coarse.tracer.tiles() {
+            progress.check()?;
+            let mut step = timed(&mut stats.seconds.camera, || coarse.tracer.trace(coarse.gpu, coarse.scene, tile))?;
+            let mut seconds = 0.0;
+            let (points, found) = timed(&mut seconds, || {
+                // Irradiance itself: the points' weight and what lies above them are left out.
+                let points: Vec<_> = coarse.points(tile)?.iter().map(bare).collect();
+                coarse.set_points(&points);
+                coarse.set_radiance(&vec![[0.0; 4]; points.len()]);
+                step += self.gather_finally(coarse, tile, progress)?;
+                Ok((points, coarse.radiance(tile)?))
+            })?;
+            stats.seconds.gather += seconds;
+            tally::add_step(stats, step);
+            for (pixel, slots) in (0..).zip(points.chunks(branches).zip(found.chunks(branches))) {
+                let Some((column, row)) = coarse.tracer.pixel(tile, pixel) else { continue };
+                let first = (row * window.width + column) as usize * branches;
+                for (slot, (point, light)) in (first..).zip(slots.0.iter().zip(slots.1)) {
+                    if point.next_map != 0 {
+                        let [ns, ng] = [point.ns, point.ng].map(|n| octahedral(n.into()));
+                        let irradiance = [light[0], light[1], light[2]];
+                        records[slot] = IrradianceRecord { position: point.position, ns, irradiance, ng };
+                    }
+                }
+            }
+        }
+        let per_pixel = |coarse: u32, fine: u32| coarse as f32 / fine as f32;
+        let grid = RecordGrid {
+            first_column: window.column,
+            first_row: window.row,
+            columns: window.width,
+            rows: window.height,
+            columns_per_pixel: per_pixel(coarse.size.0, size.0),
+            rows_per_pixel: per_pixel(coarse.size.1, size.1),
+            reach: FILTER_RADIUS * coarse.tracer.pixel_height(),
+            points: 0,
+        };
+        self.records = Some(IrradianceRecords::new(coarse.gpu, &records, grid)?);
         Ok(())
     }
 
@@ -163,12 +215,22 @@ impl Gatherer for MapGatherer<'_> {
             self.gather_map(pass, tile, (index, number), stats, progress)?;
         }
         let mut seconds = 0.0;
+        if let Some(records) = &self.records {
+            let (count, view) = (pass.tracer.point_count(tile), pass.tracer.tile_view(tile));
+            let buffers = (&pass.tracer.points, &pass.tracer.radiance);
+            timed(&mut seconds, || records.light(pass.gpu, &view, count, buffers));
+        }
         let count = timed(&mut seconds, || self.gather_finally(pass, tile, progress))?;
         stats.seconds.gather += seconds;
         stats.non_finite.gather += count.non_finite;
         tally::add_step(stats, count);
         Ok(())
     }
+}
+
+/// A point whose radiance is its irradiance.
+fn bare(point: &VisiblePoint) -> VisiblePoint {
+    VisiblePoint { weight: [1.0; 3], above: 0, ..*point }
 }
 
 /// The ends of all final-gather rays of a pass.

@@ -11,10 +11,12 @@ use crate::{
     error::Result,
     gpu::Gpu,
     image::{Film, Frame},
+    layout::RECORD_REACH,
     passes::{CameraKernels, EstimateSharing, MapKernels, PathRanges, PhotonTracer},
+    pixel_filter::PixelFilter,
     progress::{Progress, Stage},
     scene::Scene,
-    settings::{EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Search, Settings, check_samples},
+    settings::{Crop, EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Search, Settings, check_samples},
     stats::{DeviceStats, Stats, timed},
     upload::SceneBuffers,
 };
@@ -181,8 +183,37 @@ impl<'a> Session<'a> {
             let scout = scout.of_pass(&scouted, index)?;
             gatherer.prepare(&scout, &mut stats, progress)?;
         }
+        if estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty() {
+            let coarse = coarser(picture, pass.size, estimate.gather_spacing);
+            let single = EstimateSettings { share_reach: 0.0, ..estimate.clone() };
+            let records = CameraPass::new(self.gpu, scene, camera, maps.settings(), &single, &coarse)?;
+            let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
+            let records = records.of_pass(&coarse, index)?.with_joint_rays();
+            gatherer.keep_records(&records, pass.size, &mut stats, progress)?;
+        }
         let films = pass.render(gatherer, stage, &mut stats, progress)?;
         Ok((films, stats))
+    }
+}
+
+/// Settings of a coarser version of the part of the picture that is rendered, and what surrounds it
+/// as far as the filter of records reaches.
+fn coarser(picture: &PictureSettings, size: (u32, u32), spacing: u32) -> PictureSettings {
+    let window = picture.window(size);
+    let along = |pixels: u32, origin: u32, count: u32| {
+        let side = pixels.div_ceil(spacing);
+        let place = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
+        let first = place(origin).saturating_sub(RECORD_REACH + 1);
+        (side, first, (place(origin + count) + RECORD_REACH + 2).min(side) - first)
+    };
+    let (columns, column, width) = along(size.0, window.column, window.width);
+    let (rows, row, height) = along(size.1, window.row, window.height);
+    PictureSettings {
+        size: Some((columns, rows)),
+        spp: 1,
+        crop: Some(Crop { column, row, width, height }),
+        pixel_filter: PixelFilter::Box,
+        ..picture.clone()
     }
 }
 

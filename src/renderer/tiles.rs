@@ -26,6 +26,18 @@ pub(crate) trait Gatherer {
         Ok(())
     }
 
+    /// Receives a pass over a picture that is coarser by `spacing`, before the picture, to keep
+    /// records of irradiance at its visible points. The default does nothing with it.
+    fn keep_records(
+        &mut self,
+        _coarse: &CameraPass,
+        _size: (u32, u32),
+        _stats: &mut Stats,
+        _progress: &dyn Progress,
+    ) -> Result<()> {
+        Ok(())
+    }
+
     /// Number of pictures that it makes of the same visible points.
     fn pictures(&self) -> usize {
         1
@@ -46,7 +58,7 @@ pub(crate) struct CameraPass<'a> {
     /// The radiance estimate that the settings ask for.
     pub estimate: GatherSettings,
     pub size: (u32, u32),
-    window: Crop,
+    pub window: Crop,
     spp: u32,
     /// Direct light comes from shadow rays.
     direct: bool,
@@ -86,6 +98,11 @@ impl<'a> CameraPass<'a> {
     pub fn of_pass(self, picture: &PictureSettings, first_sample: Option<u32>) -> Result<Self> {
         let Some(first) = first_sample else { return Ok(self) };
         Ok(Self { tracer: self.tracer.of_pass(self.gpu, picture, first)?, ..self })
+    }
+
+    /// Makes the rays of final gathering of all points one set of numbers.
+    pub fn with_joint_rays(self) -> Self {
+        Self { final_gather: self.final_gather.map(FinalGather::joint), ..self }
     }
 
     /// Renders tile by tile: camera rays to visible points, direct light, the light of photons,
@@ -169,6 +186,7 @@ impl<'a> CameraPass<'a> {
             let rays =
                 FinalRays { first, count: at_once.min(gather.rays() - first), chosen: chosen.len() as u32 };
             done += gather.trace(self.gpu, self.scene, &self.tracer, tile, rays)?;
+            done += gather.light_directly(self.gpu, self.scene, &self.tracer, tile, rays)?;
             light(gather, rays, &chosen)?;
             gather.add(self.gpu, &self.tracer, rays);
         }
@@ -178,6 +196,11 @@ impl<'a> CameraPass<'a> {
     /// Reads the tile's visible points; some slots have no point.
     pub fn points(&self, tile: &Tile) -> Result<Vec<VisiblePoint>> {
         self.gpu.read(&self.tracer.points, 0, self.tracer.point_count(tile).into())
+    }
+
+    /// Replaces the visible points.
+    pub fn set_points(&self, points: &[VisiblePoint]) {
+        self.gpu.write(&self.tracer.points, 0, points);
     }
 
     /// Reads the radiance of the visible points so far.

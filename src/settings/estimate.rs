@@ -51,6 +51,10 @@ pub struct EstimateSettings {
     /// fraction of the estimate's radius, in [`Self::IRRADIANCE_CELLS`]; 0: every end has an
     /// estimate of its own.
     pub irradiance_cells: f32,
+    /// Pixels between the visible points at which final gathering is done, in
+    /// [`Self::GATHER_SPACING`]; others take the irradiance of those around them. 0: at every
+    /// camera sample.
+    pub gather_spacing: u32,
 }
 
 impl Default for EstimateSettings {
@@ -65,6 +69,7 @@ impl Default for EstimateSettings {
             raw: false,
             share_reach: 2.0,
             irradiance_cells: 0.5,
+            gather_spacing: 0,
         }
     }
 }
@@ -82,6 +87,9 @@ impl EstimateSettings {
 
     /// Range of [`Self::irradiance_cells`].
     pub const IRRADIANCE_CELLS: Range<f32> = Range::closed(0.0, 2.0);
+
+    /// Range of [`Self::gather_spacing`], pixels.
+    pub const GATHER_SPACING: Range<u32> = Range::closed(0, 16);
 
     /// Whether irradiance is kept in cells. Estimates to compare with are made at each point.
     pub(crate) fn keeps_irradiance(&self) -> bool {
@@ -104,6 +112,7 @@ impl EstimateSettings {
         self.max_radius.map_or(Ok(()), |radius| Self::RADIUS.check("estimate.max_radius", radius))?;
         Self::SHARE_REACH.check("estimate.share_reach", self.share_reach)?;
         Self::IRRADIANCE_CELLS.check("estimate.irradiance_cells", self.irradiance_cells)?;
+        Self::GATHER_SPACING.check("estimate.gather_spacing", self.gather_spacing)?;
         match (self.search, self.radius) {
             (Search::Radius, None) => fail("estimate.search", "radius".to_string(), "needs a radius"),
             (Search::Radius, Some(radius)) => Self::RADIUS.check("estimate.radius", radius),

@@ -149,13 +149,6 @@ impl PhotonSettings {
     /// Range of [`Self::final_gather`], rays.
     pub const FINAL_GATHER: Range<u32> = Range::closed(0, 65_536);
 
-    /// Whether the global map stores photons that come directly from a light (LD): if the mode says
-    /// so, or for rays of final gathering.
-    #[must_use]
-    pub fn stores_direct(&self) -> bool {
-        self.mode.stores_direct() || self.final_gather > 0
-    }
-
     /// Maximum number of surfaces that a path meets, 1 to [`MAX_BOUNCES`].
     #[must_use]
     pub fn bounce_limit(&self) -> u32 {

@@ -2,6 +2,8 @@
 //! visible points, adds direct light, and sums over each pixel's samples. Memory depends only on
 //! the size of a tile.
 
+use glam::Vec3;
+
 use super::{
     direct_light::DirectLighting,
     tile::{StepCount, Tile},
@@ -180,6 +182,18 @@ impl CameraTracer {
         self.view.branches * tile.pixels * tile.samples
     }
 
+    /// Path slots of each sample.
+    #[must_use]
+    pub fn branches(&self) -> u32 {
+        self.view.branches
+    }
+
+    /// Height of a pixel at a distance of one metre, or everywhere if rays are parallel, metres.
+    #[must_use]
+    pub fn pixel_height(&self) -> f32 {
+        2.0 * Vec3::from(self.view.up).length() / self.view.height as f32
+    }
+
     /// Maximum number of visible points of any tile, without its margin.
     #[must_use]
     pub fn room(&self) -> u64 {
@@ -273,20 +287,29 @@ impl CameraTracer {
     /// # Errors
     /// Faults of the driver.
     pub fn light_directly(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
-        let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
-        let buffers = [
-            ("tile", &uniform),
-            ("points", &self.points),
-            ("radiance", &self.radiance),
-            ("counters", &self.wavefront.counters),
-        ];
-        let (steps, points) = (self.kernels.direct.steps(scene), self.point_count(tile));
+        let points = (&self.points, &self.radiance, self.point_count(tile));
+        self.light_points(gpu, scene, &self.kernels.direct, &self.tile_view(tile), points)
+    }
+
+    /// Adds direct light to the radiance of points, whose numbers are those of samples of a tile.
+    pub(super) fn light_points(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        direct: &DirectLighting,
+        view: &CameraTile,
+        (points, radiance, count): (&Buffer, &Buffer, u32),
+    ) -> Result<StepCount> {
+        let uniform = gpu.uniform("camera tile", view);
+        let counters = ("counters", &self.wavefront.counters);
+        let buffers = [("tile", &uniform), ("points", points), ("radiance", radiance), counters];
+        let (steps, points) = (direct.steps(scene), count);
         let mut count = StepCount::default();
         for first in (0..steps).step_by(DIRECT_STEPS_PER_READ as usize) {
             let mut encoder = gpu.encoder();
             encoder.clear_buffer(&self.wavefront.counters, 0, None);
             for step in first..steps.min(first + DIRECT_STEPS_PER_READ) {
-                self.kernels.direct.add(gpu, scene, &mut encoder, (step, points), &buffers);
+                direct.add(gpu, scene, &mut encoder, (step, points), &buffers);
             }
             gpu.submit(encoder);
             let counters: Counters = gpu.read(&self.wavefront.counters, 0, 1)?[0];

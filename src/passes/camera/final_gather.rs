@@ -4,6 +4,7 @@
 
 use super::{
     camera_tracer::CameraTracer,
+    direct_light::DirectLighting,
     tile::{StepCount, Tile},
 };
 use crate::{
@@ -25,6 +26,7 @@ pub struct FinalGather {
     sum: Kernel,
     /// Direct light at rough lobes, if there are any.
     lobes: Option<Kernel>,
+    direct: DirectLighting,
     rays: u32,
     /// Whether the rays of all points are one set of numbers.
     joint: bool,
@@ -60,15 +62,16 @@ impl FinalGather {
     /// # Errors
     /// Limits of the adapter.
     pub fn new(gpu: &Gpu, scene: &SceneBuffers, tracer: &CameraTracer, sampler: Sampler, rays: u32) -> Result<Self> {
-        let sampler = sampler_constant(sampler);
+        let constant = sampler_constant(sampler);
         Ok(Self {
-            start: scene.kernel_with(gpu, "start_final_gather", &[sampler]),
+            start: scene.kernel_with(gpu, "start_final_gather", &[constant]),
             // An emitter that a ray hits gives direct light, or a caustic by way of lobes that cast
             // one: the visible point has both already.
-            trace: scene.kernel_with(gpu, "trace_camera", &[sampler, ("SEES_BEYOND_WIDE_LOBES", 1.0)]),
+            trace: scene.kernel_with(gpu, "trace_camera", &[constant, ("SEES_BEYOND_WIDE_LOBES", 1.0)]),
             sum: Kernel::new(gpu, "sum_final_gather", &[]),
             lobes: (scene.materials.has_rough)
-                .then(|| scene.kernel_with(gpu, "light_lobes", &[sampler, ("LIGHTS_WIDE_LOBES_ONLY", 1.0)])),
+                .then(|| scene.kernel_with(gpu, "light_lobes", &[constant, ("LIGHTS_WIDE_LOBES_ONLY", 1.0)])),
+            direct: DirectLighting::new(gpu, scene, sampler, 1),
             rays,
             joint: false,
             chosen: gpu.storage::<u32>("points of final gathering", tracer.room())?,
@@ -110,23 +113,7 @@ impl FinalGather {
         let view = tracer.tile_view(tile);
         let step = self.step(gpu, rays);
         let camera = gpu.uniform("camera tile", &view);
-        // Each ray is a sample of its own, at a pixel of a large square. At glass, it chooses
-        // reflection or refraction at random.
-        let tile_seed = mix(view.first_row << 16 | view.first_column) ^ mix(view.first_sample);
-        let own = gpu.uniform(
-            "final gather tile",
-            &CameraTile {
-                seed: mix(view.seed ^ mix(rays.first.wrapping_add(1))) ^ tile_seed,
-                branches: 1,
-                samples: 1,
-                pixels: 1 << 16,
-                first_column: 0,
-                first_row: 0,
-                first_sample: 0,
-                width: 1 << 16,
-                ..view
-            },
-        );
+        let own = gpu.uniform("final gather tile", &rays_as_samples(&view, rays));
         let started = [
             ("tile", &camera),
             ("final_step", &step),
@@ -143,6 +130,22 @@ impl FinalGather {
             &Step { kernel: &self.trace, buffers: &followed },
             (self.lobes.as_ref(), &self.found),
         )
+    }
+
+    /// Adds direct light at the ends of rays to what they found.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn light_directly(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        tracer: &CameraTracer,
+        tile: &Tile,
+        rays: FinalRays,
+    ) -> Result<StepCount> {
+        let view = rays_as_samples(&tracer.tile_view(tile), rays);
+        tracer.light_points(gpu, scene, &self.direct, &view, (&self.ends, &self.found, rays.all()))
     }
 
     /// Adds what the rays of a step found to the radiance of their points.
@@ -165,5 +168,21 @@ impl FinalGather {
             ..Default::default()
         };
         gpu.uniform("final step", &step)
+    }
+}
+
+/// The rays of a step as samples of one pixel: all of them draw from one set of numbers. At glass, a
+/// ray chooses reflection or refraction at random.
+fn rays_as_samples(view: &CameraTile, rays: FinalRays) -> CameraTile {
+    let tile_seed = mix(view.first_row << 16 | view.first_column) ^ mix(view.first_sample);
+    CameraTile {
+        seed: mix(view.seed ^ mix(rays.first.wrapping_add(1))) ^ tile_seed,
+        branches: 1,
+        samples: rays.all(),
+        pixels: 1,
+        first_column: 0,
+        first_row: 0,
+        first_sample: 0,
+        ..*view
     }
 }

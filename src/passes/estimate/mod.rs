@@ -5,9 +5,11 @@ mod cell_table;
 pub mod gather;
 mod gather_kernels;
 pub mod irradiance_cache;
+pub mod irradiance_records;
 mod query_order;
 pub mod share_estimates;
 
 pub use gather::{Gather, GatherOptions, GatherSettings};
 pub use irradiance_cache::IrradianceCache;
+pub use irradiance_records::{FILTER_RADIUS, IrradianceRecords, NO_RECORD};
 pub use share_estimates::{EstimateRequest, EstimateSharing, SharedPoints};

@@ -120,7 +120,7 @@ impl PhotonTracer {
         (caustics, paths): (bool, &PathRanges),
         progress: &dyn Progress,
     ) -> Result<TracedPhotons> {
-        let wants_global = settings.stores_direct() || settings.mode.follows_diffuse();
+        let wants_global = settings.mode.stores_direct() || settings.mode.follows_diffuse();
         let mut traced = TracedPhotons {
             maps: ByKind {
                 global: RawMap::new(gpu, settings.global, wants_global)?,
@@ -227,7 +227,7 @@ fn plans<'a>(
         rules: rule(aimed, layout::AIM)
             | rule(aimed && lights.seen_targets > 0, layout::EVENLY)
             | rule(aimed || settings.final_gather > 0, layout::CAUSTICS_APART)
-            | rule(settings.stores_direct(), layout::STORE_DIRECT)
+            | rule(settings.mode.stores_direct(), layout::STORE_DIRECT)
             | rule(settings.mode.follows_diffuse(), layout::FOLLOW_DIFFUSE),
         fills: if aimed { &[MapKind::Global] } else { &MapKind::ALL },
         aim: if aimed { lights.seen } else { [0.0; 4] },

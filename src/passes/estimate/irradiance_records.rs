@@ -1,0 +1,52 @@
+//! Irradiance at some of the picture's visible points, filtered over their surroundings for all of
+//! them. Kernel: `filter_irradiance`.
+
+use crate::{
+    error::Result,
+    gpu::{Buffer, Gpu, Kernel},
+    layout::{CameraTile, IrradianceRecord, RecordGrid},
+};
+
+/// Radius of the filter, in pixels of the record grid.
+pub const FILTER_RADIUS: f32 = 4.0;
+
+/// A slot without a point.
+pub const NO_RECORD: IrradianceRecord =
+    IrradianceRecord { position: [0.0; 3], ns: 0, irradiance: [-1.0; 3], ng: 0 };
+
+/// The kernel and the records that it reads.
+#[derive(Debug)]
+pub struct IrradianceRecords {
+    kernel: Kernel,
+    records: Buffer,
+    grid: RecordGrid,
+}
+
+impl IrradianceRecords {
+    /// Takes records in the order of `grid`, whose points and reach are left open. `pixel`: pixels
+    /// of the picture along the side of one of the grid.
+    ///
+    /// # Errors
+    /// Limits of the adapter.
+    pub fn new(gpu: &Gpu, records: &[IrradianceRecord], grid: RecordGrid) -> Result<Self> {
+        let records = gpu.storage_with("irradiance records", records)?;
+        Ok(Self { kernel: Kernel::new(gpu, "filter_irradiance", &[]), records, grid })
+    }
+
+    /// Adds the light of the records to the radiance of a tile's points. Those that it lights wait
+    /// for no map then; others have too few records about them.
+    pub fn light(&self, gpu: &Gpu, tile: &CameraTile, count: u32, (points, radiance): (&Buffer, &Buffer)) {
+        let grid = gpu.uniform("record grid", &RecordGrid { points: count, ..self.grid });
+        let tile = gpu.uniform("camera tile", tile);
+        let buffers = [
+            ("tile", &tile),
+            ("record_grid", &grid),
+            ("records", &self.records),
+            ("points", points),
+            ("radiance", radiance),
+        ];
+        let mut encoder = gpu.encoder();
+        self.kernel.dispatch(&mut encoder, &self.kernel.bind(gpu, &buffers), count.into());
+        gpu.submit(encoder);
+    }
+}
