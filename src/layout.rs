@@ -714,11 +714,14 @@ pub struct CellGrid {
 pub struct IrradianceRecord {
     /// Metres.
     pub position: [f32; 3],
-    /// Interpolated and geometric normal, octahedral.
-    pub ns: u32,
-    /// W/m²; negative: no point.
-    pub irradiance: [f32; 3],
+    /// Geometric normal, octahedral.
     pub ng: u32,
+    /// By that normal, W/m²; negative: no point.
+    pub irradiance: [f32; 3],
+    pub pad0: u32,
+    /// Mean direction of the light, weighted by what it brings: shorter than 1.
+    pub mean_direction: [f32; 3],
+    pub pad1: u32,
 }
 
 /// Arguments of `filter_irradiance`: records by rows of a grid that is coarser than the picture,

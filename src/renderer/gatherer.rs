@@ -168,23 +168,31 @@ impl Gatherer for MapGatherer<'_> {
             let mut step = timed(&mut stats.seconds.camera, || coarse.tracer.trace(coarse.gpu, coarse.scene, tile))?;
             let mut seconds = 0.0;
             let (points, found) = timed(&mut seconds, || {
-                // Irradiance itself: the points' weight and what lies above them are left out.
-                let points: Vec<_> = coarse.points(tile)?.iter().map(bare).collect();
+                // Irradiance itself, by the geometric normal.
+                let flat = |point: &VisiblePoint| VisiblePoint { ns: point.ng, ..bare(point) };
+                let points: Vec<_> = coarse.points(tile)?.iter().map(flat).collect();
+                coarse.clear_arriving();
                 coarse.set_points(&points);
                 coarse.set_radiance(&vec![[0.0; 4]; points.len()]);
                 step += self.gather_finally(coarse, tile, progress)?;
-                Ok((points, coarse.radiance(tile)?))
+                let directions = coarse.mean_directions(tile)?;
+                let light = coarse.radiance(tile)?;
+                Ok((points, light.into_iter().zip(directions).collect::<Vec<_>>()))
             })?;
             stats.seconds.gather += seconds;
             tally::add_step(stats, step);
             for (pixel, slots) in (0..).zip(points.chunks(branches).zip(found.chunks(branches))) {
                 let Some((column, row)) = coarse.tracer.pixel(tile, pixel) else { continue };
                 let first = (row * window.width + column) as usize * branches;
-                for (slot, (point, light)) in (first..).zip(slots.0.iter().zip(slots.1)) {
+                for (slot, (point, (light, mean_direction))) in (first..).zip(slots.0.iter().zip(slots.1)) {
                     if point.next_map != 0 {
-                        let [ns, ng] = [point.ns, point.ng].map(|n| octahedral(n.into()));
-                        let irradiance = [light[0], light[1], light[2]];
-                        records[slot] = IrradianceRecord { position: point.position, ns, irradiance, ng };
+                        records[slot] = IrradianceRecord {
+                            position: point.position,
+                            ng: octahedral(point.ng.into()),
+                            irradiance: [light[0], light[1], light[2]],
+                            mean_direction: *mean_direction,
+                            ..NO_RECORD
+                        };
                     }
                 }
             }

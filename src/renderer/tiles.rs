@@ -79,7 +79,9 @@ impl<'a> CameraPass<'a> {
         let start = ray_start((geometry, &scene.solids), (camera, media), size);
         let tracer = CameraTracer::new(gpu, scene, (camera, start.media), size, photons, picture, shares)?;
         let tracer = if start.depth < 0.0 { tracer.starting_at(start.depth) } else { tracer };
-        let rays = Some(photons.final_gather).filter(|rays| *rays > 0);
+        // Samples that find no records about them share the rays of their pixel.
+        let sharing = if estimate.gather_spacing > 0 { picture.spp } else { 1 };
+        let rays = Some(photons.final_gather.div_ceil(sharing)).filter(|rays| *rays > 0);
         let final_gather = rays.map(|rays| FinalGather::new(gpu, scene, &tracer, photons.sampler, rays));
         Ok(Self {
             gpu,
@@ -201,6 +203,22 @@ impl<'a> CameraPass<'a> {
     /// Replaces the visible points.
     pub fn set_points(&self, points: &[VisiblePoint]) {
         self.gpu.write(&self.tracer.points, 0, points);
+    }
+
+    /// Forgets where the light at the tile's points came from.
+    pub fn clear_arriving(&self) {
+        let Some(gather) = &self.final_gather else { return };
+        let mut encoder = self.gpu.encoder();
+        encoder.clear_buffer(&gather.arriving, 0, None);
+        self.gpu.submit(encoder);
+    }
+
+    /// Mean direction of the light that rays of final gathering brought to each of the tile's
+    /// points, weighted by it; 0 where there was none.
+    pub fn mean_directions(&self, tile: &Tile) -> Result<Vec<[f32; 3]>> {
+        let Some(gather) = &self.final_gather else { return Ok(Vec::new()) };
+        let sums: Vec<[f32; 4]> = self.gpu.read(&gather.arriving, 0, self.tracer.point_count(tile).into())?;
+        Ok(sums.iter().map(|[x, y, z, w]| if *w > 0.0 { [x / w, y / w, z / w] } else { [0.0; 3] }).collect())
     }
 
     /// Reads the radiance of the visible points so far.

@@ -37,6 +37,11 @@ pub struct FinalGather {
     pub ends: Buffer,
     /// Light that each ray finds, `vec4f`.
     pub found: Buffer,
+    /// Direction of each ray, octahedral.
+    directions: Buffer,
+    /// For each visible point, sums of directions and of 1 over its rays, weighted by their light,
+    /// `vec4f`. Rays add to what is there.
+    pub arriving: Buffer,
 }
 
 /// Rays from each of the chosen points that are traced at once.
@@ -77,6 +82,8 @@ impl FinalGather {
             chosen: gpu.storage::<u32>("points of final gathering", tracer.room())?,
             ends: gpu.storage::<VisiblePoint>("ends of final-gather rays", tracer.room())?,
             found: gpu.storage::<[f32; 4]>("light of final-gather rays", tracer.room())?,
+            directions: gpu.storage::<u32>("directions of final-gather rays", tracer.room())?,
+            arriving: gpu.storage::<[f32; 4]>("directions of light", tracer.room())?,
         })
     }
 
@@ -120,6 +127,7 @@ impl FinalGather {
             ("points", &tracer.points),
             ("seen", &self.ends),
             ("chosen", &self.chosen),
+            ("directions", &self.directions),
         ];
         let followed = [("tile", &own), ("points", &self.ends)];
         let start = Step { kernel: &self.start, buffers: &started };
@@ -151,8 +159,14 @@ impl FinalGather {
     /// Adds what the rays of a step found to the radiance of their points.
     pub fn add(&self, gpu: &Gpu, tracer: &CameraTracer, rays: FinalRays) {
         let step = self.step(gpu, rays);
-        let buffers =
-            [("final_step", &step), ("chosen", &self.chosen), ("found", &self.found), ("radiance", &tracer.radiance)];
+        let buffers = [
+            ("final_step", &step),
+            ("chosen", &self.chosen),
+            ("found", &self.found),
+            ("directions", &self.directions),
+            ("radiance", &tracer.radiance),
+            ("arriving", &self.arriving),
+        ];
         let mut encoder = gpu.encoder();
         self.sum.dispatch(&mut encoder, &self.sum.bind(gpu, &buffers), rays.chosen.into());
         gpu.submit(encoder);
