@@ -718,10 +718,9 @@ pub struct IrradianceRecord {
     pub ng: u32,
     /// By that normal, W/m²; negative: no point.
     pub irradiance: [f32; 3],
-    pub pad0: u32,
-    /// Mean direction of the light, weighted by what it brings: shorter than 1.
-    pub mean_direction: [f32; 3],
-    pub pad1: u32,
+    /// Mean direction of the light, weighted by what it brings, shorter than 1; signed, normalised,
+    /// eight bits for each coordinate.
+    pub mean_direction: u32,
 }
 
 /// Arguments of `filter_irradiance`: records by rows of a grid that is coarser than the picture,

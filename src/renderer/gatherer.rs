@@ -190,8 +190,7 @@ impl Gatherer for MapGatherer<'_> {
                             position: point.position,
                             ng: octahedral(point.ng.into()),
                             irradiance: [light[0], light[1], light[2]],
-                            mean_direction: *mean_direction,
-                            ..NO_RECORD
+                            mean_direction: snorm8(*mean_direction),
                         };
                     }
                 }
@@ -234,6 +233,11 @@ impl Gatherer for MapGatherer<'_> {
         tally::add_step(stats, count);
         Ok(())
     }
+}
+
+/// Coordinates up to 1 in size, signed and normalised, in eight bits each.
+fn snorm8(v: [f32; 3]) -> u32 {
+    v.iter().rev().fold(0, |word, x| word << 8 | u32::from((x * 127.0).round() as i8 as u8))
 }
 
 /// A point whose radiance is its irradiance.

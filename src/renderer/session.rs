@@ -175,7 +175,7 @@ impl<'a> Session<'a> {
         let pass = pass.of_pass(picture, maps.first_sample)?;
         let mut stats = maps.stats().clone();
         if estimate.keeps_irradiance() && pass.final_rays() > 0 && !maps.maps().is_empty() {
-            let scouted = scouting(picture, pass.size, pass.final_rays());
+            let scouted = scouting(picture, pass.size, maps.settings().final_gather);
             let scout = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &scouted)?;
             // The scout of each pass looks at points of its own; that of the first is a single
             // picture's.

@@ -12,7 +12,7 @@ pub const FILTER_RADIUS: f32 = 4.0;
 
 /// A slot without a point.
 pub const NO_RECORD: IrradianceRecord =
-    IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], pad0: 0, mean_direction: [0.0; 3], pad1: 0 };
+    IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], mean_direction: 0 };
 
 /// The kernel and the records that it reads.
 #[derive(Debug)]
