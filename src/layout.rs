@@ -740,10 +740,12 @@ pub struct RecordGrid {
     pub reach: f32,
     /// Visible points.
     pub points: u32,
+    /// Pixels of the grid on each side of a point among which the filter looks for records.
+    pub window: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
-
-/// Pixels of the record grid on each side of a point among which the filter looks for records.
-pub const RECORD_REACH: u32 = 4;
 
 /// Irradiance kept for the points of a cell that lie on one surface.
 #[repr(C)]

@@ -24,8 +24,8 @@ pub fn check(bytes: &[u8]) -> Result<(), String> {
 fn settings(command: &Command) -> Option<Settings> {
     match command {
         Command::Render(args) => Some(args.settings()),
-        Command::Compare(args) => Some(args.options.settings()),
-        Command::Study(args) => Some(args.options.settings()),
+        Command::Compare(args) => Some(args.options.settings(Settings::default())),
+        Command::Study(args) => Some(args.options.settings(Settings::default())),
         Command::Merge(_) | Command::Status(_) | Command::Devices | Command::Info { .. } => None,
     }
 }

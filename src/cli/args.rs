@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use caustica::{
     compare::TOLERANCE,
-    settings::{EstimateSettings, PhotonSettings, Settings},
+    settings::{EstimateSettings, Mode, PhotonSettings, Quality, Settings},
 };
 use clap::{
     ArgAction, Parser, Subcommand,
@@ -14,10 +14,10 @@ use clap::{
 use super::{
     loading::LoadingOptions,
     merge_args::{MergeArgs, StatusArgs},
-    options::{RenderOptions, SearchArg},
+    options::{QualityArg, RenderOptions, SearchArg},
     pass_args::PassOptions,
     study_args::StudyArgs,
-    values::{irradiance_cells, output, radius, share_reach, tolerance, whole},
+    values::{gather_radius, irradiance_cells, output, radius, share_reach, tolerance, whole},
 };
 
 /// Caustica renders glTF scenes by photon mapping on the GPU, without a screen.
@@ -92,11 +92,17 @@ pub struct RenderArgs {
     #[arg(required_if_eq("search", "radius"))]
     pub radius: Option<f32>,
 
+    /// Photons, samples and final gathering of a picture for a purpose; single options override it
+    #[arg(long, value_name = "WHAT", value_enum, default_value = "normal", help_heading = "Picture")]
+    pub quality: QualityArg,
+
     /// Rays of final gathering per visible point: light over other surfaces is what these see of
-    /// the global map; 0 is none
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole(PhotonSettings::FINAL_GATHER))]
+    /// direct light and the maps; 0 takes it from the photons around the point itself [default: by
+    /// --quality, 64; 0 in other modes than hybrid and indirect-photons, with --raw-estimate, and
+    /// with other searches than the grid]
+    #[arg(long, value_name = "N", value_parser = whole(PhotonSettings::FINAL_GATHER))]
     #[arg(help_heading = "Estimate")]
-    pub final_gather: u32,
+    pub final_gather: Option<u32>,
 
     #[arg(help = format!(
         "Points on one surface share an estimate within this fraction of its radius, {}; 0 makes one for every sample",
@@ -113,11 +119,18 @@ pub struct RenderArgs {
     pub irradiance_cells: f32,
 
     #[arg(help = format!(
-        "Pixels between the points of final gathering, {}; the picture's points take the light of those around them; 0 gathers at every sample",
+        "Pixels between the points of final gathering, {}; samples take the light of those around them; 0 gathers at every sample [default: by --quality, 2]",
         EstimateSettings::GATHER_SPACING
     ))]
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole(EstimateSettings::GATHER_SPACING), help_heading = "Estimate")]
-    pub gather_spacing: u32,
+    #[arg(long, value_name = "N", value_parser = whole(EstimateSettings::GATHER_SPACING), help_heading = "Estimate")]
+    pub gather_spacing: Option<u32>,
+
+    #[arg(help = format!(
+        "Radius around a sample from which it takes that light, pixels, {} [default: by --quality, 8]",
+        EstimateSettings::GATHER_RADIUS
+    ))]
+    #[arg(long, value_name = "R", value_parser = gather_radius, help_heading = "Estimate")]
+    pub gather_radius: Option<f32>,
 
     #[command(flatten)]
     pub passes: PassOptions,
@@ -161,14 +174,40 @@ pub struct CompareArgs {
 impl RenderArgs {
     /// Converts the arguments to the library's settings.
     pub fn settings(&self) -> Settings {
-        self.options.settings().with(|s| {
-            s.photons.final_gather = self.final_gather;
+        let options = &self.options;
+        let quality = Quality::from(self.quality);
+        let goes = matches!(Mode::from(options.mode), Mode::Hybrid | Mode::IndirectPhotons)
+            && matches!(self.search, SearchArg::Grid)
+            && !options.shared.raw_estimate;
+        let gathers = self.final_gather.map_or(goes, |rays| rays > 0);
+        let base = if gathers { quality.settings() } else { quality.without_final_gather() };
+        options.settings(base).with(|s| {
+            s.photons.final_gather = self.final_gather.unwrap_or(s.photons.final_gather);
+            s.estimate.gather_spacing = self.gather_spacing.unwrap_or(s.estimate.gather_spacing);
+            s.estimate.gather_radius = self.gather_radius.unwrap_or(s.estimate.gather_radius);
             s.estimate.search = self.search.into();
             s.estimate.radius = self.radius;
             s.estimate.share_reach = self.share;
             s.estimate.irradiance_cells = self.irradiance_cells;
-            s.estimate.gather_spacing = self.gather_spacing;
         })
+    }
+
+    /// What the quality stands for, in the words of the other options.
+    pub fn quality_line(&self) -> String {
+        let Settings { photons, estimate, picture, .. } = self.settings();
+        format!(
+            "quality {}: --global-photons {} --caustic-photons {} -k {} --spp {} --light-samples {} --final-gather {} \
+             --gather-spacing {} --gather-radius {}",
+            Quality::from(self.quality).name(),
+            photons.global,
+            photons.caustic,
+            estimate.neighbors,
+            picture.spp,
+            picture.light_samples,
+            photons.final_gather,
+            estimate.gather_spacing,
+            estimate.gather_radius,
+        )
     }
 }
 
@@ -195,8 +234,23 @@ mod tests {
     }
 
     #[test]
-    fn without_options_the_settings_are_the_library_defaults() {
-        assert_eq!(settings(""), Settings::default());
+    fn without_options_the_settings_are_those_of_normal_quality() {
+        assert_eq!(settings(""), Quality::Normal.settings());
+        assert_eq!(settings("--final-gather 0"), Settings::default());
+        let high = settings("--quality high --spp 9 --final-gather 32");
+        let expected = Quality::High.settings().with(|s| {
+            s.picture.spp = 9;
+            s.photons.final_gather = 32;
+        });
+        assert_eq!(high, expected);
+    }
+
+    #[test]
+    fn estimates_of_the_report_do_without_final_gathering() {
+        for words in ["--mode photons", "--raw-estimate", "--search kdtree", "--search radius --radius 1"] {
+            let s = settings(words);
+            assert_eq!((s.photons.final_gather, s.estimate.gather_spacing, s.estimate.neighbors), (0, 0, 100), "{words}");
+        }
     }
 
     #[test]
@@ -218,7 +272,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_settings() {
         let s = settings(
-            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --share 0.5 --irradiance-cells 0.25 --gather-spacing 3 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
+            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --share 0.5 --irradiance-cells 0.25 --gather-spacing 3 --gather-radius 5 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
              --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
              --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
@@ -231,6 +285,7 @@ mod tests {
             s.estimate.share_reach = 0.5;
             s.estimate.irradiance_cells = 0.25;
             s.estimate.gather_spacing = 3;
+            s.estimate.gather_radius = 5.0;
             s.estimate.cone_constant = 1.5;
             s.estimate.max_radius = Some(0.25);
             s.photons.max_bounces = 0;

@@ -8,6 +8,7 @@ use caustica::{
     gpu::Gpu,
     progress::{Progress, Stage},
     scene::Scene,
+    settings::Settings,
 };
 
 use super::{args::CompareArgs, files::Files, progress::Display, render::RAW_NOTE, say::print};
@@ -22,7 +23,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     options.shared.environment.light([&mut scene])?;
     display.check()?;
     prepare(args, &scene)?;
-    let settings = options.settings();
+    let settings = options.settings(Settings::default());
     let gpu = Gpu::open(options.shared.device.as_deref())?;
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
     if !settings.estimate.raw {

@@ -4,7 +4,7 @@
 type Row = (&'static str, &'static str);
 
 /// Inputs that a message of the library can name.
-const FLAGS: [Row; 40] = [
+const FLAGS: [Row; 41] = [
     ("device", "--device"),
     ("estimate.cone_constant", "--cone-constant"),
     ("estimate.kernel", "--kernel"),
@@ -14,6 +14,7 @@ const FLAGS: [Row; 40] = [
     ("estimate.raw", "--raw-estimate"),
     ("estimate.search", "--search"),
     ("estimate.share_reach", "--share"),
+    ("estimate.gather_radius", "--gather-radius"),
     ("estimate.gather_spacing", "--gather-spacing"),
     ("estimate.irradiance_cells", "--irradiance-cells"),
     ("lights.photon_weights", "--light-photons"),

@@ -6,7 +6,7 @@ use caustica::{
     pixel_filter::PixelFilter,
     settings::{
         Crop, Emission, EstimateSettings, LightSampling, LightSettings, LightUnit, Mode, PhotonSettings,
-        PictureSettings, Range, Sampler, Search, Settings,
+        PictureSettings, Quality, Range, Sampler, Search, Settings,
     },
 };
 use clap::{
@@ -43,10 +43,13 @@ pub struct RenderOptions {
     #[arg(long, value_name = "N", value_parser = photons, allow_hyphen_values = true, help_heading = "Photons")]
     pub caustic_photons: Option<u32>,
 
-    #[arg(help = format!("Neighbours in the radiance estimate, {}", EstimateSettings::NEIGHBORS))]
-    #[arg(short = 'k', long, value_name = "K", default_value_t = 100, help_heading = "Estimate")]
+    #[arg(help = format!(
+        "Neighbours in the radiance estimate, {} [default: 100, 50 with final gathering by --quality]",
+        EstimateSettings::NEIGHBORS
+    ))]
+    #[arg(short = 'k', long, value_name = "K", help_heading = "Estimate")]
     #[arg(value_parser = whole(EstimateSettings::NEIGHBORS))]
-    pub neighbors: u32,
+    pub neighbors: Option<u32>,
 
     #[command(flatten)]
     pub shared: SharedOptions,
@@ -66,9 +69,10 @@ pub struct SharedOptions {
     pub light_photons: Vec<(String, f64)>,
 
     /// Samples of the direct light of emissive surfaces and the environment per visible point
-    #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Light")]
+    /// [default: 4]
+    #[arg(long, value_name = "N", help_heading = "Light")]
     #[arg(value_parser = whole(PictureSettings::LIGHT_SAMPLES))]
-    pub light_samples: u32,
+    pub light_samples: Option<u32>,
 
     /// Where photon paths are sent
     #[arg(long, value_name = "HOW", value_enum, default_value = "aimed", help_heading = "Photons")]
@@ -177,23 +181,23 @@ pub struct SharedOptions {
 }
 
 impl RenderOptions {
-    /// Converts the arguments to the library's settings.
-    pub fn settings(&self) -> Settings {
+    /// Converts the arguments to the library's settings; others are those of `base`.
+    pub fn settings(&self, base: Settings) -> Settings {
         let capacity = |own: Option<u32>, default| own.or(self.photons).unwrap_or(default);
-        self.shared.settings().with(|s| {
+        self.shared.settings(base).with(|s| {
             s.photons.mode = self.mode.into();
             s.photons.global = capacity(self.global_photons, s.photons.global);
             s.photons.caustic = capacity(self.caustic_photons, s.photons.caustic);
-            s.estimate.neighbors = self.neighbors;
+            s.estimate.neighbors = self.neighbors.unwrap_or(s.estimate.neighbors);
         })
     }
 }
 
 impl SharedOptions {
-    /// Converts the arguments to the library's settings. Mode, photons and neighbours stay at the
-    /// defaults.
-    pub fn settings(&self) -> Settings {
-        let Settings { photons, estimate, picture, .. } = Settings::default();
+    /// Converts the arguments to the library's settings. Mode, photons and neighbours stay at those
+    /// of `base`.
+    pub fn settings(&self, base: Settings) -> Settings {
+        let Settings { photons, estimate, picture, .. } = base;
         Settings {
             lights: LightSettings {
                 sampling: self.light_sampling.into(),
@@ -223,7 +227,7 @@ impl SharedOptions {
                 pixel_filter: self.pixel_filter.into(),
                 aperture: self.aperture.unwrap_or(picture.aperture),
                 focus: self.focus,
-                light_samples: self.light_samples,
+                light_samples: self.light_samples.unwrap_or(picture.light_samples),
             },
         }
     }
@@ -330,6 +334,17 @@ value_enum!(SearchArg => Search {
     KdTree,
     /// All photons within --radius, in the grid
     Radius,
+});
+
+value_enum!(QualityArg => Quality {
+    /// To look at while a scene is made
+    Draft,
+    /// Clean where light is smooth
+    Normal,
+    /// Clean edges and penumbrae as well
+    High,
+    /// As good as one pass can be
+    Final,
 });
 
 value_enum!(SamplerArg => Sampler {

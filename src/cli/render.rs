@@ -65,6 +65,9 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     files.read_scene(&scene)?;
     display.check()?;
     display.note(&light_unit_line(&settings));
+    if options.shared.verbose {
+        display.note(&args.quality_line());
+    }
     if settings.estimate.search == Search::KdTree && !settings.estimate.raw {
         display.note(RAW_NOTE);
     }

@@ -12,7 +12,7 @@ use caustica::{
     gpu::Gpu,
     image::read_exr,
     scene::{LoadOptions, Scene},
-    settings::Mode,
+    settings::{Mode, Settings},
     study::{self, Finer, Look, Plan, Reference, Results, Subject},
 };
 
@@ -89,7 +89,7 @@ fn verdict(results: &Results, folder: &Path) -> Result<()> {
 fn plan(args: &StudyArgs) -> Result<Plan> {
     let options = &args.options;
     let look = Look { exposure: options.exposure.of_all(), tonemap: options.tonemap.into() };
-    let settings = options.settings();
+    let settings = options.settings(Settings::default());
     if args.preset == Some(PresetArg::Report) {
         if options.loading.options() != LoadOptions::default() {
             let problem = "has scenes of its own, which --scene, --variant, --texture-size, --allow-outside and \

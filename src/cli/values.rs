@@ -109,6 +109,11 @@ pub fn irradiance_cells(text: &str) -> Result<f32, String> {
     in_range(text, EstimateSettings::IRRADIANCE_CELLS, "a number ")
 }
 
+/// A distance in the picture, pixels.
+pub fn gather_radius(text: &str) -> Result<f32, String> {
+    in_range(text, EstimateSettings::GATHER_RADIUS, "a number ")
+}
+
 /// A relative difference.
 pub fn tolerance(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|t| *t >= 0.0 && t.is_finite());

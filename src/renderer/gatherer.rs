@@ -11,8 +11,8 @@ use crate::{
     layout::{Gathered, IrradianceRecord, RecordGrid, VisiblePoint, octahedral},
     map_kind::MapKind,
     passes::{
-        EstimateRequest, EstimateSharing, FILTER_RADIUS, Gather, GatherOptions, GatherSettings, IrradianceCache,
-        IrradianceRecords, NO_RECORD, PhotonMap, StepCount, Tile,
+        EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
+        NO_RECORD, PhotonMap, StepCount, Tile, filter_window,
     },
     progress::Progress,
     reference::{Estimate, KdMap},
@@ -204,8 +204,10 @@ impl Gatherer for MapGatherer<'_> {
             rows: window.height,
             columns_per_pixel: per_pixel(coarse.size.0, size.0),
             rows_per_pixel: per_pixel(coarse.size.1, size.1),
-            reach: FILTER_RADIUS * coarse.tracer.pixel_height(),
-            points: 0,
+            // Of the picture's pixels.
+            reach: self.estimate.gather_radius * coarse.tracer.pixel_height() * per_pixel(coarse.size.1, size.1),
+            window: filter_window(self.estimate.gather_radius, self.estimate.gather_spacing),
+            ..Default::default()
         };
         self.records = Some(IrradianceRecords::new(coarse.gpu, &records, grid)?);
         Ok(())

@@ -11,8 +11,7 @@ use crate::{
     error::Result,
     gpu::Gpu,
     image::{Film, Frame},
-    layout::RECORD_REACH,
-    passes::{CameraKernels, EstimateSharing, MapKernels, PathRanges, PhotonTracer},
+    passes::{CameraKernels, EstimateSharing, MapKernels, PathRanges, PhotonTracer, filter_window},
     pixel_filter::PixelFilter,
     progress::{Progress, Stage},
     scene::Scene,
@@ -184,7 +183,7 @@ impl<'a> Session<'a> {
             gatherer.prepare(&scout, &mut stats, progress)?;
         }
         if estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty() {
-            let coarse = coarser(picture, pass.size, estimate.gather_spacing);
+            let coarse = coarser(picture, pass.size, estimate);
             let single = EstimateSettings { share_reach: 0.0, ..estimate.clone() };
             let records = CameraPass::new(self.gpu, scene, camera, maps.settings(), &single, &coarse)?;
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
@@ -198,13 +197,15 @@ impl<'a> Session<'a> {
 
 /// Settings of a coarser version of the part of the picture that is rendered, and what surrounds it
 /// as far as the filter of records reaches.
-fn coarser(picture: &PictureSettings, size: (u32, u32), spacing: u32) -> PictureSettings {
+fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSettings) -> PictureSettings {
+    let spacing = estimate.gather_spacing;
+    let reach = filter_window(estimate.gather_radius, spacing);
     let window = picture.window(size);
     let along = |pixels: u32, origin: u32, count: u32| {
         let side = pixels.div_ceil(spacing);
         let place = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
-        let first = place(origin).saturating_sub(RECORD_REACH + 1);
-        (side, first, (place(origin + count) + RECORD_REACH + 2).min(side) - first)
+        let first = place(origin).saturating_sub(reach + 1);
+        (side, first, (place(origin + count) + reach + 2).min(side) - first)
     };
     let (columns, column, width) = along(size.0, window.column, window.width);
     let (rows, row, height) = along(size.1, window.row, window.height);

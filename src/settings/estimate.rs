@@ -55,6 +55,9 @@ pub struct EstimateSettings {
     /// [`Self::GATHER_SPACING`]; others take the irradiance of those around them. 0: at every
     /// camera sample.
     pub gather_spacing: u32,
+    /// Radius around a visible point from which it takes irradiance then, pixels, in
+    /// [`Self::GATHER_RADIUS`].
+    pub gather_radius: f32,
 }
 
 impl Default for EstimateSettings {
@@ -70,6 +73,7 @@ impl Default for EstimateSettings {
             share_reach: 2.0,
             irradiance_cells: 0.5,
             gather_spacing: 0,
+            gather_radius: 8.0,
         }
     }
 }
@@ -90,6 +94,8 @@ impl EstimateSettings {
 
     /// Range of [`Self::gather_spacing`], pixels.
     pub const GATHER_SPACING: Range<u32> = Range::closed(0, 16);
+    /// Range of [`Self::gather_radius`], pixels.
+    pub const GATHER_RADIUS: Range<f32> = Range::closed(0.5, 64.0);
 
     /// Whether irradiance is kept in cells. Estimates to compare with are made at each point.
     pub(crate) fn keeps_irradiance(&self) -> bool {
@@ -113,6 +119,7 @@ impl EstimateSettings {
         Self::SHARE_REACH.check("estimate.share_reach", self.share_reach)?;
         Self::IRRADIANCE_CELLS.check("estimate.irradiance_cells", self.irradiance_cells)?;
         Self::GATHER_SPACING.check("estimate.gather_spacing", self.gather_spacing)?;
+        Self::GATHER_RADIUS.check("estimate.gather_radius", self.gather_radius)?;
         match (self.search, self.radius) {
             (Search::Radius, None) => fail("estimate.search", "radius".to_string(), "needs a radius"),
             (Search::Radius, Some(radius)) => Self::RADIUS.check("estimate.radius", radius),

@@ -6,6 +6,7 @@ mod loading;
 mod passes;
 mod photons;
 mod picture;
+mod quality;
 mod range;
 mod render_settings;
 
@@ -15,6 +16,7 @@ pub use loading::LoadOptions;
 pub use passes::{PassRange, PassSettings};
 pub use photons::{Emission, MAX_BOUNCES, Mode, PhotonSettings, Sampler};
 pub use picture::{Crop, PictureSettings};
+pub use quality::Quality;
 pub use range::{Number, Range};
 pub use render_settings::Settings;
 pub(crate) use render_settings::check_samples;

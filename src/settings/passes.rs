@@ -33,6 +33,8 @@ impl PassSettings {
     /// of them at least ([`crate::density::Density::of_few`]), so that fewer neighbours than about
     /// this would not make the radius smaller.
     pub const MIN_NEIGHBORS: u32 = 5;
+    /// Radius from which irradiance is taken at least, pixels.
+    const MIN_GATHER_RADIUS: f32 = 0.5;
 
     /// Squared radius of pass `index`, relative to that of pass 0: Π (j + α)/(j + 1) over j = 1 to
     /// `index` (Knaus and Zwicker 2011, "Progressive Photon Mapping: A Probabilistic Approach").
@@ -51,6 +53,7 @@ impl PassSettings {
             neighbors: neighbors.max(Self::MIN_NEIGHBORS.min(first.neighbors)),
             radius: first.radius.map(shrunken),
             max_radius: first.max_radius.map(shrunken),
+            gather_radius: shrunken(first.gather_radius).max(Self::MIN_GATHER_RADIUS),
             ..first.clone()
         }
     }
@@ -147,6 +150,7 @@ mod tests {
         assert_eq!(tenth.neighbors, (100.0 * area).round() as u32);
         assert!((f64::from(tenth.radius.expect("one")).powi(2) / 4.0 - area).abs() < 1e-6);
         assert!((f64::from(tenth.max_radius.expect("one")).powi(2) / 16.0 - area).abs() < 1e-6);
+        assert!((f64::from(tenth.gather_radius).powi(2) / 64.0 - area).abs() < 1e-6);
         assert_eq!(passes.bandwidth(&first, 10), f64::from(tenth.neighbors) / 100.0);
         assert_eq!(passes.bandwidth(&EstimateSettings { search: Search::Radius, ..first.clone() }, 10), area);
         assert_eq!(passes.estimate(&first, 1_000_000).neighbors, PassSettings::MIN_NEIGHBORS);

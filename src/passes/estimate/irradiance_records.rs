@@ -7,8 +7,16 @@ use crate::{
     layout::{CameraTile, IrradianceRecord, RecordGrid},
 };
 
-/// Radius of the filter, in pixels of the record grid.
-pub const FILTER_RADIUS: f32 = 4.0;
+/// Pixels of the record grid on each side of a point among which the filter looks for records at
+/// most.
+const MAX_WINDOW: u32 = 8;
+
+/// Pixels of the record grid on each side of a point among which a filter of that radius, in pixels
+/// of the picture, looks for records.
+#[must_use]
+pub fn filter_window(radius: f32, spacing: u32) -> u32 {
+    ((radius / spacing as f32).ceil() as u32).clamp(1, MAX_WINDOW)
+}
 
 /// A slot without a point.
 pub const NO_RECORD: IrradianceRecord =
@@ -23,8 +31,7 @@ pub struct IrradianceRecords {
 }
 
 impl IrradianceRecords {
-    /// Takes records in the order of `grid`, whose points and reach are left open. `pixel`: pixels
-    /// of the picture along the side of one of the grid.
+    /// Takes records by the rows of `grid`, whose number of points is left open.
     ///
     /// # Errors
     /// Limits of the adapter.
