@@ -284,6 +284,11 @@ pub struct Light {
     /// Triangle: number of parts along an edge of its triangle; 0 or 1 if the light is all of it.
     /// The parts are consecutive lights, row by row.
     pub side: u32,
+    /// Index of its leaf among the [`LightNode`]s, or [`NO_LEAF`].
+    pub leaf: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// Set in [`Light::part`] for a part that is turned by half a turn against its triangle.
@@ -305,6 +310,58 @@ pub struct LightChoice {
     pub cdf: f32,
     /// Probability of this light: the difference to its predecessor.
     pub probability: f32,
+}
+
+/// Roots of the trees of lights, the first [`LightNode`]s: that of the environment, that of the
+/// surfaces (with points and spots where they are many), that of directional lights, and that of few
+/// points and spots. Where directional lights are few as well, light samples of visible points use
+/// the first [`EMITTER_ROOTS`] only.
+pub const LIGHT_ROOTS: u32 = 4;
+pub const ENVIRONMENT_ROOT: u32 = 0;
+pub const EMITTER_ROOT: u32 = 1;
+pub const DIRECTIONAL_ROOT: u32 = 2;
+pub const PUNCTUAL_ROOT: u32 = 3;
+pub const EMITTER_ROOTS: u32 = 2;
+/// In place of the leaf of a light that is never chosen: none.
+pub const NO_LEAF: u32 = u32::MAX;
+/// Bits of [`LightNode::next`]: the node is a leaf; its surfaces may shine along the opposite cone as
+/// well; its lights are at infinity.
+pub const LEAF_BIT: u32 = 0x8000_0000;
+pub const BOTH_WAYS_BIT: u32 = 0x4000_0000;
+pub const FAR_BIT: u32 = 0x2000_0000;
+/// Mask there of the index.
+pub const NEXT_MASK: u32 = FAR_BIT - 1;
+
+/// Node of a tree by which direct light chooses a light: bounds of one light or several, see
+/// `src/emitters/light_bounds.rs`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LightNode {
+    /// Sphere around the lights, metres.
+    pub center: [f32; 3],
+    pub radius: f32,
+    /// Axis of the cone along which they shine, a unit vector.
+    pub axis: [f32; 3],
+    /// Sum of their greatest radiant intensities, or of the irradiance by lights at infinity,
+    /// relative to those of all lights.
+    pub intensity: f32,
+    /// Cosine of the half angle of the cone, and of the angle from there on beyond which nothing
+    /// shines.
+    pub cos_spread: f32,
+    pub cos_falloff: f32,
+    /// Leaf: index of the light. Others: of the first of two children, which are neighbours. With
+    /// [`LEAF_BIT`], [`BOTH_WAYS_BIT`], [`FAR_BIT`].
+    pub next: u32,
+    /// Index of the parent; of a root its own.
+    pub parent: u32,
+}
+
+impl LightNode {
+    /// Index of the light of a leaf.
+    #[must_use]
+    pub fn light(&self) -> u32 {
+        self.next & NEXT_MASK
+    }
 }
 
 /// Sphere around all geometry.
@@ -390,16 +447,6 @@ pub struct VisiblePoint {
     /// the normal and at grazing angles, strongest colour of the sheen and its roughness. 0 for
     /// nothing.
     pub above: u32,
-}
-
-/// Lights of [`LobePoint`]s.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct LobeLight {
-    pub light_count: u32,
-    pub pad0: u32,
-    pub pad1: u32,
-    pub pad2: u32,
 }
 
 /// Vertex of a camera path at which rough lobes are lit. Unit vectors are octahedral, see
@@ -673,8 +720,8 @@ pub struct EmitterSample {
     /// Index of the sample, and number of samples per point.
     pub sample: u32,
     pub samples: u32,
-    /// Entries of the table of lights.
-    pub light_count: u32,
+    /// Number of trees of lights that are sampled, [`EMITTER_ROOTS`] or one more.
+    pub roots: u32,
 }
 
 /// Arguments of `start_final_gather`: one ray of each visible point.

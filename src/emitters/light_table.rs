@@ -1,5 +1,5 @@
-//! All lights of a scene, as one list for the device, and the tables by which passes choose from
-//! it.
+//! All lights of a scene, as one list for the device, and the tables and trees by which passes
+//! choose from it.
 //!
 //! Punctual lights come first, then emissive triangles and spheres, material by material, then the
 //! environment. A group is what a user calls one light: a punctual light, all surfaces of one
@@ -11,10 +11,13 @@ use std::{
 };
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::{
     cumulative::{MAX_CHOICES, cumulative, probabilities},
     environment_map::EnvironmentMap,
+    light_bounds::LightBounds,
+    light_tree::LightTrees,
     surface_lights::{SurfaceLight, SurfaceLights},
     targets::Target,
 };
@@ -28,6 +31,9 @@ use crate::{
 /// Least share that paths take of what a part of a surface would emit if nothing darkened it: its
 /// mean may miss what is bright between the points by which it is taken.
 const MIN_SHARE: f64 = 1.0 / 64.0;
+/// Maximum number of points and spots, and of directional lights, whose direct light at a visible
+/// point is the sum over all of them. Of more, light samples choose.
+pub const MAX_SUMMED: usize = 16;
 
 /// A group of lights: what a user calls one light.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,8 +52,12 @@ pub struct LightTable {
     /// Sorted by group.
     pub lights: Vec<layout::Light>,
     pub groups: Vec<LightGroup>,
-    /// Number of punctual lights, the first ones in `lights`.
-    pub punctual: usize,
+    /// The trees by which direct light chooses.
+    pub trees: LightTrees,
+    /// Indices of the punctual lights that visible points sum over.
+    pub summed: Vec<u32>,
+    /// Number of trees that light samples of visible points choose from.
+    pub sampled_roots: u32,
     /// The emission of some surface varies: it has lights with a [`layout::Light::material`].
     pub is_varied: bool,
     /// Materials that shine nowhere, one line each.
@@ -80,7 +90,6 @@ impl LightTable {
         for light in &scene.lights {
             table.add_punctual(light, around.radius, settings.unit);
         }
-        table.punctual = table.lights.len();
         table.add_surfaces(scene, settings.unit);
         if let (Some(environment), Some(map)) = (&scene.environment, environment) {
             let power = DVec3::from(map.integral) * PI * f64::from(around.radius).powi(2);
@@ -93,7 +102,32 @@ impl LightTable {
             return Err(Error::Scene { path: scene.path.clone(), place: "materials".to_owned(), problem });
         }
         table.check_names(settings)?;
+        table.plant_trees(environment);
         Ok(table)
+    }
+
+    /// Divides the lights into those that visible points sum over and those that they sample, and
+    /// builds the trees.
+    fn plant_trees(&mut self, environment: Option<&EnvironmentMap>) {
+        let count = |kinds: &[u32]| self.lights.iter().filter(|light| kinds.contains(&light.kind)).count();
+        let sums_places = count(&[layout::POINT_LIGHT, layout::SPOT_LIGHT]) <= MAX_SUMMED;
+        let sums_directions = count(&[layout::DIRECTIONAL_LIGHT]) <= MAX_SUMMED;
+        let root = |light: &layout::Light| match light.kind {
+            layout::POINT_LIGHT | layout::SPOT_LIGHT if sums_places => layout::PUNCTUAL_ROOT,
+            layout::DIRECTIONAL_LIGHT => layout::DIRECTIONAL_ROOT,
+            layout::ENVIRONMENT_LIGHT => layout::ENVIRONMENT_ROOT,
+            _ => layout::EMITTER_ROOT,
+        };
+        self.sampled_roots = layout::EMITTER_ROOTS + u32::from(!sums_directions);
+        let is_summed = |light: &layout::Light| root(light) >= self.sampled_roots;
+        self.summed = (0..).zip(&self.lights).filter(|(_, light)| is_summed(light)).map(|(i, _)| i).collect();
+        // The mean irradiance of surfaces under the environment, which face it in any direction.
+        let sky = environment.map_or(0.0, |map| map.integral.iter().sum::<f64>() / 12.0);
+        let strengths: Vec<f64> = self.lights.iter().zip(&self.powers).map(|(l, power)| strength(l, *power, sky)).collect();
+        let total: f64 = strengths.iter().sum();
+        let bounds = self.lights.par_iter().zip(strengths).map(|(light, s)| LightBounds::new(light, s / total)).collect::<Vec<_>>();
+        self.trees = LightTrees::new(&bounds, |i| root(&self.lights[i]));
+        self.lights.iter_mut().zip(&self.trees.leaves).for_each(|(light, leaf)| light.leaf = *leaf);
     }
 
     /// Index of a primitive's first light, plus one; 0 if the primitive does not emit light.
@@ -108,10 +142,17 @@ impl LightTable {
         !self.emitters.is_empty()
     }
 
-    /// Some light is not punctual, so that its direct light must be sampled.
+    /// Some light is not punctual, so that rays may meet it.
     #[must_use]
     pub fn has_extent(&self) -> bool {
-        self.powers[self.punctual..].iter().any(|power| *power > 0.0)
+        let is_met = |light: &layout::Light| light.kind >= layout::TRIANGLE_LIGHT && light.leaf != layout::NO_LEAF;
+        self.lights.iter().any(is_met)
+    }
+
+    /// Visible points have lights to sample.
+    #[must_use]
+    pub fn is_sampled(&self) -> bool {
+        self.trees.nodes.iter().take(self.sampled_roots as usize).any(|root| root.intensity > 0.0)
     }
 
     /// Power of all lights, W, mean of the channels.
@@ -133,14 +174,6 @@ impl LightTable {
     pub fn for_aimed_photons(&self, targets: &[Target], around: &Target, settings: &LightSettings) -> Choices {
         let aimed = |(light, power): (&layout::Light, &f64)| power * aimed_fraction(light, targets, around);
         self.choices(self.lights.iter().zip(&self.powers).map(aimed).collect(), settings)
-    }
-
-    /// Table for direct light of all lights but the punctual ones: in proportion to power.
-    #[must_use]
-    pub fn for_direct_light(&self) -> Choices {
-        let mut powers = self.powers.clone();
-        powers[..self.punctual].fill(0.0);
-        Choices { entries: entries(&powers), strata: 1 }
     }
 
     fn choices(&self, powers: Vec<f64>, settings: &LightSettings) -> Choices {
@@ -240,6 +273,19 @@ impl LightTable {
         let names: Vec<String> = self.groups.iter().map(|group| format!("{:?}", group.name)).collect();
         let problem = format!("no light is called {name:?}; the scene has {}", names.join(", "));
         Err(Error::Setting { name: "lights.photon_weights", value: format!("{name}={weight}"), problem })
+    }
+}
+
+/// Greatest radiant intensity of a light, W/sr; of a light at infinity the irradiance that it gives,
+/// W/m².
+fn strength(light: &layout::Light, power: f64, sky: f64) -> f64 {
+    let mean = light.emission.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
+    match light.kind {
+        layout::DIRECTIONAL_LIGHT => mean,
+        layout::ENVIRONMENT_LIGHT => sky,
+        // A sphere shows a quarter of its surface.
+        layout::SPHERE_LIGHT => power / (4.0 * f64::from(light.solid_angle)),
+        _ => power / f64::from(light.solid_angle),
     }
 }
 
