@@ -284,11 +284,11 @@ pub struct Light {
     /// Triangle: number of parts along an edge of its triangle; 0 or 1 if the light is all of it.
     /// The parts are consecutive lights, row by row.
     pub side: u32,
-    /// Index of its leaf among the [`LightNode`]s, or [`NO_LEAF`].
+    /// Index of its leaf among the [`LightNode`]s, or [`NO_LEAF`], and of the root of its tree.
     pub leaf: u32,
+    pub root: u32,
     pub pad0: u32,
     pub pad1: u32,
-    pub pad2: u32,
 }
 
 /// Set in [`Light::part`] for a part that is turned by half a turn against its triangle.
@@ -333,34 +333,35 @@ pub const FAR_BIT: u32 = 0x2000_0000;
 pub const NEXT_MASK: u32 = FAR_BIT - 1;
 
 /// Node of a tree by which direct light chooses a light: bounds of one light or several, see
-/// `src/emitters/light_bounds.rs`.
+/// `src/emitters/light_bounds.rs`. It consists of vectors of four words, as [`BvhNode`] does.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LightNode {
-    /// Sphere around the lights, metres.
-    pub center: [f32; 3],
-    pub radius: f32,
-    /// Axis of the cone along which they shine, a unit vector.
-    pub axis: [f32; 3],
-    /// Sum of their greatest radiant intensities, or of the irradiance by lights at infinity,
-    /// relative to those of all lights.
-    pub intensity: f32,
-    /// Cosine of the half angle of the cone, and of the angle from there on beyond which nothing
-    /// shines.
-    pub cos_spread: f32,
-    pub cos_falloff: f32,
-    /// Leaf: index of the light. Others: of the first of two children, which are neighbours. With
-    /// [`LEAF_BIT`], [`BOTH_WAYS_BIT`], [`FAR_BIT`].
-    pub next: u32,
-    /// Index of the parent; of a root its own.
-    pub parent: u32,
+    /// Centre and radius of the sphere around the lights, metres.
+    pub sphere: [f32; 4],
+    /// Word 0: axis of the cone along which they shine, octahedral. Word 1: cosines of its half
+    /// angle, and of the angle from there on beyond which nothing shines; each a 16-bit snorm
+    /// number, rounded down. Word 2: bits of the sum of their greatest radiant intensities, or of
+    /// the irradiance by lights at infinity, relative to that of all lights. Word 3, [`Self::next`].
+    pub shine: [u32; 4],
 }
 
 impl LightNode {
-    /// Index of the light of a leaf.
+    /// Leaf: index of the light. Others: of the first of two children, which are neighbours. With
+    /// [`LEAF_BIT`], [`BOTH_WAYS_BIT`], [`FAR_BIT`].
     #[must_use]
-    pub fn light(&self) -> u32 {
-        self.next & NEXT_MASK
+    pub fn next(&self) -> u32 {
+        self.shine[3]
+    }
+
+    #[must_use]
+    pub fn is_leaf(&self) -> bool {
+        self.next() & LEAF_BIT != 0
+    }
+
+    #[must_use]
+    pub fn intensity(&self) -> f32 {
+        f32::from_bits(self.shine[2])
     }
 }
 

@@ -7,14 +7,18 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use glam::{Quat, Vec3};
 
 use crate::{
-    layout::{self, BOTH_WAYS_BIT, FAR_BIT, LightNode},
+    layout::{self, BOTH_WAYS_BIT, FAR_BIT, LightNode, octahedral},
     scene::Bounds,
 };
 
-/// Angles that are added to cones against the rounding of their unions, radians, and taken from
-/// cosines against that of the kernels.
+/// What is added to cones against the rounding of their unions, radians, and to spheres relative to
+/// their radius.
 const ANGLE_SLACK: f32 = 1e-5;
-const COSINE_SLACK: f32 = 1e-6;
+const RADIUS_SLACK: f32 = 1e-6;
+/// Steps of a 16-bit snorm number from 0 to 1, and those by which the falloff's cosine is lowered
+/// for the rounding of axes.
+const COSINE_STEPS: i16 = i16::MAX;
+const FALLOFF_SLACK: i16 = 4;
 
 /// Bounds of one light or several. Lights at infinity (`is_far`) have no place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,27 +98,26 @@ impl LightBounds {
         self.intensity * solid_angle_measure(self.spread, self.falloff) * size
     }
 
-    /// The node of these bounds. `next` and `parent` as in [`LightNode`].
-    pub fn node(&self, next: u32, parent: u32) -> LightNode {
+    /// The node of these bounds. `next` as in [`LightNode::next`], without its bits for bounds.
+    pub fn node(&self, next: u32) -> LightNode {
         let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
         let radius = 0.5 * (self.place.max - self.place.min).length();
+        let middle = 0.5 * (self.place.min + self.place.max);
+        // A single direction is exact.
+        let spread = if self.spread > 0.0 { lowered(self.spread.cos(), 0) } else { COSINE_STEPS };
+        let cones = spread as u16 as u32 | ((lowered(self.falloff.cos(), FALLOFF_SLACK) as u16 as u32) << 16);
+        let next = next | bit(self.both_ways, BOTH_WAYS_BIT) | bit(self.is_far, FAR_BIT);
         LightNode {
-            center: (0.5 * (self.place.min + self.place.max)).to_array(),
             // The corners round.
-            radius: radius * (1.0 + COSINE_SLACK),
-            axis: self.axis.to_array(),
-            intensity: self.intensity,
-            cos_spread: lowered(self.spread.cos(), self.spread > 0.0),
-            cos_falloff: self.falloff.cos() - COSINE_SLACK,
-            next: next | bit(self.both_ways, BOTH_WAYS_BIT) | bit(self.is_far, FAR_BIT),
-            parent,
+            sphere: middle.extend(radius * (1.0 + RADIUS_SLACK)).to_array(),
+            shine: [octahedral(self.axis), cones, self.intensity.to_bits(), next],
         }
     }
 }
 
-/// A cosine of which kernels compute no smaller sine than that of the angle.
-fn lowered(cosine: f32, is_cone: bool) -> f32 {
-    if is_cone { (cosine - COSINE_SLACK).max(-1.0) } else { cosine }
+/// The 16-bit snorm number below a cosine, and `slack` steps below that.
+fn lowered(cosine: f32, slack: i16) -> i16 {
+    ((cosine * f32::from(COSINE_STEPS)).floor() as i16).saturating_sub(slack).max(-COSINE_STEPS)
 }
 
 /// The angle of which 1 − cos is `height`.

@@ -126,8 +126,10 @@ impl LightTable {
         let strengths: Vec<f64> = self.lights.iter().zip(&self.powers).map(|(l, power)| strength(l, *power, sky)).collect();
         let total: f64 = strengths.iter().sum();
         let bounds = self.lights.par_iter().zip(strengths).map(|(light, s)| LightBounds::new(light, s / total)).collect::<Vec<_>>();
-        self.trees = LightTrees::new(&bounds, |i| root(&self.lights[i]));
-        self.lights.iter_mut().zip(&self.trees.leaves).for_each(|(light, leaf)| light.leaf = *leaf);
+        self.trees = LightTrees::new(&bounds, self.lights.iter().map(root).collect());
+        for (light, (leaf, root)) in self.lights.iter_mut().zip(self.trees.leaves.iter().zip(&self.trees.roots)) {
+            (light.leaf, light.root) = (*leaf, *root);
+        }
     }
 
     /// Index of a primitive's first light, plus one; 0 if the primitive does not emit light.
@@ -152,7 +154,7 @@ impl LightTable {
     /// Visible points have lights to sample.
     #[must_use]
     pub fn is_sampled(&self) -> bool {
-        self.trees.nodes.iter().take(self.sampled_roots as usize).any(|root| root.intensity > 0.0)
+        self.trees.nodes.iter().take(self.sampled_roots as usize).any(|root| root.intensity() > 0.0)
     }
 
     /// Power of all lights, W, mean of the channels.

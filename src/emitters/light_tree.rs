@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::light_bounds::LightBounds;
 use crate::{
-    layout::{LEAF_BIT, LIGHT_ROOTS, LightNode, NO_LEAF},
+    layout::{LEAF_BIT, LIGHT_ROOTS, LightNode, NEXT_MASK, NO_LEAF},
     scene::Bounds,
 };
 
@@ -26,6 +26,8 @@ pub struct LightTrees {
     pub nodes: Vec<LightNode>,
     /// The leaf of each light, [`NO_LEAF`] for lights that are never chosen.
     pub leaves: Vec<u32>,
+    /// The root of each light's tree.
+    pub roots: Vec<u32>,
 }
 
 /// A light with its bounds.
@@ -42,69 +44,57 @@ struct Subtree {
     bounds: LightBounds,
 }
 
-/// Place of a node: its index and its parent's, and that of the first node below it.
-#[derive(Clone, Copy)]
-struct Place {
-    own: u32,
-    parent: u32,
-    below: u32,
-}
-
 impl LightTrees {
-    /// Trees over the lights that have bounds. `root` says in which one each light is.
-    pub(super) fn new(bounds: &[Option<LightBounds>], root: impl Fn(usize) -> u32) -> Self {
+    /// Trees over the lights that have bounds; `roots` says which tree each light belongs to.
+    pub(super) fn new(bounds: &[Option<LightBounds>], roots: Vec<u32>) -> Self {
         let mut trees: Vec<Vec<Item>> = vec![Vec::new(); LIGHT_ROOTS as usize];
-        for (i, bounds) in bounds.iter().enumerate() {
-            if let Some(bounds) = *bounds {
-                trees[root(i) as usize].push(Item { bounds, light: i as u32 });
-            }
+        for (light, (bounds, root)) in (0..).zip(bounds.iter().zip(&roots)) {
+            trees[*root as usize].extend(bounds.map(|bounds| Item { bounds, light }));
         }
         // A tree of n leaves has n − 1 pairs of children.
         let pairs: usize = trees.iter().map(|items| items.len().saturating_sub(1)).sum();
         let mut nodes = vec![LightNode::default(); LIGHT_ROOTS as usize + 2 * pairs];
-        let (roots, mut below) = nodes.split_at_mut(LIGHT_ROOTS as usize);
+        let (tops, mut below) = nodes.split_at_mut(LIGHT_ROOTS as usize);
         let mut first = LIGHT_ROOTS;
-        for (own, items) in (0..LIGHT_ROOTS).zip(&mut trees) {
+        for (top, items) in tops.iter_mut().zip(&mut trees) {
             if items.is_empty() {
-                roots[own as usize] = LightNode { next: LEAF_BIT, ..Default::default() };
+                *top = LightNode { shine: [0, 0, 0, LEAF_BIT], ..Default::default() };
                 continue;
             }
-            let (these, others) = std::mem::take(&mut below).split_at_mut(2 * (items.len() - 1));
-            roots[own as usize] = subtree(items, these, Place { own, parent: own, below: first }, 0).node;
-            first += these.len() as u32;
+            let (own, others) = std::mem::take(&mut below).split_at_mut(2 * (items.len() - 1));
+            let count = own.len() as u32;
+            *top = subtree(items, own, first, 0).node;
+            first += count;
             below = others;
         }
         let mut leaves = vec![NO_LEAF; bounds.len()];
-        for (index, node) in (0..).zip(&nodes) {
-            if node.intensity > 0.0 && node.next & LEAF_BIT != 0 {
-                leaves[node.light() as usize] = index;
-            }
+        let is_light = |node: &LightNode| node.is_leaf() && node.intensity() > 0.0;
+        for (index, node) in (0..).zip(&nodes).filter(|(_, node)| is_light(node)) {
+            leaves[(node.next() & NEXT_MASK) as usize] = index;
         }
-        Self { nodes, leaves }
+        Self { nodes, leaves, roots }
     }
 }
 
-/// Builds the tree of `items`, the nodes below its uppermost one in `slots`. Children are pairs of
-/// neighbours; those of the first child come before those of the second.
-fn subtree(items: &mut [Item], slots: &mut [LightNode], place: Place, depth: u32) -> Subtree {
+/// Builds the tree of `items`, the nodes below its uppermost one in `slots`, the first of which has
+/// the index `first`. Children are pairs of neighbours. What is below the first child comes before
+/// what is below the second, by which kernels find the way to a leaf.
+fn subtree(items: &mut [Item], slots: &mut [LightNode], first: u32, depth: u32) -> Subtree {
     if let [item] = items {
-        return Subtree { node: item.bounds.node(item.light | LEAF_BIT, place.parent), bounds: item.bounds };
+        return Subtree { node: item.bounds.node(item.light | LEAF_BIT), bounds: item.bounds };
     }
+    let is_large = items.len() > PARALLEL;
     let count = divide(items, depth);
-    let (first, second) = items.split_at_mut(count);
+    let (items, others) = items.split_at_mut(count);
     let (pair, slots) = slots.split_at_mut(2);
-    let (of_first, of_second) = slots.split_at_mut(2 * (count - 1));
-    let [own, below] = [place.below, place.below + 2];
-    let places = [(own, below), (own + 1, below + of_first.len() as u32)];
-    let [one, two] = places.map(|(own, below)| Place { own, parent: place.own, below });
-    let is_large = first.len() + second.len() > PARALLEL;
-    let mut build_first = || subtree(first, of_first, one, depth + 1);
-    let mut build_second = || subtree(second, of_second, two, depth + 1);
-    let (first, second) =
-        if is_large { rayon::join(build_first, build_second) } else { (build_first(), build_second()) };
-    (pair[0], pair[1]) = (first.node, second.node);
-    let bounds = first.bounds.union(second.bounds);
-    Subtree { node: bounds.node(place.below, place.parent), bounds }
+    let (own, rest) = slots.split_at_mut(2 * (count - 1));
+    let second = first + 2 + own.len() as u32;
+    let mut left = || subtree(items, own, first + 2, depth + 1);
+    let mut right = || subtree(others, rest, second, depth + 1);
+    let (left, right) = if is_large { rayon::join(left, right) } else { (left(), right()) };
+    (pair[0], pair[1]) = (left.node, right.node);
+    let bounds = left.bounds.union(right.bounds);
+    Subtree { node: bounds.node(first), bounds }
 }
 
 /// Reorders the items into two parts and returns the size of the first, at least 1 and less than
