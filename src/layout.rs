@@ -312,16 +312,10 @@ pub struct LightChoice {
     pub probability: f32,
 }
 
-/// Roots of the trees of lights, the first [`LightNode`]s: that of the environment, that of the
-/// surfaces (with points and spots where they are many), that of directional lights, and that of few
-/// points and spots. Where directional lights are few as well, light samples of visible points use
-/// the first [`EMITTER_ROOTS`] only.
+/// Number of trees of lights, whose roots are the first [`LightNode`]s, and that of the environment
+/// among them; see `src/emitters/light_tree.rs`.
 pub const LIGHT_ROOTS: u32 = 4;
 pub const ENVIRONMENT_ROOT: u32 = 0;
-pub const EMITTER_ROOT: u32 = 1;
-pub const DIRECTIONAL_ROOT: u32 = 2;
-pub const PUNCTUAL_ROOT: u32 = 3;
-pub const EMITTER_ROOTS: u32 = 2;
 /// In place of the leaf of a light that is never chosen: none.
 pub const NO_LEAF: u32 = u32::MAX;
 /// Bits of [`LightNode::next`]: the node is a leaf; its surfaces may shine along the opposite cone as
@@ -721,7 +715,7 @@ pub struct EmitterSample {
     /// Index of the sample, and number of samples per point.
     pub sample: u32,
     pub samples: u32,
-    /// Number of trees of lights that are sampled, [`EMITTER_ROOTS`] or one more.
+    /// Number of trees of lights that are sampled.
     pub roots: u32,
 }
 

@@ -203,7 +203,8 @@ mod tests {
         assert!(LightBounds::new(&point, 1.0).is_some());
         let nowhere = layout::Light { position: [f32::NAN, 0.0, 0.0], ..point };
         let flat = layout::Light { kind: layout::TRIANGLE_LIGHT, e1: [1.0, 0.0, 0.0], ..point };
-        for (light, intensity) in [(point, 0.0), (point, f64::NAN), (point, f64::INFINITY), (nowhere, 1.0), (flat, 1.0)] {
+        for (light, intensity) in [(point, 0.0), (point, f64::NAN), (point, f64::INFINITY), (nowhere, 1.0), (flat, 1.0)]
+        {
             assert_eq!(LightBounds::new(&light, intensity), None, "{light:?} of {intensity}");
         }
     }

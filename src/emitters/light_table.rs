@@ -17,7 +17,7 @@ use super::{
     cumulative::{MAX_CHOICES, cumulative, probabilities},
     environment_map::EnvironmentMap,
     light_bounds::LightBounds,
-    light_tree::LightTrees,
+    light_tree::{DIRECTIONAL_ROOT, EMITTER_ROOT, EMITTER_ROOTS, LightTrees, PUNCTUAL_ROOT},
     surface_lights::{SurfaceLight, SurfaceLights},
     targets::Target,
 };
@@ -113,19 +113,25 @@ impl LightTable {
         let sums_places = count(&[layout::POINT_LIGHT, layout::SPOT_LIGHT]) <= MAX_SUMMED;
         let sums_directions = count(&[layout::DIRECTIONAL_LIGHT]) <= MAX_SUMMED;
         let root = |light: &layout::Light| match light.kind {
-            layout::POINT_LIGHT | layout::SPOT_LIGHT if sums_places => layout::PUNCTUAL_ROOT,
-            layout::DIRECTIONAL_LIGHT => layout::DIRECTIONAL_ROOT,
+            layout::POINT_LIGHT | layout::SPOT_LIGHT if sums_places => PUNCTUAL_ROOT,
+            layout::DIRECTIONAL_LIGHT => DIRECTIONAL_ROOT,
             layout::ENVIRONMENT_LIGHT => layout::ENVIRONMENT_ROOT,
-            _ => layout::EMITTER_ROOT,
+            _ => EMITTER_ROOT,
         };
-        self.sampled_roots = layout::EMITTER_ROOTS + u32::from(!sums_directions);
+        self.sampled_roots = EMITTER_ROOTS + u32::from(!sums_directions);
         let is_summed = |light: &layout::Light| root(light) >= self.sampled_roots;
         self.summed = (0..).zip(&self.lights).filter(|(_, light)| is_summed(light)).map(|(i, _)| i).collect();
         // The mean irradiance of surfaces under the environment, which face it in any direction.
         let sky = environment.map_or(0.0, |map| map.integral.iter().sum::<f64>() / 12.0);
-        let strengths: Vec<f64> = self.lights.iter().zip(&self.powers).map(|(l, power)| strength(l, *power, sky)).collect();
+        let strengths: Vec<f64> =
+            self.lights.iter().zip(&self.powers).map(|(l, power)| strength(l, *power, sky)).collect();
         let total: f64 = strengths.iter().sum();
-        let bounds = self.lights.par_iter().zip(strengths).map(|(light, s)| LightBounds::new(light, s / total)).collect::<Vec<_>>();
+        let bounds = self
+            .lights
+            .par_iter()
+            .zip(strengths)
+            .map(|(light, s)| LightBounds::new(light, s / total))
+            .collect::<Vec<_>>();
         self.trees = LightTrees::new(&bounds, self.lights.iter().map(root).collect());
         for (light, (leaf, root)) in self.lights.iter_mut().zip(self.trees.leaves.iter().zip(&self.trees.roots)) {
             (light.leaf, light.root) = (*leaf, *root);

@@ -11,6 +11,13 @@ use crate::{
     scene::Bounds,
 };
 
+/// Roots besides that of the environment: of surfaces, with points and spots where these are many;
+/// of directional lights; of few points and spots.
+pub const EMITTER_ROOT: u32 = 1;
+pub const DIRECTIONAL_ROOT: u32 = 2;
+pub const PUNCTUAL_ROOT: u32 = 3;
+/// Number of trees from which visible points always choose, the first ones.
+pub const EMITTER_ROOTS: u32 = 2;
 /// Intervals along an axis between which lights are divided.
 const BUCKETS: usize = 12;
 /// Depth from which on lights are divided in halves, so that no descent is longer than this and the
@@ -157,4 +164,85 @@ fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
         }
     }
     count
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::vec3;
+
+    use super::*;
+    use crate::layout::{Light, POINT_LIGHT, TRIANGLE_LIGHT};
+
+    fn light(position: Vec3, kind: u32) -> Light {
+        let edges = [[0.01, 0.0, 0.02], [0.0, 0.03, 0.0]];
+        Light { position: position.to_array(), kind, e1: edges[0], e2: edges[1], ..Default::default() }
+    }
+
+    fn trees(lights: &[Light], intensity: impl Fn(usize) -> f64) -> LightTrees {
+        let bounds = |(i, light): (usize, &Light)| LightBounds::new(light, intensity(i));
+        let bounds: Vec<_> = lights.iter().enumerate().map(bounds).collect();
+        LightTrees::new(&bounds, vec![EMITTER_ROOT; lights.len()])
+    }
+
+    /// The greatest depth of a tree, whose nodes must be within their parents.
+    fn depth_of(trees: &LightTrees) -> u32 {
+        let mut open = vec![(EMITTER_ROOT as usize, 0)];
+        let (mut deepest, mut seen) = (0, 0);
+        while let Some((at, depth)) = open.pop() {
+            let node = trees.nodes[at];
+            seen += 1;
+            deepest = deepest.max(depth);
+            if node.is_leaf() {
+                continue;
+            }
+            let first = (node.next() & NEXT_MASK) as usize;
+            let [x, y, z, radius] = node.sphere;
+            for child in &trees.nodes[first..first + 2] {
+                let apart = vec3(x, y, z).distance(Vec3::from_slice(&child.sphere));
+                // Boxes lie in each other. Their spheres do not, but hold each other's centres.
+                assert!(apart <= radius * 1.0001 && child.sphere[3] <= radius * 1.0001, "{child:?} in {node:?}");
+            }
+            let sum: f32 = trees.nodes[first..first + 2].iter().map(LightNode::intensity).sum();
+            assert!((sum - node.intensity()).abs() <= 1e-5 * sum);
+            open.extend([(first, depth + 1), (first + 1, depth + 1)]);
+        }
+        assert_eq!(seen + LIGHT_ROOTS as usize - 1, trees.nodes.len(), "every node is in the tree");
+        deepest
+    }
+
+    #[test]
+    fn every_light_that_shines_has_one_leaf() {
+        let place = |i: usize| vec3((i as f32 * 0.7).sin(), (i as f32 * 1.3).cos(), i as f32 * 0.01);
+        let kind = |i: usize| if i.is_multiple_of(2) { TRIANGLE_LIGHT } else { POINT_LIGHT };
+        let lights: Vec<Light> = (0..20_000).map(|i| light(place(i), kind(i))).collect();
+        let all = trees(&lights, |i| if i % 5 == 0 { 0.0 } else { 1.0 + i as f64 });
+        assert!(depth_of(&all) < MAX_UNEVEN_DEPTH);
+        for (i, leaf) in all.leaves.iter().enumerate() {
+            assert_eq!(*leaf == NO_LEAF, i % 5 == 0, "light {i}");
+            assert!(*leaf == NO_LEAF || all.nodes[*leaf as usize].next() & NEXT_MASK == i as u32);
+        }
+        let again = trees(&lights, |i| if i % 5 == 0 { 0.0 } else { 1.0 + i as f64 });
+        assert_eq!(all.nodes, again.nodes, "threads leave no trace");
+        let other = trees(&lights, |i| 1.0 + i as f64);
+        assert_ne!(all.nodes, other.nodes, "control");
+    }
+
+    #[test]
+    fn no_arrangement_of_lights_makes_a_deep_tree() {
+        let halving: Vec<Light> = (0..120).map(|i| light(Vec3::X * 0.5_f32.powi(i), POINT_LIGHT)).collect();
+        let alike = vec![light(Vec3::ONE, POINT_LIGHT); 100_000];
+        let line: Vec<Light> = (0..5000).map(|i| light(Vec3::X * i as f32, POINT_LIGHT)).collect();
+        for lights in [halving, alike, line] {
+            let depth = depth_of(&trees(&lights, |_| 1.0));
+            assert!(depth <= MAX_UNEVEN_DEPTH + lights.len().ilog2() + 1, "{depth} for {}", lights.len());
+        }
+    }
+
+    #[test]
+    fn dark_lights_and_none_have_no_tree() {
+        for lights in [vec![], vec![light(Vec3::ZERO, POINT_LIGHT); 1000]] {
+            let none = trees(&lights, |_| 0.0);
+            assert!(none.nodes.len() == LIGHT_ROOTS as usize && none.nodes.iter().all(|node| node.intensity() == 0.0));
+        }
+    }
 }

@@ -44,7 +44,7 @@ pub struct LightBuffers {
     pub has_environment: bool,
     pub warnings: Vec<String>,
     lights: Buffer,
-    nodes: Buffer,
+    nodes: Table,
     targets: Buffer,
     scene_sphere: Buffer,
     environment_info: Buffer,
@@ -91,7 +91,7 @@ impl LightBuffers {
             has_environment: map.is_some(),
             warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
-            nodes: gpu.storage_with("light nodes", &table.trees.nodes)?,
+            nodes: Table::new(gpu, "light nodes", &table.trees.nodes)?,
             targets: gpu.storage_with("targets", &spheres)?,
             scene_sphere: gpu.uniform("scene sphere", &scene_sphere),
             environment_info: gpu.uniform("environment info", &environment_info),
@@ -104,10 +104,9 @@ impl LightBuffers {
 
     /// The variables that all passes share. Passes of photons also bind their own `choices`.
     #[must_use]
-    pub fn bindings(&self) -> [(&'static str, &Buffer); 5] {
+    pub fn bindings(&self) -> [(&'static str, &Buffer); 4] {
         [
             ("lights", &self.lights),
-            ("light_nodes", &self.nodes),
             ("targets", &self.targets),
             ("scene_sphere", &self.scene_sphere),
             ("environment_info", &self.environment_info),
@@ -116,8 +115,9 @@ impl LightBuffers {
 
     /// The tables that all passes share.
     #[must_use]
-    pub fn tables(&self) -> [(&'static str, &Table); 3] {
+    pub fn tables(&self) -> [(&'static str, &Table); 4] {
         [
+            ("light_nodes", &self.nodes),
             ("environment", &self.environment),
             ("environment_cells", &self.environment_cells),
             ("environment_rows", &self.environment_rows),

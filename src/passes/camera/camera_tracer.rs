@@ -12,8 +12,7 @@ use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
     layout::{
-        self, CameraTile, Counters, FirstHit, Gathered, LobePoint, MARGIN_CELL, MARGIN_SAMPLES, PixelSums,
-        VisiblePoint,
+        self, CameraTile, Counters, FirstHit, Gathered, LobePoint, MARGIN_CELL, MARGIN_SAMPLES, PixelSums, VisiblePoint,
     },
     passes::{
         estimate::SharedPoints,
