@@ -331,8 +331,11 @@ pub const NEXT_MASK: u32 = FAR_BIT - 1;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LightNode {
-    /// Centre and radius of the sphere around the lights, metres.
-    pub sphere: [f32; 4],
+    /// Centre of the box around the lights, metres.
+    pub center: [f32; 3],
+    /// Half extents of the box: eight bits each, z lowest, in units of which the top eight bits are
+    /// the exponent, biased as in a float.
+    pub half: u32,
     /// Word 0: axis of the cone along which they shine, octahedral. Word 1: cosines of its half
     /// angle, and of the angle from there on beyond which nothing shines; each a 16-bit snorm
     /// number, rounded down. Word 2: bits of the sum of their greatest radiant intensities, or of

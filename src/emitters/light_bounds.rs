@@ -11,10 +11,8 @@ use crate::{
     scene::Bounds,
 };
 
-/// What is added to cones against the rounding of their unions, radians, and to spheres relative to
-/// their radius.
+/// What is added to cones against the rounding of their unions, radians.
 const ANGLE_SLACK: f32 = 1e-5;
-const RADIUS_SLACK: f32 = 1e-6;
 /// Steps of a 16-bit snorm number from 0 to 1, and those by which the falloff's cosine is lowered
 /// for the rounding of axes.
 const COSINE_STEPS: i16 = i16::MAX;
@@ -101,18 +99,29 @@ impl LightBounds {
     /// The node of these bounds. `next` as in [`LightNode::next`], without its bits for bounds.
     pub fn node(&self, next: u32) -> LightNode {
         let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
-        let radius = 0.5 * (self.place.max - self.place.min).length();
-        let middle = 0.5 * (self.place.min + self.place.max);
         // A single direction is exact.
         let spread = if self.spread > 0.0 { lowered(self.spread.cos(), 0) } else { COSINE_STEPS };
         let cones = spread as u16 as u32 | ((lowered(self.falloff.cos(), FALLOFF_SLACK) as u16 as u32) << 16);
         let next = next | bit(self.both_ways, BOTH_WAYS_BIT) | bit(self.is_far, FAR_BIT);
         LightNode {
-            // The corners round.
-            sphere: middle.extend(radius * (1.0 + RADIUS_SLACK)).to_array(),
+            center: (0.5 * (self.place.min + self.place.max)).to_array(),
+            half: packed_half(0.5 * (self.place.max - self.place.min)),
             shine: [octahedral(self.axis), cones, self.intensity.to_bits(), next],
         }
     }
+}
+
+/// [`LightNode::half`], rounded up.
+fn packed_half(half: Vec3) -> u32 {
+    if half.max_element() <= 0.0 {
+        return 0;
+    }
+    // The smallest power of two of which 255 reach the largest extent, at least the smallest float.
+    let least = (half.max_element() / 255.0).max(f32::MIN_POSITIVE);
+    let exponent = (least.to_bits() >> 23) + 1;
+    let steps = half / f32::from_bits(exponent << 23);
+    let [x, y, z] = steps.to_array().map(|x| (x.ceil() as u32).min(255));
+    (exponent << 24) | (x << 16) | (y << 8) | z
 }
 
 /// The 16-bit snorm number below a cosine, and `slack` steps below that.
@@ -195,6 +204,19 @@ mod tests {
         assert!((solid_angle_measure(0.0, FRAC_PI_2) - PI).abs() < 1e-5);
         assert!((solid_angle_measure(PI - 1e-4, FRAC_PI_2) - 2.0 * TAU).abs() < 1e-2);
         assert!((solid_angle_measure(0.0, 0.0)).abs() < 1e-6, "control: one direction");
+    }
+
+    #[test]
+    fn packed_extents_are_those_or_little_more() {
+        for half in [vec3(1.0, 0.02, 0.0), vec3(1e-30, 3e-30, 2e-31), vec3(255.0, 256.0, 1e5), vec3(3e38, 1.0, 0.0)] {
+            let word = packed_half(half);
+            let unit = f64::from(f32::from_bits((word >> 24) << 23));
+            let read = [16, 8, 0].map(|shift| f64::from((word >> shift) & 255) * unit);
+            for (read, right) in read.into_iter().zip(half.to_array().map(f64::from)) {
+                assert!(read >= right && read <= right + f64::from(half.max_element()) / 127.0, "{read} for {right}");
+            }
+        }
+        assert_eq!(packed_half(Vec3::ZERO), 0);
     }
 
     #[test]

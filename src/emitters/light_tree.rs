@@ -184,6 +184,11 @@ mod tests {
         LightTrees::new(&bounds, vec![EMITTER_ROOT; lights.len()])
     }
 
+    fn half_of(node: &LightNode) -> Vec3 {
+        let steps = [16, 8, 0].map(|shift| ((node.half >> shift) & 255) as f32);
+        f32::from_bits((node.half >> 24) << 23) * Vec3::from_array(steps)
+    }
+
     /// The greatest depth of a tree, whose nodes must be within their parents.
     fn depth_of(trees: &LightTrees) -> u32 {
         let mut open = vec![(EMITTER_ROOT as usize, 0)];
@@ -196,11 +201,13 @@ mod tests {
                 continue;
             }
             let first = (node.next() & NEXT_MASK) as usize;
-            let [x, y, z, radius] = node.sphere;
+            let center = Vec3::from_array(node.center);
             for child in &trees.nodes[first..first + 2] {
-                let apart = vec3(x, y, z).distance(Vec3::from_slice(&child.sphere));
-                // Boxes lie in each other. Their spheres do not, but hold each other's centres.
-                assert!(apart <= radius * 1.0001 && child.sphere[3] <= radius * 1.0001, "{child:?} in {node:?}");
+                let apart = (Vec3::from_array(child.center) - center).abs();
+                // Extents are rounded up to 1 of 128 parts of the largest.
+                let (inner, outer) = (half_of(child), half_of(&node));
+                let slack = outer.max_element() / 60.0 + 1e-5;
+                assert!((apart + inner).cmple(outer + slack).all(), "{child:?} in {node:?}");
             }
             let sum: f32 = trees.nodes[first..first + 2].iter().map(LightNode::intensity).sum();
             assert!((sum - node.intensity()).abs() <= 1e-5 * sum);

@@ -47,7 +47,7 @@ fn twins() -> Vec<Twin> {
         Attributes { uvs, colors, tangents, pad }
         Medium { tint, ior, absorption, dispersion }
         Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media, material, attributes, part, side, leaf, root, pad0, pad1 }
-        LightNode { sphere, shine }
+        LightNode { center, half, shine }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
