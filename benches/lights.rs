@@ -1,9 +1,9 @@
 //! Benchmark: direct light of few and many lights, as seconds and as error.
 //!
 //! `cargo bench --bench lights`. The first table has point lights over a floor, the picture's mean
-//! against the closed form at the same points. The second has emissive triangles of powers over five
-//! decades among blocks, the relMSE of each picture against one of the same camera rays with 64
-//! times the light samples. The third has the time to build the trees.
+//! against the closed form at the same points. The second has emissive triangles of powers over
+//! five decades among blocks, the relMSE of each picture against one of the same camera rays with
+//! 64 times the light samples. The third has the time to build the trees.
 
 use std::time::Instant;
 

@@ -318,8 +318,8 @@ pub const LIGHT_ROOTS: u32 = 4;
 pub const ENVIRONMENT_ROOT: u32 = 0;
 /// In place of the leaf of a light that is never chosen: none.
 pub const NO_LEAF: u32 = u32::MAX;
-/// Bits of [`LightNode::next`]: the node is a leaf; its surfaces may shine along the opposite cone as
-/// well; its lights are at infinity.
+/// Bits of [`LightNode::next`]: the node is a leaf; its surfaces may shine along the opposite cone
+/// as well; its lights are at infinity.
 pub const LEAF_BIT: u32 = 0x8000_0000;
 pub const BOTH_WAYS_BIT: u32 = 0x4000_0000;
 pub const FAR_BIT: u32 = 0x2000_0000;
@@ -339,7 +339,8 @@ pub struct LightNode {
     /// Word 0: axis of the cone along which they shine, octahedral. Word 1: cosines of its half
     /// angle, and of the angle from there on beyond which nothing shines; each a 16-bit snorm
     /// number, rounded down. Word 2: bits of the sum of their greatest radiant intensities, or of
-    /// the irradiance by lights at infinity, relative to that of all lights. Word 3, [`Self::next`].
+    /// the irradiance by lights at infinity, relative to that of all lights. Word 3,
+    /// [`Self::next`].
     pub shine: [u32; 4],
 }
 

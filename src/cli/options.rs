@@ -65,7 +65,8 @@ pub struct SharedOptions {
     #[arg(long, value_name = "NAME=WEIGHT", value_parser = light_weight, help_heading = "Light")]
     pub light_photons: Vec<(String, f64)>,
 
-    /// Samples of the direct light of emissive surfaces and the environment per visible point
+    /// Samples of the direct light of emissive surfaces, the environment and more than 16 punctual
+    /// lights per visible point
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = "Light")]
     #[arg(value_parser = whole(PictureSettings::LIGHT_SAMPLES))]
     pub light_samples: u32,

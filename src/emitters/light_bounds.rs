@@ -111,6 +111,19 @@ impl LightBounds {
     }
 }
 
+/// Greatest radiant intensity of a light, W/sr; of a light at infinity the irradiance that it
+/// gives, W/m².
+pub(super) fn strength(light: &layout::Light, power: f64, sky: f64) -> f64 {
+    let mean = light.emission.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
+    match light.kind {
+        layout::DIRECTIONAL_LIGHT => mean,
+        layout::ENVIRONMENT_LIGHT => sky,
+        // A sphere shows a quarter of its surface.
+        layout::SPHERE_LIGHT => power / (4.0 * f64::from(light.solid_angle)),
+        _ => power / f64::from(light.solid_angle),
+    }
+}
+
 /// [`LightNode::half`], rounded up.
 fn packed_half(half: Vec3) -> u32 {
     if half.max_element() <= 0.0 {

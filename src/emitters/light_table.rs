@@ -16,10 +16,10 @@ use rayon::prelude::*;
 use super::{
     cumulative::{MAX_CHOICES, cumulative, probabilities},
     environment_map::EnvironmentMap,
-    light_bounds::LightBounds,
+    light_bounds::{LightBounds, strength},
     light_tree::{DIRECTIONAL_ROOT, EMITTER_ROOT, EMITTER_ROOTS, LightTrees, PUNCTUAL_ROOT},
     surface_lights::{SurfaceLight, SurfaceLights},
-    targets::Target,
+    targets::{Target, aimed_fraction},
 };
 use crate::{
     error::{Error, Result},
@@ -284,58 +284,11 @@ impl LightTable {
     }
 }
 
-/// Greatest radiant intensity of a light, W/sr; of a light at infinity the irradiance that it gives,
-/// W/m².
-fn strength(light: &layout::Light, power: f64, sky: f64) -> f64 {
-    let mean = light.emission.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
-    match light.kind {
-        layout::DIRECTIONAL_LIGHT => mean,
-        layout::ENVIRONMENT_LIGHT => sky,
-        // A sphere shows a quarter of its surface.
-        layout::SPHERE_LIGHT => power / (4.0 * f64::from(light.solid_angle)),
-        _ => power / f64::from(light.solid_angle),
-    }
-}
-
 /// Radiometric emission of a material whose numbers in the file are in `unit`.
 pub(crate) fn emission_in(emission: Vec3, unit: LightUnit) -> Vec3 {
     match unit {
         LightUnit::Radiometric => emission,
         LightUnit::Photometric => emission / LUMENS_PER_WATT,
-    }
-}
-
-/// Approximate fraction of a light's power that goes towards the targets; above 0 if any light can
-/// reach them.
-fn aimed_fraction(light: &layout::Light, targets: &[Target], around: &Target) -> f64 {
-    let cross_sections = targets.iter().map(|t| (t.radius / around.radius).powi(2));
-    if matches!(light.kind, layout::DIRECTIONAL_LIGHT | layout::ENVIRONMENT_LIGHT) {
-        return f64::from(cross_sections.sum::<f32>()).min(1.0);
-    }
-    let [position, e1, e2] = [light.position, light.e1, light.e2].map(Vec3::from_array);
-    let (from, own) = match light.kind {
-        layout::TRIANGLE_LIGHT => (position + (e1 + e2) / 3.0, f64::from(light.solid_angle)),
-        layout::SPHERE_LIGHT => (position, 4.0 * PI),
-        _ => (position, f64::from(light.solid_angle)),
-    };
-    let seen = targets.iter().filter(|target| can_reach(light, target, from));
-    seen.map(|target| target.solid_angle(from).map_or(1.0, |angle| (angle / own).min(1.0))).sum::<f64>().min(1.0)
-}
-
-/// Light emitted at `from` can reach the target.
-fn can_reach(light: &layout::Light, target: &Target, from: Vec3) -> bool {
-    let [axis, e2] = [light.e1, light.e2].map(Vec3::from_array);
-    let to = target.center - from;
-    let sine = f64::from(target.radius) / f64::from(to.length());
-    match light.kind {
-        layout::SPOT_LIGHT if sine < 1.0 => {
-            let outer = (1.0 - f64::from(e2.x)).clamp(-1.0, 1.0).acos();
-            f64::from(axis.dot(to.normalize())).clamp(-1.0, 1.0).acos() <= outer + sine.asin() + 1e-3
-        }
-        layout::TRIANGLE_LIGHT if f64::from(light.solid_angle) < 1.5 * PI => {
-            axis.cross(e2).normalize().dot(to) > -target.radius * 1.001
-        }
-        _ => true,
     }
 }
 

@@ -114,7 +114,8 @@ const NORMAL: Vec3 = vec3(0.6, 0.8, 0.0);
 const OTHER: Vec3 = vec3(-0.6, 0.64, -0.48);
 
 /// Directions to the lamps for a surface of the normal `drawn_for`, with two densities: as sampled
-/// (negative where hidden), and as evaluated for a ray that hits the lamp, for the normal `met_for`.
+/// (negative where hidden), and as evaluated for a ray that hits the lamp, for the normal
+/// `met_for`.
 fn drawn_and_met(lamps: &Lamps, samples: &[Row], drawn_for: Vec3, met_for: Vec3) -> Vec<([f32; 4], f32)> {
     let buffers = upload(&lamps.scene, LightSampling::Power);
     assert_eq!(buffers.lights.table.lights.len(), lamps.count);
