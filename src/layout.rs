@@ -284,6 +284,11 @@ pub struct Light {
     /// Triangle: number of parts along an edge of its triangle; 0 or 1 if the light is all of it.
     /// The parts are consecutive lights, row by row.
     pub side: u32,
+    /// Index of its leaf among the [`LightNode`]s, or [`NO_LEAF`], and of the root of its tree.
+    pub leaf: u32,
+    pub root: u32,
+    pub pad0: u32,
+    pub pad1: u32,
 }
 
 /// Set in [`Light::part`] for a part that is turned by half a turn against its triangle.
@@ -305,6 +310,57 @@ pub struct LightChoice {
     pub cdf: f32,
     /// Probability of this light: the difference to its predecessor.
     pub probability: f32,
+}
+
+/// Number of trees of lights, whose roots are the first [`LightNode`]s, and that of the environment
+/// among them; see `src/emitters/light_tree.rs`.
+pub const LIGHT_ROOTS: u32 = 4;
+pub const ENVIRONMENT_ROOT: u32 = 0;
+/// In place of the leaf of a light that is never chosen: none.
+pub const NO_LEAF: u32 = u32::MAX;
+/// Bits of [`LightNode::next`]: the node is a leaf; its surfaces may shine along the opposite cone
+/// as well; its lights are at infinity.
+pub const LEAF_BIT: u32 = 0x8000_0000;
+pub const BOTH_WAYS_BIT: u32 = 0x4000_0000;
+pub const FAR_BIT: u32 = 0x2000_0000;
+/// Mask there of the index.
+pub const NEXT_MASK: u32 = FAR_BIT - 1;
+
+/// Node of a tree by which direct light chooses a light: bounds of one light or several, see
+/// `src/emitters/light_bounds.rs`. It consists of vectors of four words, as [`BvhNode`] does.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LightNode {
+    /// Centre of the box around the lights, metres.
+    pub center: [f32; 3],
+    /// Half extents of the box: eight bits each, z lowest, in units of which the top eight bits are
+    /// the exponent, biased as in a float.
+    pub half: u32,
+    /// Word 0: axis of the cone along which they shine, octahedral. Word 1: cosines of its half
+    /// angle, and of the angle from there on beyond which nothing shines; each a 16-bit snorm
+    /// number, rounded down. Word 2: bits of the sum of their greatest radiant intensities, or of
+    /// the irradiance by lights at infinity, relative to that of all lights. Word 3,
+    /// [`Self::next`].
+    pub shine: [u32; 4],
+}
+
+impl LightNode {
+    /// Leaf: index of the light. Others: of the first of two children, which are neighbours. With
+    /// [`LEAF_BIT`], [`BOTH_WAYS_BIT`], [`FAR_BIT`].
+    #[must_use]
+    pub fn next(&self) -> u32 {
+        self.shine[3]
+    }
+
+    #[must_use]
+    pub fn is_leaf(&self) -> bool {
+        self.next() & LEAF_BIT != 0
+    }
+
+    #[must_use]
+    pub fn intensity(&self) -> f32 {
+        f32::from_bits(self.shine[2])
+    }
 }
 
 /// Sphere around all geometry.
@@ -390,16 +446,6 @@ pub struct VisiblePoint {
     /// the normal and at grazing angles, strongest colour of the sheen and its roughness. 0 for
     /// nothing.
     pub above: u32,
-}
-
-/// Lights of [`LobePoint`]s.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct LobeLight {
-    pub light_count: u32,
-    pub pad0: u32,
-    pub pad1: u32,
-    pub pad2: u32,
 }
 
 /// Vertex of a camera path at which rough lobes are lit. Unit vectors are octahedral, see
@@ -673,8 +719,8 @@ pub struct EmitterSample {
     /// Index of the sample, and number of samples per point.
     pub sample: u32,
     pub samples: u32,
-    /// Entries of the table of lights.
-    pub light_count: u32,
+    /// Number of trees of lights that are sampled.
+    pub roots: u32,
 }
 
 /// Arguments of `start_final_gather` and `sum_final_gather`: some rays of the chosen points.

@@ -68,8 +68,8 @@ pub struct SharedOptions {
     #[arg(long, value_name = "NAME=WEIGHT", value_parser = light_weight, help_heading = "Light")]
     pub light_photons: Vec<(String, f64)>,
 
-    /// Samples of the direct light of emissive surfaces and the environment per visible point
-    /// [default: 4]
+    /// Samples of the direct light of emissive surfaces, the environment and more than 16 punctual
+    /// lights per visible point [default: 4]
     #[arg(long, value_name = "N", help_heading = "Light")]
     #[arg(value_parser = whole(PictureSettings::LIGHT_SAMPLES))]
     pub light_samples: Option<u32>,

@@ -1,5 +1,5 @@
-//! All lights of a scene, as one list for the device, and the tables by which passes choose from
-//! it.
+//! All lights of a scene, as one list for the device, and the tables and trees by which passes
+//! choose from it.
 //!
 //! Punctual lights come first, then emissive triangles and spheres, material by material, then the
 //! environment. A group is what a user calls one light: a punctual light, all surfaces of one
@@ -11,12 +11,15 @@ use std::{
 };
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::{
     cumulative::{MAX_CHOICES, cumulative, probabilities},
     environment_map::EnvironmentMap,
+    light_bounds::{LightBounds, strength},
+    light_tree::{DIRECTIONAL_ROOT, EMITTER_ROOT, EMITTER_ROOTS, LightTrees, PUNCTUAL_ROOT},
     surface_lights::{SurfaceLight, SurfaceLights},
-    targets::Target,
+    targets::{Target, aimed_fraction},
 };
 use crate::{
     error::{Error, Result},
@@ -28,6 +31,9 @@ use crate::{
 /// Least share that paths take of what a part of a surface would emit if nothing darkened it: its
 /// mean may miss what is bright between the points by which it is taken.
 const MIN_SHARE: f64 = 1.0 / 64.0;
+/// Maximum number of points and spots, and of directional lights, whose direct light at a visible
+/// point is the sum over all of them. Of more, light samples choose.
+pub const MAX_SUMMED: usize = 16;
 
 /// A group of lights: what a user calls one light.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,8 +52,12 @@ pub struct LightTable {
     /// Sorted by group.
     pub lights: Vec<layout::Light>,
     pub groups: Vec<LightGroup>,
-    /// Number of punctual lights, the first ones in `lights`.
-    pub punctual: usize,
+    /// The trees by which direct light chooses.
+    pub trees: LightTrees,
+    /// Indices of the punctual lights that visible points sum over.
+    pub summed: Vec<u32>,
+    /// Number of trees that light samples of visible points choose from.
+    pub sampled_roots: u32,
     /// The emission of some surface varies: it has lights with a [`layout::Light::material`].
     pub is_varied: bool,
     /// Materials that shine nowhere, one line each.
@@ -80,7 +90,6 @@ impl LightTable {
         for light in &scene.lights {
             table.add_punctual(light, around.radius, settings.unit);
         }
-        table.punctual = table.lights.len();
         table.add_surfaces(scene, settings.unit);
         if let (Some(environment), Some(map)) = (&scene.environment, environment) {
             let power = DVec3::from(map.integral) * PI * f64::from(around.radius).powi(2);
@@ -93,7 +102,40 @@ impl LightTable {
             return Err(Error::Scene { path: scene.path.clone(), place: "materials".to_owned(), problem });
         }
         table.check_names(settings)?;
+        table.plant_trees(environment);
         Ok(table)
+    }
+
+    /// Divides the lights into those that visible points sum over and those that they sample, and
+    /// builds the trees.
+    fn plant_trees(&mut self, environment: Option<&EnvironmentMap>) {
+        let count = |kinds: &[u32]| self.lights.iter().filter(|light| kinds.contains(&light.kind)).count();
+        let sums_places = count(&[layout::POINT_LIGHT, layout::SPOT_LIGHT]) <= MAX_SUMMED;
+        let sums_directions = count(&[layout::DIRECTIONAL_LIGHT]) <= MAX_SUMMED;
+        let root = |light: &layout::Light| match light.kind {
+            layout::POINT_LIGHT | layout::SPOT_LIGHT if sums_places => PUNCTUAL_ROOT,
+            layout::DIRECTIONAL_LIGHT => DIRECTIONAL_ROOT,
+            layout::ENVIRONMENT_LIGHT => layout::ENVIRONMENT_ROOT,
+            _ => EMITTER_ROOT,
+        };
+        self.sampled_roots = EMITTER_ROOTS + u32::from(!sums_directions);
+        let is_summed = |light: &layout::Light| root(light) >= self.sampled_roots;
+        self.summed = (0..).zip(&self.lights).filter(|(_, light)| is_summed(light)).map(|(i, _)| i).collect();
+        // The mean irradiance of surfaces under the environment, which face it in any direction.
+        let sky = environment.map_or(0.0, |map| map.integral.iter().sum::<f64>() / 12.0);
+        let strengths: Vec<f64> =
+            self.lights.iter().zip(&self.powers).map(|(l, power)| strength(l, *power, sky)).collect();
+        let total: f64 = strengths.iter().sum();
+        let bounds = self
+            .lights
+            .par_iter()
+            .zip(strengths)
+            .map(|(light, s)| LightBounds::new(light, s / total))
+            .collect::<Vec<_>>();
+        self.trees = LightTrees::new(&bounds, self.lights.iter().map(root).collect());
+        for (light, (leaf, root)) in self.lights.iter_mut().zip(self.trees.leaves.iter().zip(&self.trees.roots)) {
+            (light.leaf, light.root) = (*leaf, *root);
+        }
     }
 
     /// Index of a primitive's first light, plus one; 0 if the primitive does not emit light.
@@ -108,10 +150,17 @@ impl LightTable {
         !self.emitters.is_empty()
     }
 
-    /// Some light is not punctual, so that its direct light must be sampled.
+    /// Some light is not punctual, so that rays may meet it.
     #[must_use]
     pub fn has_extent(&self) -> bool {
-        self.powers[self.punctual..].iter().any(|power| *power > 0.0)
+        let is_met = |light: &layout::Light| light.kind >= layout::TRIANGLE_LIGHT && light.leaf != layout::NO_LEAF;
+        self.lights.iter().any(is_met)
+    }
+
+    /// Visible points have lights to sample.
+    #[must_use]
+    pub fn is_sampled(&self) -> bool {
+        self.trees.nodes.iter().take(self.sampled_roots as usize).any(|root| root.intensity() > 0.0)
     }
 
     /// Power of all lights, W, mean of the channels.
@@ -133,14 +182,6 @@ impl LightTable {
     pub fn for_aimed_photons(&self, targets: &[Target], around: &Target, settings: &LightSettings) -> Choices {
         let aimed = |(light, power): (&layout::Light, &f64)| power * aimed_fraction(light, targets, around);
         self.choices(self.lights.iter().zip(&self.powers).map(aimed).collect(), settings)
-    }
-
-    /// Table for direct light of all lights but the punctual ones: in proportion to power.
-    #[must_use]
-    pub fn for_direct_light(&self) -> Choices {
-        let mut powers = self.powers.clone();
-        powers[..self.punctual].fill(0.0);
-        Choices { entries: entries(&powers), strata: 1 }
     }
 
     fn choices(&self, powers: Vec<f64>, settings: &LightSettings) -> Choices {
@@ -248,40 +289,6 @@ pub(crate) fn emission_in(emission: Vec3, unit: LightUnit) -> Vec3 {
     match unit {
         LightUnit::Radiometric => emission,
         LightUnit::Photometric => emission / LUMENS_PER_WATT,
-    }
-}
-
-/// Approximate fraction of a light's power that goes towards the targets; above 0 if any light can
-/// reach them.
-fn aimed_fraction(light: &layout::Light, targets: &[Target], around: &Target) -> f64 {
-    let cross_sections = targets.iter().map(|t| (t.radius / around.radius).powi(2));
-    if matches!(light.kind, layout::DIRECTIONAL_LIGHT | layout::ENVIRONMENT_LIGHT) {
-        return f64::from(cross_sections.sum::<f32>()).min(1.0);
-    }
-    let [position, e1, e2] = [light.position, light.e1, light.e2].map(Vec3::from_array);
-    let (from, own) = match light.kind {
-        layout::TRIANGLE_LIGHT => (position + (e1 + e2) / 3.0, f64::from(light.solid_angle)),
-        layout::SPHERE_LIGHT => (position, 4.0 * PI),
-        _ => (position, f64::from(light.solid_angle)),
-    };
-    let seen = targets.iter().filter(|target| can_reach(light, target, from));
-    seen.map(|target| target.solid_angle(from).map_or(1.0, |angle| (angle / own).min(1.0))).sum::<f64>().min(1.0)
-}
-
-/// Light emitted at `from` can reach the target.
-fn can_reach(light: &layout::Light, target: &Target, from: Vec3) -> bool {
-    let [axis, e2] = [light.e1, light.e2].map(Vec3::from_array);
-    let to = target.center - from;
-    let sine = f64::from(target.radius) / f64::from(to.length());
-    match light.kind {
-        layout::SPOT_LIGHT if sine < 1.0 => {
-            let outer = (1.0 - f64::from(e2.x)).clamp(-1.0, 1.0).acos();
-            f64::from(axis.dot(to.normalize())).clamp(-1.0, 1.0).acos() <= outer + sine.asin() + 1e-3
-        }
-        layout::TRIANGLE_LIGHT if f64::from(light.solid_angle) < 1.5 * PI => {
-            axis.cross(e2).normalize().dot(to) > -target.radius * 1.001
-        }
-        _ => true,
     }
 }
 

@@ -1,10 +1,12 @@
-//! All that emits light, as one list and the tables that choose from it: punctual lights, emissive
-//! triangles and spheres, the environment. Host only; `upload` puts it on the device.
+//! All that emits light, as one list and the tables and trees that choose from it: punctual lights,
+//! emissive triangles and spheres, the environment. Host only; `upload` puts it on the device.
 
 mod cumulative;
 pub mod environment_map;
+mod light_bounds;
 mod light_media;
 pub mod light_table;
+pub mod light_tree;
 pub mod sight;
 mod surface_lights;
 pub mod targets;

@@ -2,10 +2,12 @@
 //! that could become a caustic is left out, and few others are traced. This is the projection map
 //! of Jensen 2001, section 5.3, as bounding spheres.
 
+use std::f64::consts::TAU;
+
 use glam::Vec3;
 
 use crate::{
-    layout::MAX_TARGETS,
+    layout::{self, MAX_TARGETS},
     scene::{Bounds, Scene},
 };
 
@@ -22,7 +24,7 @@ impl Target {
     #[must_use]
     pub fn solid_angle(&self, from: Vec3) -> Option<f64> {
         let sin2 = f64::from(self.radius).powi(2) / self.center.as_dvec3().distance_squared(from.as_dvec3());
-        (sin2 < 1.0).then(|| std::f64::consts::TAU * sin2 / (1.0 + (1.0 - sin2).sqrt()))
+        (sin2 < 1.0).then(|| TAU * sin2 / (1.0 + (1.0 - sin2).sqrt()))
     }
 
     fn cross_section(&self) -> f64 {
@@ -138,6 +140,40 @@ fn items(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Item> {
     let triangles = scene.triangles.iter().filter(|t| wanted(t.material)).map(|t| Item::Triangle(t.positions));
     let spheres = scene.spheres.iter().filter(|s| wanted(s.material)).map(|s| Item::Sphere(s.center, s.radius));
     triangles.chain(spheres).collect()
+}
+
+/// Approximate fraction of a light's power that goes towards the targets; above 0 if any light can
+/// reach them.
+pub(super) fn aimed_fraction(light: &layout::Light, targets: &[Target], around: &Target) -> f64 {
+    let cross_sections = targets.iter().map(|t| (t.radius / around.radius).powi(2));
+    if matches!(light.kind, layout::DIRECTIONAL_LIGHT | layout::ENVIRONMENT_LIGHT) {
+        return f64::from(cross_sections.sum::<f32>()).min(1.0);
+    }
+    let [position, e1, e2] = [light.position, light.e1, light.e2].map(Vec3::from_array);
+    let (from, own) = match light.kind {
+        layout::TRIANGLE_LIGHT => (position + (e1 + e2) / 3.0, f64::from(light.solid_angle)),
+        layout::SPHERE_LIGHT => (position, 2.0 * TAU),
+        _ => (position, f64::from(light.solid_angle)),
+    };
+    let seen = targets.iter().filter(|target| can_reach(light, target, from));
+    seen.map(|target| target.solid_angle(from).map_or(1.0, |angle| (angle / own).min(1.0))).sum::<f64>().min(1.0)
+}
+
+/// Light emitted at `from` can reach the target.
+fn can_reach(light: &layout::Light, target: &Target, from: Vec3) -> bool {
+    let [axis, e2] = [light.e1, light.e2].map(Vec3::from_array);
+    let to = target.center - from;
+    let sine = f64::from(target.radius) / f64::from(to.length());
+    match light.kind {
+        layout::SPOT_LIGHT if sine < 1.0 => {
+            let outer = (1.0 - f64::from(e2.x)).clamp(-1.0, 1.0).acos();
+            f64::from(axis.dot(to.normalize())).clamp(-1.0, 1.0).acos() <= outer + sine.asin() + 1e-3
+        }
+        layout::TRIANGLE_LIGHT if f64::from(light.solid_angle) < 0.75 * TAU => {
+            axis.cross(e2).normalize().dot(to) > -target.radius * 1.001
+        }
+        _ => true,
+    }
 }
 
 #[cfg(test)]

@@ -50,8 +50,8 @@ pub struct PictureSettings {
     /// Distance of the plane of focus along the camera's axis, metres, in [`Self::FOCUS`]. Has an
     /// effect only with an aperture, which requires it.
     pub focus: Option<f32>,
-    /// Samples of the direct light of emissive surfaces and the environment per visible point, in
-    /// [`Self::LIGHT_SAMPLES`].
+    /// Samples of the direct light of emissive surfaces, the environment and more than 16 punctual
+    /// lights per visible point, in [`Self::LIGHT_SAMPLES`].
     pub light_samples: u32,
 }
 

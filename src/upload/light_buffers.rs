@@ -1,5 +1,5 @@
-//! The lights in bind group 0: all lights, the tables by which passes choose from them, targets,
-//! environment.
+//! The lights in bind group 0: all lights, the tables and trees by which passes choose from them,
+//! targets, environment.
 
 use rayon::prelude::*;
 
@@ -32,11 +32,9 @@ pub struct ChoiceBuffer {
 pub struct LightBuffers {
     /// The lights on the host, as uploaded.
     pub table: LightTable,
-    /// Tables for photon paths, for paths aimed at mirrors and glass, and for direct light of all
-    /// lights but the punctual ones.
+    /// Tables for photon paths, and for paths aimed at mirrors and glass.
     pub photons: ChoiceBuffer,
     pub aimed: ChoiceBuffer,
-    pub direct: ChoiceBuffer,
     /// Number of spheres around what the cameras see, and around mirrors and glass. In `targets`,
     /// the sphere around the scene lies between them.
     pub seen_targets: u32,
@@ -46,6 +44,7 @@ pub struct LightBuffers {
     pub has_environment: bool,
     pub warnings: Vec<String>,
     lights: Buffer,
+    nodes: Table,
     targets: Buffer,
     scene_sphere: Buffer,
     environment_info: Buffer,
@@ -86,13 +85,13 @@ impl LightBuffers {
         Ok(Self {
             photons: upload("photon light choices", &table.for_photons(settings))?,
             aimed: upload("aimed light choices", &table.for_aimed_photons(&targets, &around, settings))?,
-            direct: upload("direct light choices", &table.for_direct_light())?,
             seen_targets: seen.len() as u32,
             seen: seen.first().map_or([0.0; 4], |target| target.center.extend(target.radius).to_array()),
             specular_targets: targets.len() as u32,
             has_environment: map.is_some(),
             warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
+            nodes: Table::new(gpu, "light nodes", &table.trees.nodes)?,
             targets: gpu.storage_with("targets", &spheres)?,
             scene_sphere: gpu.uniform("scene sphere", &scene_sphere),
             environment_info: gpu.uniform("environment info", &environment_info),
@@ -103,7 +102,7 @@ impl LightBuffers {
         })
     }
 
-    /// The variables that all passes share. Each pass also binds its own `choices`.
+    /// The variables that all passes share. Passes of photons also bind their own `choices`.
     #[must_use]
     pub fn bindings(&self) -> [(&'static str, &Buffer); 4] {
         [
@@ -116,8 +115,9 @@ impl LightBuffers {
 
     /// The tables that all passes share.
     #[must_use]
-    pub fn tables(&self) -> [(&'static str, &Table); 3] {
+    pub fn tables(&self) -> [(&'static str, &Table); 4] {
         [
+            ("light_nodes", &self.nodes),
             ("environment", &self.environment),
             ("environment_cells", &self.environment_cells),
             ("environment_rows", &self.environment_rows),

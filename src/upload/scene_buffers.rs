@@ -143,8 +143,8 @@ impl SceneBuffers {
             ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
         ];
         overrides.extend_from_slice(others);
-        let [pixels, cells, rows] = self.lights.tables();
-        let own = [("normals", &self.normals), ("media_table", &self.media), pixels, cells, rows];
+        let [light_nodes, pixels, cells, rows] = self.lights.tables();
+        let own = [("normals", &self.normals), ("media_table", &self.media), light_nodes, pixels, cells, rows];
         let tables = [&own[..], &self.materials.tables()].concat();
         Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }

@@ -4,8 +4,8 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | emission | photon paths follow the balance heuristic over overlapping targets | a smaller target |
-//! | emitters | directions follow the density that `arriving_at` returns | lamps chosen uniformly |
-//! | weights | of a direction to a lamp and one by the cosine sum to one | another table of choices |
+//! | emitters | directions follow the density that `arriving_at` returns | lamps chosen for another normal |
+//! | weights | of a direction to a lamp and one by the cosine sum to one | densities for another normal |
 
 use std::f64::consts::PI;
 
@@ -102,29 +102,35 @@ fn textured_lamps() -> Scene {
 /// Lamps, and their number: two triangles, or 256 parts of each, a sphere and the sky.
 struct Lamps {
     scene: Scene,
-    count: f32,
+    count: usize,
 }
 
 fn lamps() -> [Lamps; 2] {
-    [Lamps { scene: plain_lamps(), count: 4.0 }, Lamps { scene: textured_lamps(), count: 514.0 }]
+    [Lamps { scene: plain_lamps(), count: 4 }, Lamps { scene: textured_lamps(), count: 514 }]
 }
 
-/// Directions to the lamps with two densities: as sampled (negative where hidden), and as evaluated
-/// for a ray that hits the lamp.
-fn drawn_and_met(lamps: &Lamps, samples: &[Row], sampling: LightSampling) -> Vec<([f32; 4], f32)> {
-    let buffers = upload(&lamps.scene, sampling);
-    assert_eq!(buffers.lights.table.lights.len(), lamps.count as usize);
-    let choices = if sampling == LightSampling::Power { &buffers.lights.direct } else { &buffers.lights.photons };
-    let drawn = Probe::of_scene("probe_emitter", &buffers, choices).run(samples);
-    let asked: Vec<Row> = drawn.iter().map(|d| [*d, [0.0, lamps.count, 0.0, 0.0]]).collect();
-    let met = Probe::of_scene("probe_emitter_pdf", &buffers, choices).run(&asked);
+/// Normal of the lit surface, and another one, for which other lamps are chosen.
+const NORMAL: Vec3 = vec3(0.6, 0.8, 0.0);
+const OTHER: Vec3 = vec3(-0.6, 0.64, -0.48);
+
+/// Directions to the lamps for a surface of the normal `drawn_for`, with two densities: as sampled
+/// (negative where hidden), and as evaluated for a ray that hits the lamp, for the normal
+/// `met_for`.
+fn drawn_and_met(lamps: &Lamps, samples: &[Row], drawn_for: Vec3, met_for: Vec3) -> Vec<([f32; 4], f32)> {
+    let buffers = upload(&lamps.scene, LightSampling::Power);
+    assert_eq!(buffers.lights.table.lights.len(), lamps.count);
+    let run = |stem: &str, rows: &[Row]| Probe::of_scene(stem, &buffers, &buffers.lights.photons).run(rows);
+    let of = |a: [f32; 4], first: f32, normal: Vec3| [a, [first, normal.x, normal.y, normal.z]];
+    let samples: Vec<Row> = samples.iter().map(|row| of(row[0], row[1][0], drawn_for)).collect();
+    let drawn = run("probe_emitter", &samples);
+    let met = run("probe_emitter_pdf", &drawn.iter().map(|d| of(*d, 0.0, met_for)).collect::<Vec<_>>());
     drawn.into_iter().zip(met).map(|(drawn, met)| (drawn, met[0])).collect()
 }
 
-fn lamp_samples(count: f32) -> Vec<Row> {
+fn lamp_samples() -> Vec<Row> {
     let more = rows(2 * SAMPLES, [0.0; 4]);
     let fifth = more[SAMPLES..].iter().map(|row| row[0][0]);
-    more[..SAMPLES].iter().zip(fifth).map(|(row, fifth)| [row[0], [fifth, count, 0.0, 0.0]]).collect()
+    more[..SAMPLES].iter().zip(fifth).map(|(row, fifth)| [row[0], [fifth, 0.0, 0.0, 0.0]]).collect()
 }
 
 #[test]
@@ -133,19 +139,19 @@ fn emitters_are_sampled_with_the_density_that_is_told() {
 }
 
 fn check_density(lamps: &Lamps) {
-    let visible = |sampling| {
-        let all = drawn_and_met(lamps, &lamp_samples(lamps.count), sampling);
+    let visible = |normal| {
+        let all = drawn_and_met(lamps, &lamp_samples(), normal, NORMAL);
         all.into_iter().filter(|(d, _)| d[3] > 0.0).map(|(d, _)| d).collect::<Vec<_>>()
     };
     let grid = Directions { rows: 16, columns: 32 };
-    let points =
-        grid.midpoints(32).into_iter().map(|d| [d.as_vec3().extend(0.0).to_array(), [0.0, lamps.count, 0.0, 0.0]]);
+    let normal = [0.0, NORMAL.x, NORMAL.y, NORMAL.z];
+    let points = grid.midpoints(32).into_iter().map(|d| [d.as_vec3().extend(0.0).to_array(), normal]);
     let densities = probe("probe_emitter_pdf", &lamps.scene, &points.collect::<Vec<_>>());
     let mut probabilities = grid.probabilities(&densities.iter().map(|d| f64::from(d[0])).collect::<Vec<_>>());
     // Samples of the sky behind a lamp are hidden.
     let seen: f64 = probabilities.iter().sum();
     probabilities.iter_mut().for_each(|p| *p /= seen);
-    let drawn = visible(LightSampling::Power);
+    let drawn = visible(NORMAL);
     let share = drawn.len() as f64 / SAMPLES as f64;
     assert!(
         (share - seen).abs() < 4.0 * (seen * (1.0 - seen) / SAMPLES as f64).sqrt() + 1e-3,
@@ -154,8 +160,8 @@ fn check_density(lamps: &Lamps) {
     let test = |drawn: Vec<[f32; 4]>| deviate(&grid.counts(drawn), &probabilities);
     let found = test(drawn);
     assert!(found.fits(), "{found:?}");
-    let other = test(visible(LightSampling::Uniform));
-    assert!(!other.fits(), "control: lamps chosen alike: {other:?}");
+    let other = test(visible(OTHER));
+    assert!(!other.fits(), "control: lamps chosen for another normal: {other:?}");
 }
 
 /// Weight of the power heuristic for a direction drawn with density `p` by one technique and `q` by
@@ -170,9 +176,9 @@ fn weights_of_both_ways_to_an_emitter_sum_to_one() {
 }
 
 fn check_weights(lamps: &Lamps) {
-    let samples = lamp_samples(lamps.count);
-    let pairs = drawn_and_met(lamps, &samples, LightSampling::Power);
-    let other = drawn_and_met(lamps, &samples, LightSampling::Uniform);
+    let samples = lamp_samples();
+    let pairs = drawn_and_met(lamps, &samples, NORMAL, NORMAL);
+    let other = drawn_and_met(lamps, &samples, NORMAL, OTHER);
     // Densities of the same direction: of light sampling as drawn, of light sampling as evaluated
     // for a cosine sample, and of cosine sampling.
     let sums = |met: &dyn Fn(usize) -> Option<f32>| {
@@ -188,7 +194,6 @@ fn check_weights(lamps: &Lamps) {
     assert!(right.len() > SAMPLES / 4, "{} directions are visible", right.len());
     // Directions at an emitter's edge may hit a neighbouring surface.
     assert!(wrong(&right) < right.len() / 500, "{} of {} pairs of weights", wrong(&right), right.len());
-    let same = |i: usize| (pairs[i].0[..3] == other[i].0[..3]).then_some(other[i].1);
-    let mixed = sums(&same);
+    let mixed = sums(&|i| Some(other[i].1));
     assert!(wrong(&mixed) > mixed.len() / 2 && mixed.len() > 1000, "control: {} of {}", wrong(&mixed), mixed.len());
 }

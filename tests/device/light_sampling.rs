@@ -3,7 +3,7 @@
 //!
 //! | test | density | negative control |
 //! |---|---|---|
-//! | choice | by power, for photons and for direct light | uniform over the lights |
+//! | choice | of photon paths by power | uniform over the lights |
 //! | surface | 1/area, of a triangle and a sphere | a corner moved; a sphere moved |
 //! | profile | the cosine on one side and on both; a spot's falloff, soft and hard | another inner cone; the other number of sides |
 //! | environment | by cells, and by the density told | another map |
@@ -31,7 +31,7 @@ pub fn upload(scene: &Scene, sampling: LightSampling) -> SceneBuffers {
 /// Rows of a probe over the scene, its lights chosen by power.
 pub fn probe(stem: &str, scene: &Scene, rows: &[Row]) -> Vec<[f32; 4]> {
     let buffers = upload(scene, LightSampling::Power);
-    Probe::of_scene(stem, &buffers, &buffers.lights.direct).run(rows)
+    Probe::of_scene(stem, &buffers, &buffers.lights.photons).run(rows)
 }
 
 /// An emissive triangle and an emissive sphere, apart from each other.
@@ -68,11 +68,8 @@ fn lights_are_chosen_by_power() {
     intensities.iter().zip(&mut powers).for_each(|(intensity, power)| *power = 4.0 * PI * f64::from(*intensity));
     powers[5..].copy_from_slice(&surfaces);
     let (photons, told) = chosen(&buffers, &buffers.lights.photons, &powers);
-    let mut direct = powers;
-    direct[..5].fill(0.0);
-    let (direct, told_direct) = chosen(&buffers, &buffers.lights.direct, &direct);
-    assert!(photons.fits() && direct.fits(), "for photons {photons:?}, for direct light {direct:?}");
-    assert!(told && told_direct, "the probabilities that come with the lights are others");
+    assert!(photons.fits(), "{photons:?}");
+    assert!(told, "the probabilities that come with the lights are others");
     let alike = upload(&scene, LightSampling::Uniform);
     let (alike, told) = chosen(&alike, &alike.lights.photons, &powers);
     assert!(!alike.fits() && !told, "control: every light alike: {alike:?}");

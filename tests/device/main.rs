@@ -10,6 +10,7 @@ mod gloss;
 mod kd_tree;
 mod layers;
 mod light_sampling;
+mod light_tree;
 mod limits;
 mod losses;
 mod microfacets;

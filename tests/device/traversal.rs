@@ -63,7 +63,7 @@ fn rays(middle: Vec3) -> Vec<Row> {
 /// Distance of the nearest hit of each ray on the device; infinite if there is none.
 fn on_device(scene: &Scene, bvh: &Bvh, rays: &[Row]) -> Vec<f64> {
     let buffers = SceneBuffers::new(gpu(), scene, bvh, &LightSettings::default()).expect("the scene fits");
-    let found = Probe::of_scene("trace_rays", &buffers, &buffers.lights.direct).run(rays);
+    let found = Probe::of_scene("trace_rays", &buffers, &buffers.lights.photons).run(rays);
     found.into_iter().map(|[t, .., primitive]| if primitive < 0.0 { f64::INFINITY } else { t.into() }).collect()
 }
 

@@ -46,14 +46,14 @@ fn twins() -> Vec<Twin> {
         TextureRecord { first, size, flags, levels, transform }
         Attributes { uvs, colors, tangents, pad }
         Medium { tint, ior, absorption, dispersion }
-        Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media, material, attributes, part, side }
+        Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media, material, attributes, part, side, leaf, root, pad0, pad1 }
+        LightNode { center, half, shine }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
         Path { origin, history, direction, bounces, beta, left, media }
         Photon { position, wi, flux, normal }
         VisiblePoint { position, next_map, weight, offset, ng, media_low, ns, media_high, view, above }
-        LobeLight { light_count, pad0, pad1, pad2 }
         LobePoint { position, offset, beta, eta, ng, ns, view, tangent, f0, f90, compensation, sheen, alpha, clearcoat, clearcoat_normal, pad }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays, reads }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, pad1, aim }
@@ -64,7 +64,7 @@ fn twins() -> Vec<Twin> {
         IrradianceCell { place, level, position, split, normal, pad0, irradiance, pad1 }
         FirstHit { normal, depth, albedo, alpha }
         DirectLight { light, points, pad0, pad1 }
-        EmitterSample { points, sample, samples, light_count }
+        EmitterSample { points, sample, samples, roots }
         Cell { lo, wi_lo, hi, wi_hi }
         PhotonPlace { position, wi }
         PhotonFlux { flux, normal }
@@ -128,6 +128,13 @@ fn constants() -> Vec<(&'static str, f64)> {
         SPHERE_LIGHT,
         ENVIRONMENT_LIGHT,
         TURNED_BIT,
+        LIGHT_ROOTS,
+        ENVIRONMENT_ROOT,
+        NO_LEAF,
+        LEAF_BIT,
+        BOTH_WAYS_BIT,
+        FAR_BIT,
+        NEXT_MASK,
         STREAM_PHOTON,
         STREAM_CAUSTIC,
         STORE_GLOBAL,
@@ -208,7 +215,7 @@ fn disagreements(wgsl: &str) -> Vec<String> {
 }
 
 /// Structs that kernels decode from the texels of tables.
-const IN_TABLES: [&str; 2] = ["Medium", "Normals"];
+const IN_TABLES: [&str; 3] = ["LightNode", "Medium", "Normals"];
 
 /// Records of tables of which kernels read single texels, so that no struct of theirs is one.
 const READ_BY_ROWS: [&str; 3] = ["MaterialRecord", "TextureRecord", "Attributes"];

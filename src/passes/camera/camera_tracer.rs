@@ -14,8 +14,7 @@ use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
     layout::{
-        self, CameraTile, Counters, FirstHit, Gathered, LobeLight, LobePoint, MARGIN_CELL, MARGIN_SAMPLES, PixelSums,
-        VisiblePoint,
+        self, CameraTile, Counters, FirstHit, Gathered, LobePoint, MARGIN_CELL, MARGIN_SAMPLES, PixelSums, VisiblePoint,
     },
     passes::{
         estimate::SharedPoints,
@@ -258,14 +257,8 @@ impl CameraTracer {
         let tile = [("first_hits", &self.first_hits), ("radiance", radiance), ("lobe_points", &self.lobe_points)];
         let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
         let start = Step { kernel: start.kernel, buffers: &started };
-        let lighting = gpu.uniform(
-            "lights of lobes",
-            &LobeLight { light_count: scene.lights.table.lights.len() as u32, ..Default::default() },
-        );
-        let lit =
-            [trace.buffers, &tile, &[("lighting", &lighting), ("choices", &scene.lights.photons.buffer)]].concat();
         let trace = Step { kernel: trace.kernel, buffers: &followed };
-        let light = lobes.map(|kernel| Step { kernel, buffers: &lit });
+        let light = lobes.map(|kernel| Step { kernel, buffers: &followed });
         let steps: Vec<Step> = light.into_iter().chain([trace]).collect();
         // Without mirrors and glass, the first surface that the camera sees ends every path.
         let surfaces = if scene.has_lobes { layout::CHAIN_LIMIT } else { 1 };

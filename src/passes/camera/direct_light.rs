@@ -1,5 +1,5 @@
-//! Direct light at visible points: shadow rays to each punctual light, and samples of emissive
-//! surfaces and the environment.
+//! Direct light at visible points: shadow rays to each of few punctual lights, and samples of the
+//! other lights.
 
 use crate::{
     gpu::{Buffer, Commands, Gpu, Kernel},
@@ -13,21 +13,22 @@ use crate::{
 pub struct DirectLighting {
     punctual: Kernel,
     /// Kernel and number of samples for the other lights; `None` if there are none.
-    emitters: Option<(Kernel, u32)>,
+    sampled: Option<(Kernel, u32)>,
 }
 
 impl DirectLighting {
-    /// Compiles the kernels that the scene's lights need. `samples`: samples per point of emissive
-    /// surfaces and the environment.
+    /// Compiles the kernels that the scene's lights need. `samples`: samples per point.
     pub fn new(gpu: &Gpu, scene: &SceneBuffers, sampler: Sampler, samples: u32) -> Self {
-        let sample = || scene.kernel_with(gpu, "sample_emitters", &[sampler_constant(sampler)]);
-        let emitters = scene.lights.table.has_extent().then(|| (sample(), samples));
-        Self { punctual: scene.kernel(gpu, "light_directly"), emitters }
+        let table = &scene.lights.table;
+        let meets_lights = ("MEETS_LIGHTS", f64::from(u8::from(table.has_extent())));
+        let kernel = || scene.kernel_with(gpu, "sample_emitters", &[sampler_constant(sampler), meets_lights]);
+        let sampled = table.is_sampled().then(|| (kernel(), samples));
+        Self { punctual: scene.kernel(gpu, "light_directly"), sampled }
     }
 
-    /// Number of steps, each one dispatch: one per punctual light, then one per sample.
+    /// Number of steps, each one dispatch: one per light that is summed, then one per sample.
     pub fn steps(&self, scene: &SceneBuffers) -> u32 {
-        scene.lights.table.punctual as u32 + self.emitters.as_ref().map_or(0, |(_, samples)| *samples)
+        scene.lights.table.summed.len() as u32 + self.sampled.as_ref().map_or(0, |(_, samples)| *samples)
     }
 
     /// Adds the direct light of one step to the radiance of the points. `buffers` are `tile`,
@@ -41,17 +42,15 @@ impl DirectLighting {
         buffers: &[(&str, &Buffer)],
     ) {
         let table = &scene.lights.table;
-        let punctual = table.punctual as u32;
-        let Some(sample) = step.checked_sub(punctual) else {
-            let uniform = gpu.uniform("direct light", &DirectLight { light: step, points, ..Default::default() });
+        if let Some(&light) = table.summed.get(step as usize) {
+            let uniform = gpu.uniform("direct light", &DirectLight { light, points, ..Default::default() });
             let bindings = self.punctual.bind(gpu, &[&scene.with(buffers)[..], &[("direct", &uniform)]].concat());
             return self.punctual.dispatch(commands, &bindings, u64::from(points));
-        };
-        let Some((kernel, samples)) = &self.emitters else { return };
-        let (samples, light_count) = (*samples, table.lights.len() as u32);
-        let uniform = gpu.uniform("emitter sample", &EmitterSample { points, sample, samples, light_count });
-        let own = [("sampling", &uniform), ("choices", &scene.lights.direct.buffer)];
-        let bindings = kernel.bind(gpu, &[&scene.with(buffers)[..], &own].concat());
+        }
+        let Some((kernel, samples)) = &self.sampled else { return };
+        let (sample, samples, roots) = (step - table.summed.len() as u32, *samples, table.sampled_roots);
+        let uniform = gpu.uniform("emitter sample", &EmitterSample { points, sample, samples, roots });
+        let bindings = kernel.bind(gpu, &[&scene.with(buffers)[..], &[("sampling", &uniform)]].concat());
         kernel.dispatch(commands, &bindings, u64::from(points));
     }
 }

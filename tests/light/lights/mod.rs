@@ -2,6 +2,7 @@
 
 mod aimed;
 mod closed_forms;
+mod many;
 mod photons;
 mod textured;
 

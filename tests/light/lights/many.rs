@@ -1,0 +1,183 @@
+//! Many lights, of which direct light chooses.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | points, spots | 2,000 of them give the sum of I a(θ)² cos θ/d² | every third one left out |
+//! | suns | 40 of them give the sum of E cos θ | every third one left out |
+//! | few | 16 have no noise | 17 have |
+//! | parts | a lamp in 800 pieces lights diffuse and rough surfaces like one | some pieces left out |
+//! | agreement | photons and rays have the same mean under many lights of all kinds | without the second bounce |
+//! | dark | a million lights of no power, and one of infinite or undefined place, change nothing | the place in order |
+
+use std::time::Instant;
+
+use caustica::{
+    bvh::Bvh,
+    scene::{Environment, Light, LightKind, Material, Scene, Surface},
+    settings::{LightSettings, Mode},
+    upload::SceneBuffers,
+};
+use glam::{Vec3, vec3};
+
+use support::{photons::Random, *};
+
+use super::{closed_forms::irradiance_at, floor, spot};
+
+/// A floor under `count` lights made by `light` from a place above it and a direction downwards.
+fn hall(count: usize, light: impl Fn(&mut Random, Vec3, Vec3) -> Light) -> Scene {
+    let mut random = Random(8);
+    let mut scene = floor(8.0);
+    for _ in 0..count {
+        let mut across = || 12.0 * random.unit() - 6.0;
+        let place = vec3(across(), 0.3 * across().abs() + 0.2, across());
+        let down = vec3(across(), -6.0, across()).normalize();
+        scene.lights.push(light(&mut random, place, down));
+    }
+    scene
+}
+
+/// Irradiance of an unhidden surface that faces up.
+fn sum_over(lights: &[Light], point: Vec3) -> f64 {
+    let of = |light: &Light| {
+        let to_light = (light.position - point).as_dvec3();
+        let wi = to_light.normalize();
+        let intensity = f64::from(light.intensity.x);
+        match light.kind {
+            LightKind::Directional => intensity * f64::from(-light.direction.y).max(0.0),
+            LightKind::Point => intensity * wi.y.max(0.0) / to_light.length_squared(),
+            LightKind::Spot { inner, outer } => {
+                let [full, none] = [inner, outer].map(|angle| f64::from(angle).cos());
+                let t = ((-wi.dot(light.direction.as_dvec3()) - none) / (full - none)).clamp(0.0, 1.0);
+                intensity * t * t * wi.y.max(0.0) / to_light.length_squared()
+            }
+        }
+    };
+    lights.iter().map(of).sum()
+}
+
+fn check_sum(scene: &Scene) {
+    let mut fewer = scene.clone();
+    let mut index = 0;
+    fewer.lights.retain(|_| {
+        index += 1;
+        index % 3 != 0
+    });
+    for point in [vec3(0.1, 0.0, 0.2), vec3(4.0, 0.0, -3.0)] {
+        // From below the lamps, so that none is before the camera.
+        let measured = |scene: &Scene| irradiance_at(scene, point + vec3(0.05, 0.1, 0.01), point, 256);
+        let right = sum_over(&scene.lights, point);
+        assert!(within(measured(scene), right, 0.01), "{} instead of {right} at {point}", measured(scene));
+        let left_out = measured(&fewer);
+        assert!(!within(left_out, right, 0.01), "control: {left_out} with fewer lights at {point}");
+    }
+}
+
+#[test]
+fn two_thousand_points_and_spots_light_as_their_sum() {
+    check_sum(&hall(2000, |random, place, _| point_light(place, 0.01 + random.unit().powi(8))));
+    check_sum(&hall(2000, |random, place, down| spot(place, down, 0.1 + random.unit().powi(4), 0.1, 0.7)));
+}
+
+#[test]
+fn many_suns_light_as_their_sum() {
+    check_sum(&hall(40, |random, place, direction| {
+        let kind = LightKind::Directional;
+        Light { kind, direction, ..point_light(place, 0.1 + random.unit().powi(4)) }
+    }));
+}
+
+#[test]
+fn sixteen_lights_have_no_noise() {
+    let spread = |count: usize| {
+        let mut scene = hall(count, |_, place, _| point_light(place, 1.0));
+        scene.cameras = vec![camera(vec3(0.15, 0.1, 0.21), vec3(0.1, 0.0, 0.2), 0.02)];
+        let render = render_scene(&scene, &settings(Mode::DirectRays, 1, 8));
+        let values = || render.frame.radiance().iter().map(|pixel| pixel[0]);
+        let (least, most) = (values().fold(f32::MAX, f32::min), values().fold(0.0, f32::max));
+        (most - least) / most
+    };
+    assert!(spread(16) < 1e-3, "{}", spread(16));
+    assert!(spread(17) > 1e-3, "control: {}", spread(17));
+}
+
+/// A surface under a lamp of `side` x `side` squares, all but each `gap`-th of them.
+fn under_a_lamp((surface, roughness): (Surface, f32), side: u32, gap: u32) -> Scene {
+    let mut scene = floor(2.0);
+    scene.materials[0] = Material { surface, roughness, ..scene.materials[0].clone() };
+    scene.materials.push(emissive("lamp", 0.0, 4.0, false));
+    let step = 1.6 / side as f32;
+    for i in (0..side * side).filter(|i| (i + 1) % gap != 0) {
+        let corner = vec3(step * (i % side) as f32 - 0.8, 1.2, step * (i / side) as f32 - 0.8);
+        add_quad(&mut scene, corner, Vec3::X * step, Vec3::Z * step, 1);
+    }
+    scene.cameras = vec![camera(vec3(0.0, 0.9, 1.9), vec3(0.0, 0.0, 0.3), 30.0)];
+    scene
+}
+
+#[test]
+fn a_lamp_in_pieces_lights_like_one() {
+    let metal = Surface::Layered { base: Vec3::splat(0.8), metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    for (name, surface, roughness) in
+        [("diffuse", diffuse(0.5), 1.0), ("rough metal", metal, 0.6), ("sharper metal", metal, 0.2)]
+    {
+        let seen = |side, gap| {
+            let settings = settings(Mode::DirectRays, 1, 48).with(|s| {
+                s.picture.spp = 32;
+                s.picture.light_samples = 8;
+            });
+            mean(&render_scene(&under_a_lamp((surface, roughness), side, gap), &settings))
+        };
+        let (whole, pieces, fewer) = (seen(1, u32::MAX), seen(20, u32::MAX), seen(20, 20));
+        assert!(within(pieces, whole, 0.01), "{name}: {pieces} in pieces, {whole} as one");
+        assert!(!within(fewer, whole, 0.01), "control, {name}: {fewer} without some, {whole} as one");
+    }
+}
+
+#[test]
+fn photons_and_rays_agree_under_many_lights() {
+    let mut random = Random(5);
+    let mut scene = hall(40, |random, place, _| point_light(place + Vec3::Y, 0.1 + random.unit().powi(4)));
+    scene.lights.extend(hall(30, |_, place, down| spot(place + Vec3::Y, down, 1.0, 0.2, 0.5)).lights);
+    scene.materials.push(emissive("lamps", 0.2, 20.0, true));
+    for _ in 0..300 {
+        let corner = vec3(10.0 * random.unit() - 5.0, 1.5 + 2.0 * random.unit(), 10.0 * random.unit() - 5.0);
+        add_quad(&mut scene, corner, vec3(0.05, 0.02, 0.0), vec3(0.0, 0.02, 0.05) * (0.2 + random.unit()), 1);
+    }
+    scene.environment = Some(Environment::uniform(Vec3::splat(0.1)));
+    add_box(&mut scene, vec3(-1.0, 0.0, -1.5), vec3(1.0, 0.8, -0.5), 0);
+    scene.cameras = vec![camera(vec3(0.0, 1.2, 3.0), vec3(0.0, 0.0, 0.0), 50.0)];
+    let seen = |mode, bounces| {
+        let settings = settings(mode, 400_000, 48).with(|s| {
+            s.photons.max_bounces = bounces;
+            s.picture.spp = 16;
+        });
+        mean(&render_scene(&scene, &settings))
+    };
+    let (rays, photons) = (seen(Mode::Hybrid, 6), seen(Mode::Photons, 6));
+    assert!(within(photons, rays, 0.02), "{rays} by rays, {photons} by photons");
+    let once = seen(Mode::Photons, 1);
+    assert!(!within(once, rays, 0.02), "control: {once} without the second bounce");
+}
+
+#[test]
+fn a_million_dark_lights_change_nothing() {
+    let lit = hall(30, |_, place, _| point_light(place, 1.0));
+    let mut dark = lit.clone();
+    dark.lights.extend((0..1_000_000).map(|i| point_light(Vec3::splat(i as f32), 0.0)));
+    let upload = |scene: &Scene| {
+        let start = Instant::now();
+        let buffers = SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &LightSettings::default()).expect("fits");
+        (buffers.lights.table.trees.nodes.clone(), start.elapsed().as_secs_f64())
+    };
+    let ((nodes, _), (among_dark, seconds)) = (upload(&lit), upload(&dark));
+    assert_eq!(nodes, among_dark);
+    assert!(seconds < 30.0, "{seconds} s");
+    // A light without a place is never chosen.
+    let mut nowhere = lit.clone();
+    nowhere.lights.push(point_light(vec3(f32::NAN, 1.0, 0.0), 1.0));
+    nowhere.lights.push(point_light(vec3(0.0, f32::INFINITY, 0.0), 1.0));
+    let nodes_of = |scene: &Scene| upload(scene).0.len();
+    assert_eq!(nodes_of(&nowhere), nodes.len());
+    nowhere.lights[30].position = Vec3::Y;
+    assert_eq!(nodes_of(&nowhere), nodes.len() + 2, "control");
+}
