@@ -754,6 +754,20 @@ pub struct CellGrid {
     pub points: u32,
 }
 
+/// What the rays of final gathering of a point tell of the light's way there: sums over rays.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ArrivingLight {
+    /// Directions weighted by radiance, and 1 by irradiance.
+    pub direction: [f32; 3],
+    pub light: f32,
+    /// Inverse distances to what was hit, 1/m.
+    pub nearness: f32,
+    pub pad0: f32,
+    pub pad1: f32,
+    pub pad2: f32,
+}
+
 /// Irradiance at a visible point of one of the pixels of a record grid.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -764,9 +778,9 @@ pub struct IrradianceRecord {
     pub ng: u32,
     /// By that normal, W/m²; negative: no point.
     pub irradiance: [f32; 3],
-    /// Mean direction of the light, weighted by what it brings, shorter than 1; signed, normalised,
-    /// eight bits for each coordinate.
-    pub mean_direction: u32,
+    /// Eight bits each, signed and normalised: the vector ∫ L ω dω along the surface, over twice the
+    /// irradiance; and the part of the filter's radius up to which the record is taken.
+    pub direction_and_reach: u32,
 }
 
 /// Arguments of `filter_irradiance`: records by rows of a grid that is coarser than the picture,

@@ -249,7 +249,11 @@ mod tests {
     fn estimates_of_the_report_do_without_final_gathering() {
         for words in ["--mode photons", "--raw-estimate", "--search kdtree", "--search radius --radius 1"] {
             let s = settings(words);
-            assert_eq!((s.photons.final_gather, s.estimate.gather_spacing, s.estimate.neighbors), (0, 0, 100), "{words}");
+            assert_eq!(
+                (s.photons.final_gather, s.estimate.gather_spacing, s.estimate.neighbors),
+                (0, 0, 100),
+                "{words}"
+            );
         }
     }
 

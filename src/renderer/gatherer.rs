@@ -8,11 +8,11 @@ use super::{
 use crate::{
     error::Result,
     gpu::Gpu,
-    layout::{Gathered, IrradianceRecord, RecordGrid, VisiblePoint, octahedral},
+    layout::{Gathered, RecordGrid, VisiblePoint},
     map_kind::MapKind,
     passes::{
         EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
-        NO_RECORD, PhotonMap, StepCount, Tile, filter_window,
+        PhotonMap, Records, StepCount, Tile, filter_window,
     },
     progress::Progress,
     reference::{Estimate, KdMap},
@@ -161,13 +161,13 @@ impl Gatherer for MapGatherer<'_> {
         stats: &mut Stats,
         progress: &dyn Progress,
     ) -> Result<()> {
-        let (window, branches) = (coarse.window, coarse.tracer.branches() as usize);
-        let mut records = vec![NO_RECORD; window.width as usize * window.height as usize * branches];
+        let window = coarse.window;
+        let mut taken = Records::new((window.width, window.height), coarse.tracer.branches());
         for tile in &coarse.tracer.tiles() {
             progress.check()?;
             let mut step = timed(&mut stats.seconds.camera, || coarse.tracer.trace(coarse.gpu, coarse.scene, tile))?;
             let mut seconds = 0.0;
-            let (points, found) = timed(&mut seconds, || {
+            let found = timed(&mut seconds, || {
                 // Irradiance itself, by the geometric normal.
                 let flat = |point: &VisiblePoint| VisiblePoint { ns: point.ng, ..bare(point) };
                 let points: Vec<_> = coarse.points(tile)?.iter().map(flat).collect();
@@ -175,28 +175,23 @@ impl Gatherer for MapGatherer<'_> {
                 coarse.set_points(&points);
                 coarse.set_radiance(&vec![[0.0; 4]; points.len()]);
                 step += self.gather_finally(coarse, tile, progress)?;
-                let directions = coarse.mean_directions(tile)?;
-                let light = coarse.radiance(tile)?;
-                Ok((points, light.into_iter().zip(directions).collect::<Vec<_>>()))
+                let light = coarse.radiance(tile)?.into_iter().zip(coarse.arriving(tile)?);
+                Ok(points.into_iter().zip(light).collect::<Vec<_>>())
             })?;
             stats.seconds.gather += seconds;
             tally::add_step(stats, step);
-            for (pixel, slots) in (0..).zip(points.chunks(branches).zip(found.chunks(branches))) {
-                let Some((column, row)) = coarse.tracer.pixel(tile, pixel) else { continue };
-                let first = (row * window.width + column) as usize * branches;
-                for (slot, (point, (light, mean_direction))) in (first..).zip(slots.0.iter().zip(slots.1)) {
-                    if point.next_map != 0 {
-                        records[slot] = IrradianceRecord {
-                            position: point.position,
-                            ng: octahedral(point.ng.into()),
-                            irradiance: [light[0], light[1], light[2]],
-                            mean_direction: snorm8(*mean_direction),
-                        };
-                    }
+            for (pixel, slots) in (0..).zip(found.chunks(coarse.tracer.branches() as usize)) {
+                let Some(place) = coarse.tracer.pixel(tile, pixel) else { continue };
+                for (branch, (point, (light, arriving))) in
+                    (0..).zip(slots).filter(|(_, (point, _))| point.next_map != 0)
+                {
+                    taken.put(place, branch, point, *light, arriving, coarse.final_rays());
                 }
             }
         }
         let per_pixel = |coarse: u32, fine: u32| coarse as f32 / fine as f32;
+        // Of the picture's pixels.
+        let reach = self.estimate.gather_radius * coarse.tracer.pixel_height() * per_pixel(coarse.size.1, size.1);
         let grid = RecordGrid {
             first_column: window.column,
             first_row: window.row,
@@ -204,11 +199,11 @@ impl Gatherer for MapGatherer<'_> {
             rows: window.height,
             columns_per_pixel: per_pixel(coarse.size.0, size.0),
             rows_per_pixel: per_pixel(coarse.size.1, size.1),
-            // Of the picture's pixels.
-            reach: self.estimate.gather_radius * coarse.tracer.pixel_height() * per_pixel(coarse.size.1, size.1),
+            reach,
             window: filter_window(self.estimate.gather_radius, self.estimate.gather_spacing),
             ..Default::default()
         };
+        let records = taken.finish(|position| reach * coarse.tracer.scale_at(position));
         self.records = Some(IrradianceRecords::new(coarse.gpu, &records, grid)?);
         Ok(())
     }
@@ -235,11 +230,6 @@ impl Gatherer for MapGatherer<'_> {
         tally::add_step(stats, count);
         Ok(())
     }
-}
-
-/// Coordinates up to 1 in size, signed and normalised, in eight bits each.
-fn snorm8(v: [f32; 3]) -> u32 {
-    v.iter().rev().fold(0, |word, x| word << 8 | u32::from((x * 127.0).round() as i8 as u8))
 }
 
 /// A point whose radiance is its irradiance.

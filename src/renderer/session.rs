@@ -15,7 +15,9 @@ use crate::{
     pixel_filter::PixelFilter,
     progress::{Progress, Stage},
     scene::Scene,
-    settings::{Crop, EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Search, Settings, check_samples},
+    settings::{
+        Crop, EstimateSettings, LightSettings, PhotonSettings, PictureSettings, Search, Settings, check_samples,
+    },
     stats::{DeviceStats, Stats, timed},
     upload::SceneBuffers,
 };

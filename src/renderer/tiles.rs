@@ -6,7 +6,7 @@ use crate::{
     error::Result,
     gpu::Gpu,
     image::Film,
-    layout::VisiblePoint,
+    layout::{ArrivingLight, VisiblePoint},
     passes::{CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
@@ -185,8 +185,7 @@ impl<'a> CameraPass<'a> {
         let at_once = (self.tracer.room() as u32 / chosen.len() as u32).min(gather.rays());
         for first in (0..gather.rays()).step_by(at_once as usize) {
             progress.check()?;
-            let rays =
-                FinalRays { first, count: at_once.min(gather.rays() - first), chosen: chosen.len() as u32 };
+            let rays = FinalRays { first, count: at_once.min(gather.rays() - first), chosen: chosen.len() as u32 };
             done += gather.trace(self.gpu, self.scene, &self.tracer, tile, rays)?;
             done += gather.light_directly(self.gpu, self.scene, &self.tracer, tile, rays)?;
             light(gather, rays, &chosen)?;
@@ -213,12 +212,10 @@ impl<'a> CameraPass<'a> {
         self.gpu.submit(encoder);
     }
 
-    /// Mean direction of the light that rays of final gathering brought to each of the tile's
-    /// points, weighted by it; 0 where there was none.
-    pub fn mean_directions(&self, tile: &Tile) -> Result<Vec<[f32; 3]>> {
+    /// Where the light at the tile's points came from, by rays of final gathering.
+    pub fn arriving(&self, tile: &Tile) -> Result<Vec<ArrivingLight>> {
         let Some(gather) = &self.final_gather else { return Ok(Vec::new()) };
-        let sums: Vec<[f32; 4]> = self.gpu.read(&gather.arriving, 0, self.tracer.point_count(tile).into())?;
-        Ok(sums.iter().map(|[x, y, z, w]| if *w > 0.0 { [x / w, y / w, z / w] } else { [0.0; 3] }).collect())
+        self.gpu.read(&gather.arriving, 0, self.tracer.point_count(tile).into())
     }
 
     /// Reads the radiance of the visible points so far.

@@ -207,7 +207,15 @@ const ORDERS: [(&str, &[&str]); 5] = [
     ("passes", &["maps", "wavefront", "photons", "estimate", "camera"]),
     (
         "passes/estimate",
-        &["query_order", "gather_kernels", "gather", "share_estimates", "cell_table", "irradiance_cache"],
+        &[
+            "query_order",
+            "gather_kernels",
+            "gather",
+            "share_estimates",
+            "cell_table",
+            "irradiance_cache",
+            "irradiance_records",
+        ],
     ),
     (
         "study",

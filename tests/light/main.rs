@@ -13,4 +13,5 @@ mod references;
 mod refraction;
 mod seen;
 mod solids;
+mod spaced_gathering;
 mod transport;

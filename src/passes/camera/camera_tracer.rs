@@ -193,6 +193,12 @@ impl CameraTracer {
         2.0 * Vec3::from(self.view.up).length() / self.view.height as f32
     }
 
+    /// Ratio of the width of what a pixel sees at a place to [`Self::pixel_height`].
+    #[must_use]
+    pub fn scale_at(&self, place: Vec3) -> f32 {
+        if self.view.parallel != 0 { 1.0 } else { place.distance(self.view.position.into()) }
+    }
+
     /// Maximum number of visible points of any tile, without its margin.
     #[must_use]
     pub fn room(&self) -> u64 {

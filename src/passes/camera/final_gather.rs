@@ -10,7 +10,7 @@ use super::{
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CameraTile, FinalStep, VisiblePoint},
+    layout::{ArrivingLight, CameraTile, FinalStep, VisiblePoint},
     passes::wavefront::Step,
     reference::mix,
     settings::Sampler,
@@ -39,8 +39,7 @@ pub struct FinalGather {
     pub found: Buffer,
     /// Direction of each ray, octahedral.
     directions: Buffer,
-    /// For each visible point, sums of directions and of 1 over its rays, weighted by their light,
-    /// `vec4f`. Rays add to what is there.
+    /// An [`ArrivingLight`] for each visible point. Rays add to what is there.
     pub arriving: Buffer,
 }
 
@@ -83,7 +82,7 @@ impl FinalGather {
             ends: gpu.storage::<VisiblePoint>("ends of final-gather rays", tracer.room())?,
             found: gpu.storage::<[f32; 4]>("light of final-gather rays", tracer.room())?,
             directions: gpu.storage::<u32>("directions of final-gather rays", tracer.room())?,
-            arriving: gpu.storage::<[f32; 4]>("directions of light", tracer.room())?,
+            arriving: gpu.storage::<ArrivingLight>("arriving light", tracer.room())?,
         })
     }
 
@@ -166,6 +165,8 @@ impl FinalGather {
             ("directions", &self.directions),
             ("radiance", &tracer.radiance),
             ("arriving", &self.arriving),
+            ("seen", &self.ends),
+            ("points", &tracer.points),
         ];
         let mut encoder = gpu.encoder();
         self.sum.dispatch(&mut encoder, &self.sum.bind(gpu, &buffers), rays.chosen.into());

@@ -1,10 +1,12 @@
 //! Irradiance at some of the picture's visible points, filtered over their surroundings for all of
 //! them. Kernel: `filter_irradiance`.
 
+use glam::Vec3;
+
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CameraTile, IrradianceRecord, RecordGrid},
+    layout::{ArrivingLight, CameraTile, IrradianceRecord, RecordGrid, VisiblePoint, octahedral},
 };
 
 /// Pixels of the record grid on each side of a point among which the filter looks for records at
@@ -19,8 +21,88 @@ pub fn filter_window(radius: f32, spacing: u32) -> u32 {
 }
 
 /// A slot without a point.
-pub const NO_RECORD: IrradianceRecord =
-    IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], mean_direction: 0 };
+const NO_RECORD: IrradianceRecord =
+    IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], direction_and_reach: 0 };
+
+/// Part of the distance to what is near over which a record is taken.
+const NEAR_PART: f32 = 1.5;
+
+/// Records in the order of a grid, as they are taken.
+#[derive(Debug)]
+pub struct Records {
+    columns: usize,
+    branches: usize,
+    records: Vec<IrradianceRecord>,
+    /// Harmonic mean distance of each point to what is around it, metres.
+    distances: Vec<f32>,
+}
+
+impl Records {
+    /// No record yet.
+    #[must_use]
+    pub fn new((columns, rows): (u32, u32), branches: u32) -> Self {
+        let slots = columns as usize * rows as usize * branches as usize;
+        let (columns, branches) = (columns as usize, branches as usize);
+        Self { columns, branches, records: vec![NO_RECORD; slots], distances: vec![f32::INFINITY; slots] }
+    }
+
+    /// Takes the light that `rays` brought to a point, for a pixel of the grid and a branch of its
+    /// sample.
+    pub fn put(
+        &mut self,
+        (column, row): (u32, u32),
+        branch: usize,
+        point: &VisiblePoint,
+        light: [f32; 4],
+        arriving: &ArrivingLight,
+        rays: u32,
+    ) {
+        let slot = (row as usize * self.columns + column as usize) * self.branches + branch;
+        let (all, normal) = (Vec3::from(arriving.direction), Vec3::from(point.ng));
+        let along = (all - normal * all.dot(normal)) / (2.0 * arriving.light.max(f32::MIN_POSITIVE));
+        let along = along.clamp_length_max(1.0).to_array();
+        self.records[slot] = IrradianceRecord {
+            position: point.position,
+            ng: octahedral(point.ng.into()),
+            irradiance: [light[0], light[1], light[2]],
+            direction_and_reach: along.iter().rev().fold(0, |word, x| word << 8 | snorm8(*x)),
+        };
+        self.distances[slot] = rays as f32 / arriving.nearness;
+    }
+
+    /// All records, with their reach. `radius`: that of the filter at a place, metres.
+    #[must_use]
+    pub fn finish(mut self, radius: impl Fn(Vec3) -> f32) -> Vec<IrradianceRecord> {
+        for slot in 0..self.records.len() {
+            let distance = self.distance(slot);
+            let record = &mut self.records[slot];
+            let part = NEAR_PART * distance / radius(record.position.into());
+            record.direction_and_reach |= snorm8(part.clamp(1.0 / 127.0, 1.0)) << 24;
+        }
+        self.records
+    }
+
+    /// Distance to what is around a record. It is no farther away than from a neighbour by way of
+    /// that (Křivánek et al. 2006, "Making Radiance and Irradiance Caching Practical", neighbour
+    /// clamping).
+    fn distance(&self, slot: usize) -> f32 {
+        let here = Vec3::from(self.records[slot].position);
+        let row = self.columns * self.branches;
+        let around = [-1, 0, 1]
+            .map(|rows: isize| [-1, 0, 1].map(|columns: isize| rows * row as isize + columns * self.branches as isize));
+        let neighbors = around.as_flattened().iter().filter_map(|step| slot.checked_add_signed(*step));
+        let there = neighbors.filter_map(|n| Some((self.records.get(n)?, self.distances[n])));
+        there
+            .filter(|(record, _)| record.irradiance[0] >= 0.0)
+            .map(|(record, distance)| distance + here.distance(record.position.into()))
+            .fold(self.distances[slot], f32::min)
+    }
+}
+
+/// A number up to 1 in size, signed and normalised, in eight bits.
+fn snorm8(x: f32) -> u32 {
+    u32::from((x * 127.0).round() as i8 as u8)
+}
 
 /// The kernel and the records that it reads.
 #[derive(Debug)]

@@ -1,0 +1,147 @@
+//! Final gathering at spaced points, whose light the samples around them take.
+//!
+//! | scene | right | negative control |
+//! |---|---|---|
+//! | a ball on the floor, leaves, a slit, mirrors that face each other, a glass ball before all | final gathering with many rays at every sample | the estimate from the photons around the point |
+//! | a floor whose interpolated normals lean | the same | the floor without them |
+//! | a crop | the bits of the whole | another seed |
+
+use caustica::{
+    renderer::Render,
+    scene::{Scene, Surface},
+    settings::{Crop, Mode, Settings},
+};
+use glam::{Vec3, vec3};
+use support::{photons::Random, *};
+
+const MATT: u32 = 0;
+const MIRROR: u32 = 1;
+const GLASS: u32 = 2;
+
+/// A closed room of 2 m with a lamp, and a camera at one wall.
+fn room() -> Scene {
+    let mirror = Surface::Mirror { tint: Vec3::splat(0.9) };
+    let mut scene = scene(&[diffuse(0.7), mirror, glass()]);
+    scene.materials[0].double_sided = true;
+    add_box(&mut scene, Vec3::ONE, Vec3::NEG_ONE, MATT);
+    scene.lights.push(point_light(vec3(0.2, 0.8, 0.1), 3.0));
+    scene.cameras.push(camera(vec3(0.0, 0.1, 0.95), vec3(0.0, -0.3, 0.0), 70.0));
+    scene
+}
+
+fn with(change: impl FnOnce(&mut Scene)) -> Scene {
+    let mut scene = room();
+    change(&mut scene);
+    scene
+}
+
+fn leaves(scene: &mut Scene) {
+    let mut random = Random(5);
+    for _ in 0..40 {
+        let corner = vec3(0.6, 0.3, 0.3) * random.vector() - vec3(0.0, 0.4, 0.0);
+        let along = 0.12 * random.direction();
+        let across = 0.08 * along.cross(random.direction()).normalize();
+        add_quad(scene, corner, along, across, MATT);
+    }
+}
+
+fn scenes() -> [(&'static str, Scene); 5] {
+    let ball = |center, radius, material| with(|s| s.spheres.push(sphere(center, radius, material)));
+    [
+        ("a ball on the floor", ball(vec3(0.1, -0.7, -0.2), 0.3, MATT)),
+        ("leaves", with(leaves)),
+        (
+            "a slit",
+            with(|s| {
+                // Between the lamp's half of the room and the camera's.
+                add_box(s, vec3(-1.0, -1.0, -0.02), vec3(-0.05, 1.0, 0.02), MATT);
+                add_box(s, vec3(0.05, -1.0, -0.02), vec3(1.0, 1.0, 0.02), MATT);
+                s.lights[0].position = vec3(0.2, 0.6, -0.6);
+            }),
+        ),
+        (
+            "mirrors that face each other",
+            with(|s| {
+                add_quad(s, vec3(-0.9, -0.9, 0.6), vec3(0.0, 0.0, -1.2), vec3(0.0, 1.2, 0.0), MIRROR);
+                add_quad(s, vec3(0.9, -0.9, -0.6), vec3(0.0, 0.0, 1.2), vec3(0.0, 1.2, 0.0), MIRROR);
+            }),
+        ),
+        ("a glass ball before all", ball(vec3(0.0, 0.0, 0.4), 0.35, GLASS)),
+    ]
+}
+
+/// Settings of a small picture by 40,000 photons, without final gathering.
+fn plain() -> Settings {
+    settings(Mode::Hybrid, 40_000, 64)
+}
+
+fn gathering(rays: u32, spacing: u32) -> Settings {
+    plain().with(|s| {
+        s.photons.final_gather = rays;
+        s.estimate.neighbors = 50;
+        s.estimate.gather_spacing = spacing;
+    })
+}
+
+/// Gathers at every sample with many rays and photons.
+fn converged() -> Settings {
+    gathering(128, 0).with(|s| {
+        s.photons.global = 100_000;
+        s.photons.caustic = 20_000;
+    })
+}
+
+/// Mean of squared differences over squared values.
+fn error(found: &Render, right: &Render) -> f64 {
+    let pairs = found.frame.radiance().iter().flatten().zip(right.frame.radiance().iter().flatten());
+    let errors = pairs.map(|(a, b)| f64::from((a - b).powi(2) / (b * b + 0.01)));
+    errors.sum::<f64>() / (3 * right.frame.radiance().len()) as f64
+}
+
+#[test]
+fn spaced_points_light_every_sample() {
+    for (name, scene) in scenes() {
+        let right = render_scene(&scene, &converged());
+        let spaced = render_scene(&scene, &gathering(32, 2));
+        let (found, control) = (error(&spaced, &right), error(&render_scene(&scene, &plain()), &right));
+        assert!(found < 0.75 * control, "{name}: {found}, and {control} by the photons around each point");
+        assert!(within(mean(&spaced), mean(&right), 0.03), "{name}: {} instead of {}", mean(&spaced), mean(&right));
+    }
+}
+
+#[test]
+fn leaning_normals_take_light_from_their_side() {
+    let floor = |lean: f32| {
+        with(|s| {
+            s.cameras = vec![camera(vec3(0.1, 0.3, 0.001), vec3(0.1, -1.0, 0.0), 60.0)];
+            // Most light comes from the lit wall, not from above.
+            s.lights[0].position = vec3(-0.9, -0.2, 0.0);
+            add_box(s, vec3(-0.9, -1.0, -0.9), vec3(-0.8, 0.2, 0.9), MATT);
+            let first = s.triangles.len();
+            add_quad(s, vec3(-0.7, -0.95, 0.9), vec3(1.6, 0.0, 0.0), vec3(0.0, 0.0, -1.8), MATT);
+            let normal = vec3(lean, 1.0, 0.0).normalize();
+            s.triangles[first..].iter_mut().for_each(|t| t.normals = [normal; 3]);
+        })
+    };
+    let of = |scene: &Scene, settings: &Settings| mean(&render_scene(scene, settings));
+    let flat = of(&floor(0.0), &gathering(32, 2));
+    for (lean, matters) in [(0.5, true), (-0.5, false)] {
+        let (right, found) = (of(&floor(lean), &converged()), of(&floor(lean), &gathering(32, 2)));
+        assert!(within(found, right, 0.06), "{lean}: {found} instead of {right}");
+        assert!(!matters || !within(flat, right, 0.15), "control: {flat} without them instead of {right}");
+    }
+}
+
+#[test]
+fn a_crop_has_the_bits_of_the_whole() {
+    let (_, scene) = &scenes()[0];
+    let settings = gathering(8, 2).with(|s| s.picture.size = Some((150, 140)));
+    let whole = render_scene(scene, &settings);
+    let crop = Crop { column: 70, row: 60, width: 21, height: 17 };
+    let part = render_scene(scene, &settings.clone().with(|s| s.picture.crop = Some(crop)));
+    let rows = whole.frame.radiance().chunks(150).skip(60).take(17);
+    let expected: Vec<_> = rows.flat_map(|row| row[70..91].to_vec()).collect();
+    assert_eq!(part.frame.radiance(), expected);
+    let other = render_scene(scene, &settings.with(|s| s.photons.seed = 1));
+    assert_ne!(other.frame.radiance(), whole.frame.radiance(), "control: another seed");
+}
