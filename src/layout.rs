@@ -778,8 +778,8 @@ pub struct IrradianceRecord {
     pub ng: u32,
     /// By that normal, W/m²; negative: no point.
     pub irradiance: [f32; 3],
-    /// Eight bits each, signed and normalised: the vector ∫ L ω dω along the surface, over twice the
-    /// irradiance; and the part of the filter's radius up to which the record is taken.
+    /// Eight bits each, signed and normalised: the vector ∫ L ω dω along the surface, over twice
+    /// the irradiance; and the part of the filter's radius up to which the record is taken.
     pub direction_and_reach: u32,
 }
 

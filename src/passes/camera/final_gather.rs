@@ -186,8 +186,8 @@ impl FinalGather {
     }
 }
 
-/// The rays of a step as samples of one pixel: all of them draw from one set of numbers. At glass, a
-/// ray chooses reflection or refraction at random.
+/// The rays of a step as samples of one pixel: all of them draw from one set of numbers. At glass,
+/// a ray chooses reflection or refraction at random.
 fn rays_as_samples(view: &CameraTile, rays: FinalRays) -> CameraTile {
     let tile_seed = mix(view.first_row << 16 | view.first_column) ^ mix(view.first_sample);
     CameraTile {
