@@ -47,6 +47,10 @@ pub(crate) trait Gatherer {
     fn show(&mut self, _picture: usize, _pass: &CameraPass) {}
 }
 
+/// Adds light at the ends of rays to what they have found. The last argument has the indices of the
+/// points that they started from.
+pub(crate) type RayLight<'a> = dyn FnMut(&FinalGather, FinalRays, &[u32]) -> Result<()> + 'a;
+
 /// Device part of a camera pass: camera paths, direct light, rays of final gathering.
 pub(crate) struct CameraPass<'a> {
     pub gpu: &'a Gpu,
@@ -168,12 +172,7 @@ impl<'a> CameraPass<'a> {
     /// Traces rays of final gathering of all of the tile's visible points that still wait, in steps
     /// of as many as there is room for. After each step, `light` receives the rays, and adds the
     /// light at their ends to what they have found. The result is then in the points' radiance.
-    pub fn gather_finally(
-        &self,
-        tile: &Tile,
-        progress: &dyn Progress,
-        light: &mut dyn FnMut(&FinalGather, FinalRays, &[u32]) -> Result<()>,
-    ) -> Result<StepCount> {
+    pub fn gather_finally(&self, tile: &Tile, progress: &dyn Progress, light: &mut RayLight) -> Result<StepCount> {
         let mut done = StepCount::default();
         let Some(gather) = &self.final_gather else { return Ok(done) };
         let points = (0..).zip(self.points(tile)?);
