@@ -10,9 +10,11 @@ use caustica::image::{difference::rel_mse, read_exr};
 
 const RUNS: usize = 5;
 /// Options of each measurement, besides the size.
-const SETTINGS: [&str; 4] = [
-    "--photons 200k --spp 4",
-    "--photons 200k --spp 4 --share 0",
+const SETTINGS: [&str; 6] = [
+    "",
+    "--photons 200k",
+    "--final-gather 0 --photons 200k --spp 4",
+    "--final-gather 0 --photons 200k --spp 4 --share 0",
     "--global-photons 100k --caustic-photons 50k --spp 2 --raw-estimate -k 90 --max-bounces 12",
     "--photons 70k --spp 2 --raw-estimate -k 70 --max-bounces 12",
 ];

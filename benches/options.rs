@@ -10,20 +10,24 @@ use std::{path::Path, process::Command, time::Instant};
 use caustica::image::{difference::rel_mse, read_exr};
 
 /// Changed options, and whether the reference shows the same picture.
-const CHANGES: [(&str, bool); 18] = [
+const CHANGES: [(&str, bool); 22] = [
     ("", true),
-    ("--share 0", true),
+    ("--gather-spacing 1 --gather-radius 4", true),
+    ("--gather-spacing 4 --gather-radius 16", true),
+    ("--final-gather 32", true),
+    ("--final-gather 0", true),
+    ("--final-gather 0 --share 0", true),
     ("--sampler random", true),
     ("--raw-estimate", true),
     ("--raw-estimate --share 0", true),
-    ("--emission unaimed", true),
-    ("--kernel constant", true),
-    ("--kernel epanechnikov", true),
-    ("--kernel gaussian", true),
-    ("--kernel silverman", true),
+    ("--final-gather 0 --emission unaimed", true),
+    ("--final-gather 0 --kernel constant", true),
+    ("--final-gather 0 --kernel epanechnikov", true),
+    ("--final-gather 0 --kernel gaussian", true),
+    ("--final-gather 0 --kernel silverman", true),
     ("--search radius --radius 0.06", true),
-    ("--final-gather 16", true),
-    ("--final-gather 16 --irradiance-cells 0", true),
+    ("--final-gather 16 --gather-spacing 0", true),
+    ("--final-gather 16 --gather-spacing 0 --irradiance-cells 0", true),
     ("--spp 1", true),
     ("--spp 16", true),
     ("--pixel-filter gaussian", false),

@@ -11,7 +11,10 @@ use crate::{
     error::Result,
     gpu::Gpu,
     image::{Film, Frame},
-    passes::{CameraKernels, EstimateSharing, MapKernels, PathRanges, PhotonTracer, filter_window},
+    passes::{
+        CameraKernels, EstimateSharing, FinalGather, IrradianceCache, IrradianceRecords, MapKernels, PathRanges,
+        PhotonTracer, filter_window,
+    },
     pixel_filter::PixelFilter,
     progress::{Progress, Stage},
     scene::Scene,
@@ -71,8 +74,8 @@ impl<'a> Session<'a> {
     }
 
     /// Starts to compile the kernels that a picture with these settings needs, in the order of
-    /// their use, so that the first ones run while others compile. Kernels of final gathering, and
-    /// all kernels that were not requested here, are compiled when they are needed.
+    /// their use, so that the first ones run while others compile. Kernels that were not requested
+    /// here are compiled when they are needed.
     pub fn prefetch(&self, settings: &Settings) {
         let (gpu, scene) = (self.gpu, &self.buffers);
         let Settings { photons, estimate, picture, .. } = settings;
@@ -84,6 +87,11 @@ impl<'a> Session<'a> {
         if photons.mode.traces_photons() && estimate.search != Search::KdTree {
             EstimateSharing::prefetch(gpu);
             gather_for(gpu, scene, estimate).prefetch(gpu, &estimate.into());
+        }
+        if photons.final_gather > 0 {
+            FinalGather::prefetch(gpu, scene, photons.sampler);
+            IrradianceCache::prefetch(gpu);
+            IrradianceRecords::prefetch(gpu);
         }
     }
 

@@ -17,16 +17,38 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Kernels, and buffers for as many rays as a tile has points. Memory does not grow with the number
-/// of rays.
+/// Kernels of final gathering.
 #[derive(Debug)]
-pub struct FinalGather {
+struct FinalKernels {
     start: Kernel,
     trace: Kernel,
     sum: Kernel,
     /// Direct light at rough lobes, if there are any.
     lobes: Option<Kernel>,
     direct: DirectLighting,
+}
+
+impl FinalKernels {
+    fn new(gpu: &Gpu, scene: &SceneBuffers, sampler: Sampler) -> Self {
+        let constant = sampler_constant(sampler);
+        Self {
+            start: scene.kernel_with(gpu, "start_final_gather", &[constant]),
+            // An emitter that a ray hits gives direct light, or a caustic by way of lobes that cast
+            // one: the visible point has both already.
+            trace: scene.kernel_with(gpu, "trace_camera", &[constant, ("SEES_BEYOND_WIDE_LOBES", 1.0)]),
+            sum: Kernel::new(gpu, "sum_final_gather", &[]),
+            lobes: (scene.materials.has_rough)
+                .then(|| scene.kernel_with(gpu, "light_lobes", &[constant, ("LIGHTS_WIDE_LOBES_ONLY", 1.0)])),
+            direct: DirectLighting::new(gpu, scene, sampler, 1),
+        }
+    }
+}
+
+/// Kernels, and buffers for as many rays as a tile has points. Memory does not grow with the number
+/// of rays.
+#[derive(Debug)]
+pub struct FinalGather {
+    kernels: FinalKernels,
     rays: u32,
     /// Whether the rays of all points are one set of numbers.
     joint: bool,
@@ -66,16 +88,8 @@ impl FinalGather {
     /// # Errors
     /// Limits of the adapter.
     pub fn new(gpu: &Gpu, scene: &SceneBuffers, tracer: &CameraTracer, sampler: Sampler, rays: u32) -> Result<Self> {
-        let constant = sampler_constant(sampler);
         Ok(Self {
-            start: scene.kernel_with(gpu, "start_final_gather", &[constant]),
-            // An emitter that a ray hits gives direct light, or a caustic by way of lobes that cast
-            // one: the visible point has both already.
-            trace: scene.kernel_with(gpu, "trace_camera", &[constant, ("SEES_BEYOND_WIDE_LOBES", 1.0)]),
-            sum: Kernel::new(gpu, "sum_final_gather", &[]),
-            lobes: (scene.materials.has_rough)
-                .then(|| scene.kernel_with(gpu, "light_lobes", &[constant, ("LIGHTS_WIDE_LOBES_ONLY", 1.0)])),
-            direct: DirectLighting::new(gpu, scene, sampler, 1),
+            kernels: FinalKernels::new(gpu, scene, sampler),
             rays,
             joint: false,
             chosen: gpu.storage::<u32>("points of final gathering", tracer.room())?,
@@ -84,6 +98,11 @@ impl FinalGather {
             directions: gpu.storage::<u32>("directions of final-gather rays", tracer.room())?,
             arriving: gpu.storage::<ArrivingLight>("arriving light", tracer.room())?,
         })
+    }
+
+    /// Has the kernels compiled ahead of their use.
+    pub fn prefetch(gpu: &Gpu, scene: &SceneBuffers, sampler: Sampler) {
+        let _ = FinalKernels::new(gpu, scene, sampler);
     }
 
     /// Makes the rays of all points of the picture one set of numbers: those of neighbours are then
@@ -129,13 +148,13 @@ impl FinalGather {
             ("directions", &self.directions),
         ];
         let followed = [("tile", &own), ("points", &self.ends)];
-        let start = Step { kernel: &self.start, buffers: &started };
+        let start = Step { kernel: &self.kernels.start, buffers: &started };
         tracer.follow(
             gpu,
             scene,
             (&start, rays.all()),
-            &Step { kernel: &self.trace, buffers: &followed },
-            (self.lobes.as_ref(), &self.found),
+            &Step { kernel: &self.kernels.trace, buffers: &followed },
+            (self.kernels.lobes.as_ref(), &self.found),
         )
     }
 
@@ -152,7 +171,7 @@ impl FinalGather {
         rays: FinalRays,
     ) -> Result<StepCount> {
         let view = rays_as_samples(&tracer.tile_view(tile), rays);
-        tracer.light_points(gpu, scene, &self.direct, &view, (&self.ends, &self.found, rays.all()))
+        tracer.light_points(gpu, scene, &self.kernels.direct, &view, (&self.ends, &self.found, rays.all()))
     }
 
     /// Adds what the rays of a step found to the radiance of their points.
@@ -169,7 +188,7 @@ impl FinalGather {
             ("points", &tracer.points),
         ];
         let mut encoder = gpu.encoder();
-        self.sum.dispatch(&mut encoder, &self.sum.bind(gpu, &buffers), rays.chosen.into());
+        self.kernels.sum.dispatch(&mut encoder, &self.kernels.sum.bind(gpu, &buffers), rays.chosen.into());
         gpu.submit(encoder);
     }
 

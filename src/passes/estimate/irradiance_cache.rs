@@ -35,6 +35,11 @@ impl IrradianceCache {
         Ok(Some(Self { kernel: Kernel::new(gpu, "reuse_irradiance", &[]), cells, grid }))
     }
 
+    /// Has the kernel compiled ahead of its use.
+    pub fn prefetch(gpu: &Gpu) {
+        let _ = Kernel::new(gpu, "reuse_irradiance", &[]);
+    }
+
     /// Adds the light of the first `points` points to `radiance`, where their cell has one. Those
     /// then wait for no map.
     pub fn light(&self, gpu: &Gpu, points: &Buffer, count: u32, radiance: &Buffer) {

@@ -122,6 +122,11 @@ impl IrradianceRecords {
         Ok(Self { kernel: Kernel::new(gpu, "filter_irradiance", &[]), records, grid })
     }
 
+    /// Has the kernel compiled ahead of its use.
+    pub fn prefetch(gpu: &Gpu) {
+        let _ = Kernel::new(gpu, "filter_irradiance", &[]);
+    }
+
     /// Adds the light of the records to the radiance of a tile's points. Those that it lights wait
     /// for no map then; others have too few records about them.
     pub fn light(&self, gpu: &Gpu, tile: &CameraTile, count: u32, (points, radiance): (&Buffer, &Buffer)) {
