@@ -115,7 +115,7 @@ pub struct RenderArgs {
         "Ends of final-gather rays share irradiance in cells of this fraction of the estimate's radius, {}; 0 makes an estimate for each",
         EstimateSettings::IRRADIANCE_CELLS
     ))]
-    #[arg(long, value_name = "F", default_value_t = 0.5, value_parser = irradiance_cells, help_heading = "Estimate")]
+    #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = irradiance_cells, help_heading = "Estimate")]
     pub irradiance_cells: f32,
 
     #[arg(help = format!(

@@ -71,7 +71,7 @@ impl Default for EstimateSettings {
             radius: None,
             raw: false,
             share_reach: 2.0,
-            irradiance_cells: 0.5,
+            irradiance_cells: 1.0,
             gather_spacing: 0,
             gather_radius: 8.0,
         }

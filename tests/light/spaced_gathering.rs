@@ -79,6 +79,7 @@ fn gathering(rays: u32, spacing: u32) -> Settings {
     plain().with(|s| {
         s.photons.final_gather = rays;
         s.estimate.neighbors = 50;
+        s.estimate.irradiance_cells = 1.0;
         s.estimate.gather_spacing = spacing;
     })
 }

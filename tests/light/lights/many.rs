@@ -147,9 +147,9 @@ fn photons_and_rays_agree_under_many_lights() {
     add_box(&mut scene, vec3(-1.0, 0.0, -1.5), vec3(1.0, 0.8, -0.5), 0);
     scene.cameras = vec![camera(vec3(0.0, 1.2, 3.0), vec3(0.0, 0.0, 0.0), 50.0)];
     let seen = |mode, bounces| {
-        let settings = settings(mode, 400_000, 48).with(|s| {
+        let settings = settings(mode, 150_000, 40).with(|s| {
             s.photons.max_bounces = bounces;
-            s.picture.spp = 16;
+            s.picture.spp = 6;
         });
         mean(&render_scene(&scene, &settings))
     };

@@ -85,7 +85,6 @@ fn photons_agree_with_rays_under_every_kind_of_light() {
             mean(&render_scene(&scene, &settings.clone().with(|s| s.photons.max_paths = Some(300_000))))
         };
         let (rays, photons) = (picture(Mode::Hybrid, 0), picture(Mode::Photons, 0));
-        eprintln!("{name:24} {rays} {photons} {:+.4}", photons / rays - 1.0);
         assert!(within(photons, rays, 0.02), "{name}: mode 1 has mean {photons}, mode 0 has {rays}");
         let short = picture(Mode::DirectRays, 0);
         assert!(!within(short, rays, 0.02), "control: {name}: {short} of direct light alone");
