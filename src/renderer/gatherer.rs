@@ -12,7 +12,7 @@ use crate::{
     map_kind::MapKind,
     passes::{
         EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
-        PhotonMap, Records, StepCount, Tile, filter_window,
+        PhotonMap, Records, StepCount, Tile, filter_window, record_spacing,
     },
     progress::Progress,
     reference::{Estimate, KdMap},
@@ -189,6 +189,7 @@ impl Gatherer for MapGatherer<'_> {
                 }
             }
         }
+        let spacing = record_spacing(size, self.estimate.gather_spacing, coarse.tracer.branches());
         let per_pixel = |coarse: u32, fine: u32| coarse as f32 / fine as f32;
         // Of the picture's pixels.
         let reach = self.estimate.gather_radius * coarse.tracer.pixel_height() * per_pixel(coarse.size.1, size.1);
@@ -200,7 +201,7 @@ impl Gatherer for MapGatherer<'_> {
             columns_per_pixel: per_pixel(coarse.size.0, size.0),
             rows_per_pixel: per_pixel(coarse.size.1, size.1),
             reach,
-            window: filter_window(self.estimate.gather_radius, self.estimate.gather_spacing),
+            window: filter_window(self.estimate.gather_radius, spacing),
             ..Default::default()
         };
         let records = taken.finish(|position| reach * coarse.tracer.scale_at(position));

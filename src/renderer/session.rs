@@ -13,7 +13,7 @@ use crate::{
     image::{Film, Frame},
     passes::{
         CameraKernels, EstimateSharing, FinalGather, IrradianceCache, IrradianceRecords, MapKernels, PathRanges,
-        PhotonTracer, filter_window,
+        PhotonTracer, filter_window, record_spacing,
     },
     pixel_filter::PixelFilter,
     progress::{Progress, Stage},
@@ -193,7 +193,7 @@ impl<'a> Session<'a> {
             gatherer.prepare(&scout, &mut stats, progress)?;
         }
         if estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty() {
-            let coarse = coarser(picture, pass.size, estimate);
+            let coarse = coarser(picture, pass.size, estimate, pass.tracer.branches());
             let single = EstimateSettings { share_reach: 0.0, ..estimate.clone() };
             let records = CameraPass::new(self.gpu, scene, camera, maps.settings(), &single, &coarse)?;
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
@@ -207,8 +207,8 @@ impl<'a> Session<'a> {
 
 /// Settings of a coarser version of the part of the picture that is rendered, and what surrounds it
 /// as far as the filter of records reaches.
-fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSettings) -> PictureSettings {
-    let spacing = estimate.gather_spacing;
+fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSettings, branches: u32) -> PictureSettings {
+    let spacing = record_spacing(size, estimate.gather_spacing, branches);
     let reach = filter_window(estimate.gather_radius, spacing);
     let window = picture.window(size);
     let along = |pixels: u32, origin: u32, count: u32| {

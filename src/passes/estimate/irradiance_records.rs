@@ -24,8 +24,23 @@ pub fn filter_window(radius: f32, spacing: u32) -> u32 {
 const NO_RECORD: IrradianceRecord =
     IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], direction_and_reach: 0 };
 
+/// Slots of records of a picture at most: 128 MiB, which all adapters bind.
+const MAX_RECORDS: u64 = 1 << 22;
+
 /// Part of the distance to what is near over which a record is taken.
 const NEAR_PART: f32 = 1.5;
+
+/// Pixels between the points of final gathering: more than asked for where the whole picture would
+/// have too many of them.
+///
+/// # Panics
+/// Never: a picture of one point has few.
+#[must_use]
+pub fn record_spacing((width, height): (u32, u32), spacing: u32, branches: u32) -> u32 {
+    let slots =
+        |spacing: u32| u64::from(width.div_ceil(spacing)) * u64::from(height.div_ceil(spacing)) * u64::from(branches);
+    (spacing..).find(|spacing| slots(*spacing) <= MAX_RECORDS).expect("a picture of one point has few")
+}
 
 /// Records in the order of a grid, as they are taken.
 #[derive(Debug)]
@@ -142,5 +157,19 @@ impl IrradianceRecords {
         let mut encoder = gpu.encoder();
         self.kernel.dispatch(&mut encoder, &self.kernel.bind(gpu, &buffers), count.into());
         gpu.submit(encoder);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_of_any_picture_fit_a_binding() {
+        assert_eq!(record_spacing((256, 256), 2, 4), 2);
+        assert_eq!(record_spacing((2048, 2048), 2, 4), 2);
+        assert_eq!(record_spacing((2049, 2048), 2, 4), 3, "one column more");
+        assert_eq!(record_spacing((4096, 4096), 2, 1), 2);
+        assert_eq!(record_spacing((65_535, 65_535), 1, 4), 64);
     }
 }
