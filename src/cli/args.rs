@@ -176,7 +176,7 @@ impl RenderArgs {
     pub fn settings(&self) -> Settings {
         let options = &self.options;
         let quality = Quality::from(self.quality);
-        let goes = matches!(Mode::from(options.mode), Mode::Hybrid | Mode::IndirectPhotons)
+        let goes = Mode::from(options.mode).gathers_finally()
             && matches!(self.search, SearchArg::Grid)
             && !options.shared.raw_estimate;
         let gathers = self.final_gather.map_or(goes, |rays| rays > 0);

@@ -112,6 +112,7 @@ impl<'a> MapGatherer<'a> {
         let Self { maps, search, estimate, cache, .. } = self;
         let done = pass.gather_finally(tile, progress, &mut |gather, rays, chosen| {
             let (points, radiance, count) = (&gather.ends, &gather.found, rays.all());
+            let direct = gather.light_directly(pass.gpu, pass.scene, &pass.tracer, tile, rays)?;
             if let Some(cache) = cache {
                 cache.light(pass.gpu, points, count, radiance);
                 let ends: Vec<VisiblePoint> = pass.gpu.read(points, 0, count.into())?;
@@ -122,14 +123,14 @@ impl<'a> MapGatherer<'a> {
                 if left.0.len() as u64 >= pass.tracer.room() {
                     search.light_ends(pass, (maps, estimate), tile, &std::mem::take(&mut left), progress)?;
                 }
-                return Ok(());
+                return Ok(direct);
             }
             for index in 0..maps.maps().len() {
                 let gathered = &pass.tracer.gathered;
                 let request = EstimateRequest { points, count, map_number: 1, radiance, gathered };
                 search.answer(pass, maps, index, estimate, &request, progress)?;
             }
-            Ok(())
+            Ok(direct)
         })?;
         if !left.0.is_empty() {
             search.light_ends(pass, (maps, estimate), tile, &left, progress)?;
@@ -246,7 +247,7 @@ fn ends_of_rays(pass: &CameraPass, progress: &dyn Progress) -> Result<(Vec<Visib
         done += pass.gather_finally(tile, progress, &mut |gather, rays, _| {
             let found: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
             ends.extend(found.into_iter().filter(|point| point.next_map != 0));
-            Ok(())
+            Ok(StepCount::default())
         })?;
     }
     Ok((ends, done))

@@ -49,7 +49,7 @@ pub(crate) trait Gatherer {
 
 /// Adds light at the ends of rays to what they have found. The last argument has the indices of the
 /// points that they started from.
-pub(crate) type RayLight<'a> = dyn FnMut(&FinalGather, FinalRays, &[u32]) -> Result<()> + 'a;
+pub(crate) type RayLight<'a> = dyn FnMut(&FinalGather, FinalRays, &[u32]) -> Result<StepCount> + 'a;
 
 /// Device part of a camera pass: camera paths, direct light, rays of final gathering.
 pub(crate) struct CameraPass<'a> {
@@ -186,8 +186,7 @@ impl<'a> CameraPass<'a> {
             progress.check()?;
             let rays = FinalRays { first, count: at_once.min(gather.rays() - first), chosen: chosen.len() as u32 };
             done += gather.trace(self.gpu, self.scene, &self.tracer, tile, rays)?;
-            done += gather.light_directly(self.gpu, self.scene, &self.tracer, tile, rays)?;
-            light(gather, rays, &chosen)?;
+            done += light(gather, rays, &chosen)?;
             gather.add(self.gpu, &self.tracer, rays);
         }
         Ok(done)

@@ -45,6 +45,12 @@ impl Mode {
         matches!(self, Mode::Hybrid | Mode::DirectRays)
     }
 
+    /// Whether its light over other surfaces can come from final gathering.
+    #[must_use]
+    pub fn gathers_finally(self) -> bool {
+        matches!(self, Mode::Hybrid | Mode::IndirectPhotons)
+    }
+
     /// Whether the picture shows emitters: directly, in mirrors and through glass.
     #[must_use]
     pub fn sees_lights(self) -> bool {
@@ -161,7 +167,7 @@ impl PhotonSettings {
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
         Self::FINAL_GATHER.check("photons.final_gather", self.final_gather)?;
-        if self.final_gather > 0 && !matches!(self.mode, Mode::Hybrid | Mode::IndirectPhotons) {
+        if self.final_gather > 0 && !self.mode.gathers_finally() {
             let problem = format!("goes with the modes hybrid and indirect-photons, not {}", self.mode.name());
             return fail("photons.final_gather", self.final_gather.to_string(), &problem);
         }
