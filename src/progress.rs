@@ -13,6 +13,8 @@ pub enum Stage {
     Photons,
     /// Sorting photons into the grid.
     Grid,
+    /// Final gathering at spaced points. Units are tiles of the coarser picture that they make.
+    Records,
     /// Camera rays, direct light and gather. Units are tiles of camera samples.
     Camera,
     /// The camera pass of a comparison, which gathers each tile twice. Units as in

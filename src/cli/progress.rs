@@ -135,6 +135,7 @@ fn name(stage: Stage) -> &'static str {
         Stage::Bvh => "bvh",
         Stage::Photons => "photons",
         Stage::Grid => "grid",
+        Stage::Records => "final gathering",
         Stage::Camera => "camera",
         Stage::Compare => "compare",
     }
@@ -147,7 +148,7 @@ fn unit(stage: Stage, total: u64) -> Option<&'static str> {
 }
 
 fn is_counted(stage: Stage) -> bool {
-    matches!(stage, Stage::Photons | Stage::Camera | Stage::Compare)
+    matches!(stage, Stage::Photons | Stage::Records | Stage::Camera | Stage::Compare)
 }
 
 /// Style without numbers.

@@ -14,7 +14,7 @@ use crate::{
         EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
         PhotonMap, Records, StepCount, Tile, filter_window, record_spacing,
     },
-    progress::Progress,
+    progress::{Progress, Stage},
     reference::{Estimate, KdMap},
     settings::{EstimateSettings, Search},
     stats::{Stats, timed},
@@ -164,8 +164,10 @@ impl Gatherer for MapGatherer<'_> {
     ) -> Result<()> {
         let window = coarse.window;
         let mut taken = Records::new((window.width, window.height), coarse.tracer.branches());
-        for tile in &coarse.tracer.tiles() {
+        let tiles = coarse.tracer.tiles();
+        for (done, tile) in tiles.iter().enumerate() {
             progress.check()?;
+            progress.report(Stage::Records, done as u64, tiles.len() as u64);
             let mut step = timed(&mut stats.seconds.camera, || coarse.tracer.trace(coarse.gpu, coarse.scene, tile))?;
             let mut seconds = 0.0;
             let found = timed(&mut seconds, || {
