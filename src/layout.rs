@@ -691,10 +691,18 @@ pub struct FirstHit {
     pub albedo: [f32; 3],
     /// 1 if something was hit.
     pub alpha: f32,
+    /// Relative to the scene's centre, metres.
+    pub position: [f32; 3],
+    /// Index of the primitive in the scene; no number to add up.
+    pub id: u32,
+    /// First set of texture coordinates; 0 without textures.
+    pub uv: [f32; 2],
+    pub pad0: u32,
+    pub pad1: u32,
 }
 
 /// Rows of four numbers that a camera sample writes for the output layers: those of [`FirstHit`].
-pub const LAYER_ROWS: usize = 2;
+pub const LAYER_ROWS: usize = 4;
 
 /// Sums over a tile's samples of one pixel, by rows. The first row is the radiance, and the number
 /// of samples left out of it because the sum would not be finite with them. The others are the rows

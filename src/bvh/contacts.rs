@@ -148,7 +148,7 @@ mod tests {
         let material = |surface| Material::new("", surface);
         let triangle = |(positions, material): &([Vec3; 3], u32)| Triangle::new(*positions, [Vec3::Y; 3], *material);
         let sphere =
-            |(radius, material): &(f32, u32)| Sphere { center: Vec3::ONE, radius: *radius, material: *material };
+            |(radius, material): &(f32, u32)| Sphere { center: Vec3::ONE, radius: *radius, material: *material, object: 0 };
         let scene = Scene {
             materials: surfaces.map(material).to_vec(),
             triangles: triangles.iter().map(triangle).collect(),

@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn nested_solids_are_found_from_the_inside_out() {
         let mut scene = scene(3);
-        scene.spheres.push(Sphere { center: Vec3::ZERO, radius: 1.0, material: 2 });
+        scene.spheres.push(Sphere { center: Vec3::ZERO, radius: 1.0, material: 2, object: 0 });
         add_cube(&mut scene, 2.0, 1, 6);
         add_cube(&mut scene, 4.0, 0, 6);
         // Points on and off the edges and diagonals of the faces as projected along all axes.

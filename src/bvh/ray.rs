@@ -100,7 +100,7 @@ mod tests {
         let materials = [0.2, 0.4].map(|a| Material::new("", Surface::Diffuse { albedo: Vec3::splat(a) })).to_vec();
         let corners = [vec3(-9.0, 0.0, 9.0), vec3(9.0, 0.0, 9.0), vec3(0.0, 0.0, -9.0)];
         let triangle = Triangle::new(corners, [Vec3::Y; 3], 0);
-        let spheres = vec![Sphere { center: vec3(0.0, 3.0, 0.0), radius: 1.0, material: 1 }];
+        let spheres = vec![Sphere { center: vec3(0.0, 3.0, 0.0), radius: 1.0, material: 1, object: 0 }];
         let scene = Scene { materials, triangles: vec![triangle], spheres, ..Scene::default() };
         let bvh = Bvh::build(&scene);
         let hit = |origin, direction: Vec3| bvh.nearest_hit(origin, direction.normalize());

@@ -14,7 +14,7 @@ use clap::{
 use super::{
     loading::LoadingOptions,
     merge_args::{MergeArgs, StatusArgs},
-    options::{QualityArg, RenderOptions, SearchArg},
+    options::{LayerArg, QualityArg, RenderOptions, SearchArg},
     pass_args::PassOptions,
     study_args::StudyArgs,
     values::{gather_radius, irradiance_cells, output, radius, share_reach, tolerance, whole},
@@ -132,6 +132,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "R", value_parser = gather_radius, help_heading = "Estimate")]
     pub gather_radius: Option<f32>,
 
+    /// Further layers of .exr files, by name, with commas between; every layer costs a little,
+    /// `lights` the time of one picture for each group of lights
+    #[arg(long, value_name = "LAYERS", value_enum, value_delimiter = ',', help_heading = "Picture")]
+    pub layers: Vec<LayerArg>,
+
     #[command(flatten)]
     pub passes: PassOptions,
 
@@ -189,6 +194,9 @@ impl RenderArgs {
             s.estimate.radius = self.radius;
             s.estimate.share_reach = self.share;
             s.estimate.irradiance_cells = self.irradiance_cells;
+            s.picture.layers = self.layers.iter().map(|layer| (*layer).into()).collect();
+            s.picture.layers.sort();
+            s.picture.layers.dedup();
         })
     }
 

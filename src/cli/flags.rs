@@ -4,7 +4,7 @@
 type Row = (&'static str, &'static str);
 
 /// Inputs that a message of the library can name.
-const FLAGS: [Row; 41] = [
+const FLAGS: [Row; 42] = [
     ("device", "--device"),
     ("estimate.cone_constant", "--cone-constant"),
     ("estimate.kernel", "--kernel"),
@@ -42,6 +42,7 @@ const FLAGS: [Row; 41] = [
     ("picture.camera", "--camera"),
     ("picture.crop", "--crop"),
     ("picture.focus", "--focus"),
+    ("picture.layers", "--layers"),
     ("picture.light_samples", "--light-samples"),
     ("picture.pixel_filter", "--pixel-filter"),
     ("picture.size", "--size"),

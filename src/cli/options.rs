@@ -5,7 +5,7 @@ use caustica::{
     image::Tonemap,
     pixel_filter::PixelFilter,
     settings::{
-        Crop, Emission, EstimateSettings, LightSampling, LightSettings, LightUnit, Mode, PhotonSettings,
+        Crop, Emission, EstimateSettings, ExtraLayers, LightSampling, LightSettings, LightUnit, Mode, PhotonSettings,
         PictureSettings, Quality, Range, Sampler, Search, Settings,
     },
 };
@@ -228,6 +228,7 @@ impl SharedOptions {
                 aperture: self.aperture.unwrap_or(picture.aperture),
                 focus: self.focus,
                 light_samples: self.light_samples.unwrap_or(picture.light_samples),
+                layers: picture.layers,
             },
         }
     }
@@ -345,6 +346,26 @@ value_enum!(QualityArg => Quality {
     High,
     /// As good as one pass can be
     Final,
+});
+
+value_enum!(LayerArg => ExtraLayers {
+    /// emission, direct, global, caustic: parts whose sum is the picture
+    Parts,
+    /// light.NAME: what each light gives, with photons of its own; lights of one
+    /// extras.caustica.group are one
+    Lights,
+    /// globalEstimate, causticEstimate: radius in metres, and photons
+    Estimates,
+    /// position: of the first hit, in the file's coordinates
+    Position,
+    /// UV: texture coordinates of textured surfaces
+    Uv,
+    /// motion: 0, since nothing moves
+    Motion,
+    /// CryptoObject: mattes of nodes
+    Objects,
+    /// CryptoMaterial: mattes of materials
+    Materials,
 });
 
 value_enum!(SamplerArg => Sampler {

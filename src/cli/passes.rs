@@ -12,7 +12,7 @@ use caustica::{
     gpu::Gpu,
     image::{Attributes, Block, ErrorEstimate, Frame, PassSum, differences, read_part, write_part},
     progress::{Progress, Stage},
-    renderer::{Progressive, Session, size_of},
+    renderer::{LightGroups, Progressive, size_of},
     scene::Scene,
     settings::{PassRange, Settings},
     stats::{DeviceStats, PassStats, Stats},
@@ -97,11 +97,14 @@ fn run(inputs: &Inputs, range: PassRange, started: Instant, done: &mut Done) -> 
     if is_over(inputs, next, range, error.as_ref()) {
         return Ok(());
     }
-    let session = Session::open(gpu, scene, &settings.lights, &stages)?;
-    session.prefetch(settings);
-    let progressive = Progressive::new(&session, settings, options.settings())?;
+    let groups = LightGroups::open(gpu, scene, settings, &stages)?;
+    let progressive = groups.sessions().iter().map(|session| {
+        session.prefetch(settings);
+        Progressive::new(session, settings, options.settings())
+    });
+    let progressive = progressive.collect::<Result<Vec<_>>>()?;
     loop {
-        let (film, stats) = progressive.render(next, &stages)?;
+        let (film, stats) = groups.film(|group, _| progressive[group].render(next, &stages))?;
         stages.shown.store(false, Ordering::Relaxed);
         done.sum.push(Block::of_pass(next, film, &stats))?;
         match done.passes {

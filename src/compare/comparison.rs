@@ -8,7 +8,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     gpu::Gpu,
-    image::Frame,
+    image::{Film, Frame},
     passes::Tile,
     progress::{Progress, Stage},
     renderer::{self, CameraPass, Gatherer, Session, finish_stats},
@@ -109,7 +109,14 @@ struct Sides<'a> {
 
 impl Gatherer for Sides<'_> {
     /// Gathers the tile's points over all maps with both sides.
-    fn gather(&mut self, pass: &CameraPass, tile: &Tile, _: &mut Stats, progress: &dyn Progress) -> Result<()> {
+    fn gather(
+        &mut self,
+        pass: &CameraPass,
+        tile: &Tile,
+        _: &mut Film,
+        _: &mut Stats,
+        progress: &dyn Progress,
+    ) -> Result<()> {
         let points = pass.points(tile)?;
         self.sabotage -= self.kdtree.leave_out(self.sabotage, &points);
         let mut by_grid = pass.radiance(tile)?;

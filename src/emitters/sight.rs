@@ -140,7 +140,7 @@ mod tests {
         let mut scene = Scene {
             materials: vec![Material::new("", Surface::Diffuse { albedo: Vec3::splat(0.5) })],
             triangles: floor.to_vec(),
-            spheres: vec![Sphere { center: Vec3::Y, radius: 1.0, material: 0 }],
+            spheres: vec![Sphere { center: Vec3::Y, radius: 1.0, material: 0, object: 0 }],
             ..Scene::default()
         };
         let forward = vec3(0.0, -0.4, -1.0).normalize();

@@ -186,7 +186,7 @@ mod tests {
     fn scene(centers: &[Vec3], radius: f32) -> Scene {
         let surface = Surface::Mirror { tint: Vec3::ONE };
         let material = Material::new("", surface);
-        let spheres = centers.iter().map(|&center| Sphere { center, radius, material: 0 }).collect();
+        let spheres = centers.iter().map(|&center| Sphere { center, radius, material: 0, object: 0 }).collect();
         Scene { materials: vec![material], spheres, ..Scene::default() }
     }
 

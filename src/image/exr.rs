@@ -17,18 +17,19 @@ use exr::{
 };
 
 use super::{
+    cryptomatte::Matte,
     file::write_file,
     frame::{DataWindow, Frame},
     layers::LAYERS,
 };
 use crate::{
     error::{Error, Result},
-    settings::{LoadOptions, Settings},
+    settings::{ExtraLayers, LoadOptions, Settings},
     stats::{MapStats, Stats},
 };
 
 /// Provenance of a frame, stored in the file's attributes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Provenance<'a> {
     /// File name of the scene, without folders.
     pub scene: &'a str,
@@ -38,6 +39,10 @@ pub struct Provenance<'a> {
     pub options: &'a LoadOptions,
     /// Environment light, if there is any.
     pub environment: Option<EnvironmentProvenance<'a>>,
+    /// Names of nodes, for mattes.
+    pub objects: Vec<&'a str>,
+    /// Names of materials, for mattes.
+    pub materials: Vec<&'a str>,
     /// Settings of the render.
     pub settings: &'a Settings,
     /// Statistics of the render. Only the device and the photon counts are stored, so that equal
@@ -60,7 +65,12 @@ pub struct EnvironmentProvenance<'a> {
     pub rotation: f32,
 }
 
-/// Text attributes by name, without the prefix `caustica:` that they have in files.
+/// Beginning of the names of our attributes in files, and of those of mattes.
+pub(super) const OURS: &str = "caustica:";
+pub(super) const CRYPTOMATTE: &str = "cryptomatte/";
+
+/// Text attributes by name, without the prefix `caustica:` that they have in files. Those of mattes
+/// begin with `cryptomatte/` in both.
 pub type Attributes = BTreeMap<String, String>;
 pub(super) type Channel = AnyChannel<FlatSamples>;
 
@@ -154,6 +164,13 @@ impl Provenance<'_> {
         let all = texts.into_iter().chain(environment);
         let mut attributes: Attributes = all.map(|(name, value)| (name.to_owned(), value)).collect();
         count_photons(&mut attributes, stats.photons.global, stats.photons.caustic);
+        let asked = &settings.picture.layers;
+        if asked.contains(&ExtraLayers::Objects) {
+            attributes.extend(Matte::attributes(ExtraLayers::Objects, self.objects.iter().copied()));
+        }
+        if asked.contains(&ExtraLayers::Materials) {
+            attributes.extend(Matte::attributes(ExtraLayers::Materials, self.materials.iter().copied()));
+        }
         attributes
     }
 }
@@ -170,7 +187,8 @@ pub(super) fn count_photons(attributes: &mut Attributes, global: MapStats, caust
 fn layer_attributes(attributes: &Attributes) -> LayerAttributes {
     let version = attributes.get("version").map_or(env!("CARGO_PKG_VERSION"), String::as_str);
     let attribute = |(name, value): (&String, &String)| {
-        (Text::from(format!("caustica:{name}").as_str()), AttributeValue::Text(text(value)))
+        let name = if name.starts_with(CRYPTOMATTE) { name.clone() } else { format!("{OURS}{name}") };
+        (Text::from(name.as_str()), AttributeValue::Text(text(value)))
     };
     LayerAttributes {
         software_name: Some(text(&format!("Caustica {version}"))),
@@ -236,6 +254,8 @@ mod tests {
             scene_hash: "ab12",
             options: &LoadOptions::default(),
             environment: None,
+            objects: Vec::new(),
+            materials: Vec::new(),
             settings,
             stats: &stats(),
         };
@@ -280,6 +300,8 @@ mod tests {
                 scene_hash: "",
                 options: &LoadOptions::default(),
                 environment,
+                objects: Vec::new(),
+                materials: Vec::new(),
                 settings: &settings,
                 stats: &stats(),
             };

@@ -15,7 +15,7 @@ use exr::{
 };
 
 use super::{
-    exr::{Attributes, failure},
+    exr::{Attributes, CRYPTOMATTE, OURS, failure},
     file::open_regular,
     frame::{DataWindow, Frame},
     layers::LAYERS,
@@ -84,8 +84,9 @@ pub(super) fn attributes_of(image: &ReadImage) -> Attributes {
 pub(super) fn our_attributes<'a>(all: impl Iterator<Item = (&'a Text, &'a AttributeValue)>) -> Attributes {
     let ours = all.filter_map(|(name, value)| match value {
         AttributeValue::Text(value) => {
-            let name = name.to_string().strip_prefix("caustica:")?.to_string();
-            Some((name, String::from_utf8_lossy(value.bytes()).into_owned()))
+            let name = name.to_string();
+            let ours = name.strip_prefix(OURS).or(Some(name.as_str()).filter(|name| name.starts_with(CRYPTOMATTE)))?;
+            Some((ours.to_owned(), String::from_utf8_lossy(value.bytes()).into_owned()))
         }
         _ => None,
     });

@@ -4,13 +4,14 @@
 use std::array;
 
 use super::{
+    cryptomatte::Matte,
     frame::{DataWindow, Frame},
-    layers::{LAYERS, Rule, layer_index},
+    layers::{EXTRA_LAYERS, LAYERS, Rule, Source, layer_index},
 };
 use crate::{
     error::{Error, Result},
     layout::PixelSums,
-    settings::Crop,
+    settings::{Crop, ExtraLayers},
 };
 
 /// Number of a film's layers.
@@ -35,8 +36,29 @@ pub struct Film {
     pub(super) bandwidth: Bandwidth,
     /// Second moments over the passes; `None` for one pass, where they are 0.
     pub(super) moments: Option<Moments>,
+    /// Layers that were asked for.
+    pub(super) extras: Vec<ExtraSums>,
+    pub(super) mattes: Vec<Matte>,
     /// Number of samples that were left out, since a sum would not be finite with them.
     pub(super) non_finite: u64,
+}
+
+/// Sums of a layer that was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ExtraSums {
+    pub channels: Vec<String>,
+    pub rule: Rule,
+    /// Where the table takes its numbers from.
+    pub source: Option<Source>,
+    /// Sums pixel by pixel; with [`Rule::PerCount`], of one number more than there are channels.
+    pub sums: Vec<f32>,
+}
+
+impl ExtraSums {
+    /// Numbers of a pixel.
+    pub fn count(&self) -> usize {
+        self.channels.len() + usize::from(self.rule == Rule::PerCount)
+    }
 }
 
 /// Squared radius of the estimates of passes, relative to that of pass 0: its mean over the passes,
@@ -77,8 +99,87 @@ impl Film {
             sums: array::from_fn(zeros),
             bandwidth: Bandwidth::of_pass(1.0),
             moments: None,
+            extras: Vec::new(),
+            mattes: Vec::new(),
             non_finite: 0,
         }
+    }
+
+    /// Adds the layers of [`EXTRA_LAYERS`] that are asked for, and mattes.
+    #[must_use]
+    pub fn with_layers(mut self, asked: &[ExtraLayers]) -> Self {
+        let pixels = self.window.width as usize * self.window.height as usize;
+        for row in EXTRA_LAYERS.iter().filter(|row| asked.contains(&row.of)) {
+            let channels = row.channels.iter().map(|name| (*name).to_owned()).collect();
+            let mut layer = ExtraSums { channels, rule: row.rule, source: Some(row.source), sums: Vec::new() };
+            layer.sums = vec![0.0; pixels * layer.count()];
+            self.extras.push(layer);
+        }
+        self.mattes.extend(Matte::asked_for(asked, pixels));
+        self
+    }
+
+    /// Adds to the numbers of a pixel in the layer of that source, if the film has it.
+    pub(crate) fn add_to(&mut self, source: Source, (column, row): (u32, u32), numbers: &[f32]) {
+        let pixel = row as usize * self.window.width as usize + column as usize;
+        for layer in self.extras.iter_mut().filter(|layer| layer.source == Some(source)) {
+            let count = layer.count();
+            let into = &mut layer.sums[pixel * count..][..count];
+            into.iter_mut().zip(numbers).filter(|(a, b)| (**a + **b).is_finite()).for_each(|(a, b)| *a += b);
+        }
+    }
+
+    /// Whether the film has mattes.
+    pub(crate) fn has_mattes(&self) -> bool {
+        !self.mattes.is_empty()
+    }
+
+    /// Adds samples of a pixel to the matte of that request.
+    pub(crate) fn add_to_matte(
+        &mut self,
+        of: ExtraLayers,
+        (column, row): (u32, u32),
+        hashes: impl Iterator<Item = u32>,
+    ) {
+        let pixel = row as usize * self.window.width as usize + column as usize;
+        if let Some(matte) = self.mattes.iter_mut().find(|matte| matte.of == of) {
+            hashes.for_each(|hash| matte.add(pixel, hash, 1));
+        }
+    }
+
+    /// The sum of the light of groups of lights, with a layer for each. All else is that of the
+    /// first.
+    ///
+    /// # Panics
+    /// If there is no group.
+    #[must_use]
+    pub(crate) fn of_light_groups(groups: Vec<(String, Self)>) -> Self {
+        let mut lights = Vec::new();
+        let mut total: Option<Self> = None;
+        for (name, film) in groups {
+            let radiance = layer_index("radiance");
+            lights.push(ExtraSums {
+                channels: ["R", "G", "B"].map(|channel| format!("light.{name}.{channel}")).to_vec(),
+                rule: Rule::PerSample,
+                source: None,
+                sums: film.sums[radiance].clone(),
+            });
+            let Some(total) = &mut total else {
+                total = Some(film);
+                continue;
+            };
+            let add = |into: &mut [f32], from: &[f32]| into.iter_mut().zip(from).for_each(|(a, b)| *a += b);
+            add(&mut total.sums[radiance], &film.sums[radiance]);
+            for (layer, other) in total.extras.iter_mut().zip(&film.extras) {
+                if matches!(layer.source, Some(Source::Part(_))) {
+                    add(&mut layer.sums, &other.sums);
+                }
+            }
+            total.non_finite += film.non_finite;
+        }
+        let mut total = total.expect("a group of lights");
+        total.extras.extend(lights);
+        total
     }
 
     /// Notes the squared radius of the pass's estimates, relative to that of pass 0.
@@ -134,6 +235,12 @@ impl Film {
                 self.non_finite += u64::from(samples);
             }
         }
+        for layer in &mut self.extras {
+            let Some(Source::Rows((row, first))) = layer.source else { continue };
+            let count = layer.channels.len();
+            let into = &mut layer.sums[pixel * count..][..count];
+            into.iter_mut().zip(&sums[row][first..]).filter(|(_, b)| b.is_finite()).for_each(|(a, b)| *a += b);
+        }
     }
 
     /// Adds the passes of another film of the same part of the same picture. Second moments are
@@ -144,6 +251,11 @@ impl Film {
     /// # Errors
     /// [`Error::Differs`] if size or window differ.
     pub fn merge(&mut self, other: &Self) -> Result<()> {
+        let layers = |film: &Self| film.extras.iter().flat_map(|layer| layer.channels.clone()).collect::<Vec<_>>();
+        let mattes = |film: &Self| film.mattes.iter().map(|matte| matte.of).collect::<Vec<_>>();
+        if (layers(self), mattes(self)) != (layers(other), mattes(other)) {
+            return Err(Error::Differs("films of different layers cannot be merged".to_owned()));
+        }
         if (self.whole, self.window) != (other.whole, other.window) {
             let part = |film: &Self| {
                 let (Crop { column, row, width, height }, (w, h)) = (film.window, film.whole);
@@ -180,6 +292,10 @@ impl Film {
         for (a, b) in self.sums.iter_mut().zip(&other.sums) {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         }
+        for (layer, theirs) in self.extras.iter_mut().zip(&other.extras) {
+            layer.sums.iter_mut().zip(&theirs.sums).for_each(|(a, b)| *a += b);
+        }
+        self.mattes.iter_mut().zip(&other.mattes).for_each(|(matte, theirs)| matte.merge(theirs));
         self.passes += other.passes;
         self.samples += other.samples;
         self.non_finite += other.non_finite;
@@ -190,7 +306,33 @@ impl Film {
     #[must_use]
     pub fn finish(&self) -> Frame {
         let size = (self.window.width, self.window.height);
-        Frame::of_layers(size, DataWindow::of(self.whole, self.window), self.means())
+        let mut frame = Frame::of_layers(size, DataWindow::of(self.whole, self.window), self.means());
+        for layer in &self.extras {
+            let scale = self.scale_of(layer.rule);
+            for (c, name) in layer.channels.iter().enumerate() {
+                let mean = |(pixel, numbers): (usize, &[f32])| match layer.rule {
+                    Rule::PerCount if numbers[layer.channels.len()] > 0.0 => numbers[c] / numbers[layer.channels.len()],
+                    Rule::PerCount => 0.0,
+                    _ => numbers[c] * scale(pixel),
+                };
+                frame.add_extra(name, layer.sums.chunks(layer.count()).enumerate().map(mean).collect());
+            }
+        }
+        for matte in &self.mattes {
+            matte.channels(self.samples).into_iter().for_each(|(name, numbers)| frame.add_extra(&name, numbers));
+        }
+        frame
+    }
+
+    /// Factor on the sums of each pixel that gives their mean by a rule.
+    fn scale_of(&self, rule: Rule) -> impl Fn(usize) -> f32 + '_ {
+        let per_sample = 1.0 / self.samples as f32;
+        let hits = &self.sums[layer_index("alpha")];
+        move |pixel| match rule {
+            Rule::PerSample => per_sample,
+            Rule::PerHit if hits[pixel] > 0.0 => 1.0 / hits[pixel],
+            Rule::PerHit | Rule::PerCount => 0.0,
+        }
     }
 
     /// Standard error over the passes of each of a layer's means; `None` for one pass.
@@ -231,15 +373,9 @@ impl Film {
 
     /// The mean of each number, by its layer's rule.
     fn means(&self) -> [Vec<f32>; LAYER_COUNT] {
-        let per_sample = 1.0 / self.samples as f32;
-        let hits = &self.sums[layer_index("alpha")];
         array::from_fn(|i| {
             let count = LAYERS[i].channels.len();
-            let scale = |pixel: usize| match LAYERS[i].rule {
-                Rule::PerSample => per_sample,
-                Rule::PerHit if hits[pixel] > 0.0 => 1.0 / hits[pixel],
-                Rule::PerHit => 0.0,
-            };
+            let scale = self.scale_of(LAYERS[i].rule);
             self.sums[i].iter().enumerate().map(|(at, sum)| sum * scale(at / count)).collect()
         })
     }
@@ -271,7 +407,9 @@ mod tests {
     /// Sums over `samples` samples, each of the value `v`, half of which hit something.
     fn sums(v: f32, samples: u32) -> PixelSums {
         let (s, hits) = (samples as f32, samples as f32 / 2.0);
-        [[v * s, 2.0 * v * s, 3.0 * v * s, 0.0], [0.0, 0.0, hits, 5.0 * hits], [v * hits, 0.0, 0.0, hits]]
+        let rows = [[v * s, 2.0 * v * s, 3.0 * v * s, 0.0], [0.0, 0.0, hits, 5.0 * hits], [v * hits, 0.0, 0.0, hits]];
+        let [radiance, normal, albedo] = rows;
+        [radiance, normal, albedo, [7.0 * hits, 8.0 * hits, 9.0 * hits, 0.0], [0.0; 4]]
     }
 
     fn film(values: &[f32], spp: u32) -> Film {
@@ -361,7 +499,7 @@ mod tests {
         assert_eq!(film.non_finite(), 2, "twice the blue channel exceeds the largest number");
         assert!(film.finish().radiance()[0].iter().all(|x| x.is_finite()));
         let mut counted = Film::new(WHOLE, ALL, 1);
-        counted.add((1, 1), &[[0.0, 0.0, 0.0, 3.0], [0.0; 4], [0.0; 4]], 1);
+        counted.add((1, 1), &[[0.0, 0.0, 0.0, 3.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
         assert_eq!(counted.non_finite(), 3);
     }
 }

@@ -1,16 +1,63 @@
 //! Table of output layers, from the device's sums to the channels of a file.
 //!
-//! To add a layer: add a row to [`LAYERS`], and the line in `shaders/trace_camera.wesl` that writes
-//! its numbers into the sample's rows (`FirstHit`; with more than eight numbers in all,
-//! [`crate::layout::LAYER_ROWS`] grows). Film, frame and file follow from the table.
+//! To add a layer: add a row to [`LAYERS`], or to [`EXTRA_LAYERS`] if only some want it, and the line
+//! in `shaders/trace_camera.wesl` that writes its numbers into the sample's rows (`FirstHit`; with
+//! more than those have room for, [`crate::layout::LAYER_ROWS`] grows). Film, frame and file follow
+//! from the tables.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{map_kind::MapKind, settings::ExtraLayers};
 
 /// Rule by which the sums over a pixel's samples become its value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Rule {
     /// Mean over all samples.
     PerSample,
     /// Mean over the samples whose first ray hit something; 0 if none did.
     PerHit,
+    /// Mean over what the layer counts itself, by a number after those of its channels; 0 if that is
+    /// 0.
+    PerCount,
+}
+
+/// Parts of the radiance, in the order in which it is added up: each by another estimator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightPart {
+    /// Emission that camera paths meet, and the light of rough lobes.
+    Emission,
+    /// Direct light, by shadow rays.
+    Direct,
+    /// Light of a photon map; with final gathering, that of the global map is all light over other
+    /// surfaces.
+    Map(MapKind),
+}
+
+/// Where the numbers of an extra layer come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The samples' rows, as [`Layer::source`].
+    Rows((usize, usize)),
+    /// A part of the radiance.
+    Part(LightPart),
+    /// Radius and number of photons of a map's estimates.
+    Estimate(MapKind),
+    /// Nowhere: all are 0.
+    Nothing,
+}
+
+/// A layer that a picture has on request.
+#[derive(Clone, Copy, Debug)]
+pub struct ExtraLayer {
+    /// The request.
+    pub of: ExtraLayers,
+    /// Names of its channels.
+    pub channels: &'static [&'static str],
+    /// Where its numbers come from.
+    pub source: Source,
+    /// Rule by which sums become a mean.
+    pub rule: Rule,
 }
 
 /// One layer: a few numbers for each pixel.
@@ -43,6 +90,55 @@ pub const LAYERS: [Layer; 5] = [
     },
 ];
 
+/// A row of [`EXTRA_LAYERS`].
+const fn extra(of: ExtraLayers, channels: &'static [&'static str], source: Source, rule: Rule) -> ExtraLayer {
+    ExtraLayer { of, channels, source, rule }
+}
+
+/// The layers that a picture has on request. Those of [`ExtraLayers::Lights`] follow the scene's
+/// lights, and mattes have no sums.
+pub const EXTRA_LAYERS: [ExtraLayer; 9] = [
+    extra(
+        ExtraLayers::Parts,
+        &["emission.R", "emission.G", "emission.B"],
+        Source::Part(LightPart::Emission),
+        Rule::PerSample,
+    ),
+    extra(ExtraLayers::Parts, &["direct.R", "direct.G", "direct.B"], Source::Part(LightPart::Direct), Rule::PerSample),
+    extra(
+        ExtraLayers::Parts,
+        &["global.R", "global.G", "global.B"],
+        Source::Part(LightPart::Map(MapKind::Global)),
+        Rule::PerSample,
+    ),
+    extra(
+        ExtraLayers::Parts,
+        &["caustic.R", "caustic.G", "caustic.B"],
+        Source::Part(LightPart::Map(MapKind::Caustic)),
+        Rule::PerSample,
+    ),
+    extra(
+        ExtraLayers::Estimates,
+        &["globalEstimate.radius", "globalEstimate.photons"],
+        Source::Estimate(MapKind::Global),
+        Rule::PerCount,
+    ),
+    extra(
+        ExtraLayers::Estimates,
+        &["causticEstimate.radius", "causticEstimate.photons"],
+        Source::Estimate(MapKind::Caustic),
+        Rule::PerCount,
+    ),
+    extra(
+        ExtraLayers::Position,
+        &["position.X", "position.Y", "position.Z"],
+        Source::Rows((3, 0)),
+        Rule::PerHit,
+    ),
+    extra(ExtraLayers::Uv, &["UV.U", "UV.V"], Source::Rows((4, 0)), Rule::PerHit),
+    extra(ExtraLayers::Motion, &["motion.X", "motion.Y"], Source::Nothing, Rule::PerHit),
+];
+
 /// Index in [`LAYERS`] of the layer of that name.
 ///
 /// # Panics
@@ -55,20 +151,30 @@ pub(crate) fn layer_index(name: &str) -> usize {
 mod tests {
     use std::collections::BTreeSet;
 
-    use super::LAYERS;
+    use super::{EXTRA_LAYERS, LAYERS, Source};
     use crate::layout::LAYER_ROWS;
 
     #[test]
     fn layers_have_sources_and_channels_of_their_own() {
         let (mut sources, mut channels, mut count) = (BTreeSet::new(), BTreeSet::<&str>::new(), 0);
+        let mut add = |(row, first): (usize, usize), of: &[&'static str]| {
+            assert!(row <= LAYER_ROWS && first + of.len() <= 4, "{of:?}");
+            sources.extend((first..).take(of.len()).map(|number| (row, number)));
+            count += of.len();
+        };
         for layer in LAYERS {
-            let (row, first) = layer.source;
-            assert!(row <= LAYER_ROWS && first + layer.channels.len() <= 4, "{}", layer.name);
-            sources.extend((first..).take(layer.channels.len()).map(|number| (row, number)));
+            add(layer.source, layer.channels);
             channels.extend(layer.channels);
-            count += layer.channels.len();
+        }
+        let mut named = channels.len();
+        for layer in EXTRA_LAYERS {
+            if let Source::Rows(source) = layer.source {
+                add(source, layer.channels);
+            }
+            channels.extend(layer.channels);
+            named += layer.channels.len();
         }
         assert!(!sources.contains(&(0, 3)), "the number of samples left out is no layer");
-        assert_eq!((sources.len(), channels.len()), (count, count));
+        assert_eq!((sources.len(), channels.len()), (count, named));
     }
 }

@@ -3,6 +3,7 @@
 #[cfg(feature = "report")]
 mod canvas;
 mod convergence;
+pub(crate) mod cryptomatte;
 pub mod difference;
 mod exposure;
 mod exr;

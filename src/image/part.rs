@@ -11,18 +11,19 @@ use exr::meta::MetaData;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    cryptomatte::{Matte, RANKS},
     exr::{Attributes, channels_of, count_photons, encode, failure},
     exr_read::{attributes_of, open, our_attributes, window_of},
     file::{open_regular, write_file},
-    film::{Bandwidth, Film, Moments},
+    film::{Bandwidth, ExtraSums, Film, Moments},
     frame::DataWindow,
-    layers::{LAYERS, layer_index},
+    layers::{EXTRA_LAYERS, LAYERS, Rule, layer_index},
     pass_sum::{Block, PassSum, is_block},
 };
 use crate::{
     error::{Error, Result},
     map_kind::ByKind,
-    settings::{Crop, PassRange},
+    settings::{Crop, ExtraLayers, PassRange},
     stats::MapStats,
 };
 
@@ -50,6 +51,32 @@ struct BlockRow {
     bandwidth: [u64; 3],
     global: MapStats,
     caustic: MapStats,
+    #[serde(default)]
+    extras: Vec<ExtraRow>,
+    #[serde(default)]
+    mattes: Vec<ExtraLayers>,
+}
+
+/// A layer that was asked for.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct ExtraRow {
+    channels: Vec<String>,
+    rule: Rule,
+}
+
+impl ExtraRow {
+    /// Names of all numbers of a pixel.
+    fn numbers(&self) -> Vec<String> {
+        let layer = self.channels.first().and_then(|name| name.rsplit_once('.')).map_or("", |(layer, _)| layer);
+        let count = (self.rule == Rule::PerCount).then(|| format!("{layer}.count"));
+        self.channels.iter().cloned().chain(count).collect()
+    }
+}
+
+/// Names of the numbers of a matte: hash and count of each rank.
+fn matte_numbers(of: ExtraLayers) -> Vec<String> {
+    let ranks = 0..RANKS;
+    ranks.flat_map(|rank| ["hash", "count"].map(|number| format!("{}.{number}{rank}", Matte::name(of)))).collect()
 }
 
 /// Writes a part. `attributes` are those of a picture.
@@ -77,6 +104,19 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
             let Some(moments) = &film.moments else { continue };
             channels.extend(channels_of(&moments.deviations[i], layer.channels, &format!("{before}deviations.")));
         }
+        let own = row_of_layers(film);
+        for (layer, row) in film.extras.iter().zip(&own.0) {
+            let names = row.numbers();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            channels.extend(channels_of(&layer.sums, &names, &format!("{before}sum.")));
+        }
+        for matte in &film.mattes {
+            let names = matte_numbers(matte.of);
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let numbers = |[hash, count]: &[u32; 2]| [f32::from_bits(*hash), *count as f32];
+            let numbers: Vec<f32> = matte.ranks.iter().flatten().flat_map(numbers).collect();
+            channels.extend(channels_of(&numbers, &names, &before));
+        }
         if let Some(moments) = &film.moments {
             let names = LAYERS[layer_index("radiance")].channels;
             channels.extend(channels_of(&moments.with_bandwidth, names, &format!("{before}withBandwidth.")));
@@ -92,7 +132,14 @@ fn before(range: PassRange) -> String {
     format!("passes{}-{}.", range.first, range.end)
 }
 
+/// Which layers a film has that were asked for.
+fn row_of_layers(film: &Film) -> (Vec<ExtraRow>, Vec<ExtraLayers>) {
+    let row = |layer: &ExtraSums| ExtraRow { channels: layer.channels.clone(), rule: layer.rule };
+    (film.extras.iter().map(row).collect(), film.mattes.iter().map(|matte| matte.of).collect())
+}
+
 fn row(block: &Block) -> BlockRow {
+    let (extras, mattes) = row_of_layers(&block.film);
     let Bandwidth { mean, deviations, inverse } = block.film.bandwidth;
     BlockRow {
         passes: block.range,
@@ -101,6 +148,8 @@ fn row(block: &Block) -> BlockRow {
         bandwidth: [mean, deviations, inverse].map(f64::to_bits),
         global: block.photons.global,
         caustic: block.photons.caustic,
+        extras,
+        mattes,
     }
 }
 
@@ -167,6 +216,22 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             let with_bandwidth = read(&format!("{before}withBandwidth."), names)?;
             Ok(Moments { deviations: of_layers("deviations")?, with_bandwidth })
         };
+        let extra = |row: &ExtraRow| -> Result<ExtraSums> {
+            let (channels, rule) = (row.channels.clone(), row.rule);
+            let known = EXTRA_LAYERS.iter().find(|known| known.channels.iter().eq(&channels));
+            let names = row.numbers();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let sums = read(&format!("{before}sum."), &names)?;
+            Ok(ExtraSums { channels, rule, source: known.map(|known| known.source), sums })
+        };
+        let matte = |of: &ExtraLayers| -> Result<Matte> {
+            let names = matte_numbers(*of);
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let numbers = read(&before, &names)?;
+            let rank = |pixel: &[f32], rank: usize| [pixel[2 * rank].to_bits(), pixel[2 * rank + 1] as u32];
+            let ranks = |pixel: &[f32]| std::array::from_fn(|i| rank(pixel, i));
+            Ok(Matte { of: *of, ranks: numbers.chunks(2 * RANKS).map(ranks).collect() })
+        };
         let [mean, deviations, inverse] = row.bandwidth.map(f64::from_bits);
         let film = Film {
             whole,
@@ -176,6 +241,8 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             sums: of_layers("sum")?,
             bandwidth: Bandwidth { mean, deviations, inverse },
             moments: if row.passes.count() > 1 { Some(moments()?) } else { None },
+            extras: row.extras.iter().map(extra).collect::<Result<_>>()?,
+            mattes: row.mattes.iter().map(matte).collect::<Result<_>>()?,
             non_finite: row.non_finite,
         };
         let photons = ByKind { global: row.global, caustic: row.caustic };

@@ -8,6 +8,7 @@ use super::{
 use crate::{
     error::Result,
     gpu::Gpu,
+    image::{Film, layers::LightPart},
     layout::{Gathered, RecordGrid, VisiblePoint},
     map_kind::MapKind,
     passes::{
@@ -81,11 +82,11 @@ impl<'a> MapGatherer<'a> {
         pass: &CameraPass,
         tile: &Tile,
         (index, number): (usize, u32),
-        stats: &mut Stats,
+        (film, stats): (&mut Film, &mut Stats),
         progress: &dyn Progress,
     ) -> Result<()> {
         let gathered = &pass.tracer.gathered;
-        if self.observer.is_some() {
+        if self.observer.is_some() || pass.keeps_estimates() {
             // The gather leaves slots without a point unchanged; they may hold results of an
             // earlier tile.
             let mut encoder = pass.gpu.encoder();
@@ -96,8 +97,10 @@ impl<'a> MapGatherer<'a> {
         let Self { maps, search, sharing, estimate, .. } = self;
         let mut answer = |request: &EstimateRequest| search.answer(pass, maps, index, estimate, request, progress);
         timed(&mut stats.seconds.gather, || sharing.run(pass.gpu, number, &shared, &mut answer))?;
+        let kind = self.maps.by_kind().nth(index).expect("one of the maps").0;
+        pass.finished_part(tile, LightPart::Map(kind), film)?;
+        pass.finished_estimates(tile, kind, film)?;
         if let Some(observer) = &mut self.observer {
-            let kind = self.maps.by_kind().nth(index).expect("one of the maps").0;
             observer.observe(kind, &pass.gpu.read(gathered, 0, pass.tracer.point_count(tile).into())?);
         }
         Ok(())
@@ -214,13 +217,20 @@ impl Gatherer for MapGatherer<'_> {
 
     /// Adds the light of all maps. With final gathering, the visible points gather the caustic map
     /// only, and the ends of the rays gather all maps.
-    fn gather(&mut self, pass: &CameraPass, tile: &Tile, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
+    fn gather(
+        &mut self,
+        pass: &CameraPass,
+        tile: &Tile,
+        film: &mut Film,
+        stats: &mut Stats,
+        progress: &dyn Progress,
+    ) -> Result<()> {
         let final_gathering = pass.final_rays() > 0;
         let gathered_here = |kind: MapKind| !final_gathering || kind == MapKind::Caustic;
         let kinds: Vec<MapKind> = self.maps.by_kind().map(|(kind, _)| kind).collect();
         let here = (0..kinds.len()).filter(|&index| gathered_here(kinds[index]));
         for (index, number) in here.zip(1..) {
-            self.gather_map(pass, tile, (index, number), stats, progress)?;
+            self.gather_map(pass, tile, (index, number), (film, stats), progress)?;
         }
         let mut seconds = 0.0;
         if let Some(records) = &self.records {
@@ -232,6 +242,9 @@ impl Gatherer for MapGatherer<'_> {
         stats.seconds.gather += seconds;
         stats.non_finite.gather += count.non_finite;
         tally::add_step(stats, count);
+        if final_gathering {
+            pass.finished_part(tile, LightPart::Map(MapKind::Global), film)?;
+        }
         Ok(())
     }
 }

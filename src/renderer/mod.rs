@@ -4,6 +4,7 @@
 //! [`Session`] offers the single stages, for several pictures of the same photons.
 
 mod gatherer;
+mod light_groups;
 mod maps;
 mod progressive;
 mod ray_start;
@@ -13,6 +14,7 @@ mod size;
 mod tally;
 mod tiles;
 
+pub use light_groups::LightGroups;
 pub use maps::PhotonMaps;
 pub use progressive::Progressive;
 pub use render::render;

@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use super::{
-    session::{Render, Session},
+    light_groups::LightGroups,
+    session::Render,
     size::picture_size,
 };
 use crate::{error::Result, gpu::Gpu, progress::Progress, scene::Scene, settings::Settings};
@@ -16,12 +17,14 @@ use crate::{error::Result, gpu::Gpu, progress::Progress, scene::Scene, settings:
 pub fn render(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Progress) -> Result<Render> {
     let start = Instant::now();
     check(scene, settings)?;
-    let session = Session::open(gpu, scene, &settings.lights, progress)?;
-    session.prefetch(settings);
-    let maps = session.photon_maps(&settings.photons, progress)?;
-    let mut render = session.picture(&maps, &settings.estimate, &settings.picture, progress)?;
-    render.stats.seconds.total = start.elapsed().as_secs_f64();
-    Ok(render)
+    let groups = LightGroups::open(gpu, scene, settings, progress)?;
+    let (film, mut stats) = groups.film(|_, session| {
+        session.prefetch(settings);
+        let maps = session.photon_maps(&settings.photons, progress)?;
+        session.film(&maps, &settings.estimate, &settings.picture, progress)
+    })?;
+    stats.seconds.total = start.elapsed().as_secs_f64();
+    Ok(Render { frame: film.finish(), stats })
 }
 
 /// Checks the settings, the scene and the picture's size before the work begins.

@@ -56,6 +56,27 @@ impl<'a> Session<'a> {
     /// # Errors
     /// As [`super::render`].
     pub fn open(gpu: &'a Gpu, scene: &'a Scene, lights: &LightSettings, progress: &dyn Progress) -> Result<Self> {
+        Ok(Self::open_lit(gpu, scene, lights, None, progress)?.remove(0))
+    }
+
+    /// As [`Self::open`], once for each group of the scene's lights, of which there is one at least.
+    pub(super) fn open_groups(
+        gpu: &'a Gpu,
+        scene: &'a Scene,
+        lights: &LightSettings,
+        groups: &[String],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Self>> {
+        Self::open_lit(gpu, scene, lights, Some(groups), progress)
+    }
+
+    fn open_lit(
+        gpu: &'a Gpu,
+        scene: &'a Scene,
+        lights: &LightSettings,
+        groups: Option<&[String]>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Self>> {
         lights.check()?;
         scene.check_renderable()?;
         let mut stats = Stats {
@@ -66,11 +87,27 @@ impl<'a> Session<'a> {
         gpu.memory.restart_peak();
         progress.report(Stage::Bvh, 0, 1);
         let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
-        let buffers = SceneBuffers::new(gpu, scene, &bvh, lights)?;
-        stats.warnings.extend(buffers.lights.warnings.iter().cloned().chain(buffers.solids.warning()));
-        let probe = MediaProbe::new(scene, &bvh, &buffers.solids);
-        let camera_media = scene.cameras.iter().map(|camera| probe.at(camera.position.as_dvec3())).collect();
-        Ok(Self { gpu, scene, buffers, camera_media, stats })
+        let lit = |group: &String| scene.lit_by(group);
+        let buffers = match groups {
+            None => vec![SceneBuffers::new(gpu, scene, &bvh, lights)?],
+            Some(groups) => {
+                let first = SceneBuffers::new(gpu, &lit(&groups[0]), &bvh, lights)?;
+                let others = groups[1..].iter().map(|group| first.relit(gpu, &lit(group), &bvh, lights));
+                let others = others.collect::<Result<Vec<_>>>()?;
+                std::iter::once(first).chain(others).collect()
+            }
+        };
+        let solids = &buffers[0].solids;
+        stats.warnings.extend(solids.warning());
+        let probe = MediaProbe::new(scene, &bvh, solids);
+        let camera_media: Vec<Media> =
+            scene.cameras.iter().map(|camera| probe.at(camera.position.as_dvec3())).collect();
+        let session = |buffers: SceneBuffers| {
+            let mut stats = stats.clone();
+            stats.warnings.extend(buffers.lights.warnings.iter().cloned());
+            Self { gpu, scene, buffers, camera_media: camera_media.clone(), stats }
+        };
+        Ok(buffers.into_iter().map(session).collect())
     }
 
     /// Starts to compile the kernels that a picture with these settings needs, in the order of

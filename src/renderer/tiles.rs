@@ -1,24 +1,39 @@
 //! Second pass: the one loop over the tiles of a picture.
 
+use std::cell::RefCell;
+
 use super::{ray_start::ray_start, size::picture_size, tally};
 use crate::{
     bvh::Media,
     error::Result,
     gpu::Gpu,
-    image::Film,
-    layout::{ArrivingLight, VisiblePoint},
+    image::{
+        Film,
+        cryptomatte::hash,
+        layers::{LightPart, Source},
+    },
+    layout::{ArrivingLight, Gathered, VisiblePoint},
+    map_kind::MapKind,
     passes::{CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
-    settings::{Crop, EstimateSettings, PhotonSettings, PictureSettings},
+    settings::{Crop, EstimateSettings, ExtraLayers, PhotonSettings, PictureSettings},
     stats::{Stats, timed},
     upload::SceneBuffers,
 };
 
 /// Source of the photons' light at the visible points of a tile.
 pub(crate) trait Gatherer {
-    /// Adds the light to the radiance of the tile's points.
-    fn gather(&mut self, pass: &CameraPass, tile: &Tile, stats: &mut Stats, progress: &dyn Progress) -> Result<()>;
+    /// Adds the light to the radiance of the tile's points. `pass` is told when that of a map is
+    /// complete, see [`CameraPass::finished_map`].
+    fn gather(
+        &mut self,
+        pass: &CameraPass,
+        tile: &Tile,
+        film: &mut Film,
+        stats: &mut Stats,
+        progress: &dyn Progress,
+    ) -> Result<()>;
 
     /// Receives a pass over a small version of the whole picture, before the picture. The default
     /// does nothing with it.
@@ -66,13 +81,20 @@ pub(crate) struct CameraPass<'a> {
     spp: u32,
     /// Direct light comes from shadow rays.
     direct: bool,
+    geometry: &'a Scene,
+    /// Sums of the tile's pixels when the last part of the light was finished.
+    parts: RefCell<Vec<[f32; 4]>>,
+    /// Layers that the film has besides.
+    layers: Vec<ExtraLayers>,
+    /// Hashes of names for mattes, of objects and of materials.
+    hashes: [Vec<u32>; 2],
 }
 
 impl<'a> CameraPass<'a> {
     /// `media` are those around the middle of the camera; `geometry` is the scene in the buffers.
     pub fn new(
         gpu: &'a Gpu,
-        (geometry, scene): (&Scene, &'a SceneBuffers),
+        (geometry, scene): (&'a Scene, &'a SceneBuffers),
         (camera, media): (&Camera, Media),
         photons: &PhotonSettings,
         estimate: &EstimateSettings,
@@ -97,6 +119,13 @@ impl<'a> CameraPass<'a> {
             window: picture.window(size),
             spp: picture.spp,
             direct: photons.mode.direct_by_rays(),
+            geometry,
+            parts: RefCell::default(),
+            layers: picture.layers.clone(),
+            hashes: [
+                geometry.objects.iter().map(|name| hash(name)).collect(),
+                geometry.materials.iter().map(|material| hash(&material.name)).collect(),
+            ],
         })
     }
 
@@ -120,13 +149,14 @@ impl<'a> CameraPass<'a> {
         stats: &mut Stats,
         progress: &dyn Progress,
     ) -> Result<Vec<Film>> {
-        let mut films = vec![Film::new(self.size, self.window, self.spp); gatherer.pictures()];
+        let film = Film::new(self.size, self.window, self.spp).with_layers(&self.layers);
+        let mut films = vec![film; gatherer.pictures()];
         let tiles = self.tracer.tiles();
         for (done, tile) in tiles.iter().enumerate() {
             progress.check()?;
             progress.report(stage, done as u64, tiles.len() as u64);
-            self.trace(tile, stats)?;
-            gatherer.gather(self, tile, stats, progress)?;
+            self.trace(tile, &mut films[0], stats)?;
+            gatherer.gather(self, tile, &mut films[0], stats, progress)?;
             for (picture, film) in films.iter_mut().enumerate() {
                 gatherer.show(picture, self);
                 self.resolve(tile, film)?;
@@ -141,25 +171,89 @@ impl<'a> CameraPass<'a> {
 
     /// Traces camera rays to the tile's visible points, and adds direct light there if the mode
     /// takes it from shadow rays.
-    fn trace(&self, tile: &Tile, stats: &mut Stats) -> Result<()> {
+    fn trace(&self, tile: &Tile, film: &mut Film, stats: &mut Stats) -> Result<()> {
         let (gpu, scene) = (self.gpu, self.scene);
         let count = timed(&mut stats.seconds.camera, || self.tracer.trace(gpu, scene, tile))?;
         stats.non_finite.camera += count.non_finite;
         tally::add_step(stats, count);
+        self.parts.borrow_mut().clear();
+        self.finished_part(tile, LightPart::Emission, film)?;
         if self.direct {
             let count = timed(&mut stats.seconds.direct, || self.tracer.light_directly(gpu, scene, tile))?;
             stats.non_finite.direct += count.non_finite;
             tally::add_step(stats, count);
+            self.finished_part(tile, LightPart::Direct, film)?;
+        }
+        Ok(())
+    }
+
+    /// Adds what the tile's radiance has more than before to the layer of a part of the light.
+    pub fn finished_part(&self, tile: &Tile, part: LightPart, film: &mut Film) -> Result<()> {
+        if !self.layers.contains(&ExtraLayers::Parts) {
+            return Ok(());
+        }
+        let sums = self.tracer.resolve(self.gpu, tile)?;
+        let mut before = self.parts.borrow_mut();
+        before.resize(sums.len(), [0.0; 4]);
+        for (i, (sums, before)) in (0..).zip(sums.iter().zip(before.iter_mut())) {
+            let added = [0, 1, 2].map(|c| sums[0][c] - before[c]);
+            *before = sums[0];
+            if let Some(pixel) = self.tracer.pixel(tile, i) {
+                film.add_to(Source::Part(part), pixel, &added);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether results of estimates are wanted.
+    pub fn keeps_estimates(&self) -> bool {
+        self.layers.contains(&ExtraLayers::Estimates)
+    }
+
+    /// Adds the results of a map's estimates at the tile's points to the film.
+    pub fn finished_estimates(&self, tile: &Tile, kind: MapKind, film: &mut Film) -> Result<()> {
+        if !self.keeps_estimates() {
+            return Ok(());
+        }
+        let points = self.tracer.point_count(tile);
+        let gathered: Vec<Gathered> = self.gpu.read(&self.tracer.gathered, 0, points.into())?;
+        for (i, of_pixel) in (0..).zip(gathered.chunks((points / tile.pixels) as usize)) {
+            let Some(pixel) = self.tracer.pixel(tile, i) else { continue };
+            for one in of_pixel.iter().filter(|one| one.radius_squared > 0.0) {
+                film.add_to(Source::Estimate(kind), pixel, &[one.radius_squared.sqrt(), one.count as f32, 1.0]);
+            }
         }
         Ok(())
     }
 
     /// Sums the tile's radiance and layers into the film.
     fn resolve(&self, tile: &Tile, film: &mut Film) -> Result<()> {
-        for (i, sums) in (0..).zip(&self.tracer.resolve(self.gpu, tile)?) {
+        for (i, mut sums) in (0..).zip(self.tracer.resolve(self.gpu, tile)?) {
             if let Some(pixel) = self.tracer.pixel(tile, i) {
-                film.add(pixel, sums, tile.samples);
+                // Positions are relative to the centre on the device.
+                let center = self.geometry.center.as_vec3() * sums[2][3];
+                (0..3).for_each(|c| sums[3][c] += center[c]);
+                film.add(pixel, &sums, tile.samples);
             }
+        }
+        if film.has_mattes() { self.add_mattes(tile, film) } else { Ok(()) }
+    }
+
+    /// Adds to the mattes what the tile's samples see first.
+    fn add_mattes(&self, tile: &Tile, film: &mut Film) -> Result<()> {
+        let (triangles, spheres) = (&self.geometry.triangles, &self.geometry.spheres);
+        let owner = |id: u32| match triangles.get(id as usize) {
+            Some(triangle) => (triangle.object, triangle.material),
+            None => spheres.get(id as usize - triangles.len()).map_or((0, 0), |sphere| (sphere.object, sphere.material)),
+        };
+        let hits = self.tracer.first_hits(self.gpu, tile)?;
+        for (i, hits) in (0..).zip(hits.chunks(tile.samples as usize)) {
+            let Some(pixel) = self.tracer.pixel(tile, i) else { continue };
+            let owners = || hits.iter().filter(|hit| hit.alpha > 0.0).map(|hit| owner(hit.id));
+            let of = |hashes: &[u32], index: u32| hashes.get(index as usize).copied();
+            let [objects, materials] = &self.hashes;
+            film.add_to_matte(ExtraLayers::Objects, pixel, owners().filter_map(|(object, _)| of(objects, object)));
+            film.add_to_matte(ExtraLayers::Materials, pixel, owners().filter_map(|(_, material)| of(materials, material)));
         }
         Ok(())
     }

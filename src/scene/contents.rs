@@ -43,6 +43,8 @@ pub struct Scene {
     pub shells: Vec<u32>,
     /// Exact spheres.
     pub spheres: Vec<Sphere>,
+    /// Names of the nodes that show triangles and spheres, which refer to them by index.
+    pub objects: Vec<String>,
     /// Materials; triangles and spheres refer to them by index.
     pub materials: Vec<Material>,
     /// Punctual lights.
@@ -163,8 +165,16 @@ impl Scene {
             strength: environment.strength,
             rotation: environment.rotation,
         });
-        let options = &self.options;
-        Provenance { scene: &self.file_name, scene_hash: &self.hash, options, environment, settings, stats }
+        Provenance {
+            scene: &self.file_name,
+            scene_hash: &self.hash,
+            options: &self.options,
+            environment,
+            objects: self.objects.iter().map(String::as_str).collect(),
+            materials: self.materials.iter().map(|material| material.name.as_str()).collect(),
+            settings,
+            stats,
+        }
     }
 
     /// Finds a camera by its name or by its index in [`Scene::cameras`]; the first if `wanted` is

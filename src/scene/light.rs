@@ -34,6 +34,9 @@ pub enum LightKind {
 pub struct Light {
     /// Name in the file.
     pub name: String,
+    /// Group that it is counted to in layers of lights, `extras.caustica.group` of the node or the
+    /// light; `None`: one of its own, by its name.
+    pub group: Option<String>,
     /// Kind of the light.
     pub kind: LightKind,
     /// Metres; unused by a directional light.

@@ -264,6 +264,9 @@ pub struct Material {
     /// Of several solids that claim the same space, that of the highest priority fills it; among
     /// equals the smallest. 0 unless the file says otherwise.
     pub priority: i32,
+    /// Group that its emission is counted to in layers of lights; `None`: one of its own, by its
+    /// name.
+    pub group: Option<String>,
     /// Textures of the factors.
     pub textures: Textures,
 }
@@ -303,6 +306,7 @@ impl Material {
             opacity: 1.0,
             normal_scale: 1.0,
             priority: 0,
+            group: None,
             textures: Textures::default(),
         }
     }

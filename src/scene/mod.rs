@@ -9,6 +9,7 @@ mod emission_map;
 mod environment;
 mod gltf;
 mod light;
+mod light_groups;
 mod load;
 mod material;
 mod shape;

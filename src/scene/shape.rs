@@ -16,6 +16,8 @@ pub struct Triangle {
     pub material: u32,
     /// Index into [`Scene::attributes`](super::Scene::attributes) plus one; 0 for none.
     pub attributes: u32,
+    /// Index into [`Scene::objects`](super::Scene::objects).
+    pub object: u32,
     /// The second and the third corner were exchanged after the attributes were read.
     pub is_turned: bool,
 }
@@ -24,7 +26,7 @@ impl Triangle {
     /// A triangle without attributes.
     #[must_use]
     pub fn new(positions: [Vec3; 3], normals: [Vec3; 3], material: u32) -> Self {
-        Self { positions, normals, material, attributes: 0, is_turned: false }
+        Self { positions, normals, material, attributes: 0, object: 0, is_turned: false }
     }
 
     /// Unit normal of the plane, towards the outside; zero for a degenerate triangle.
@@ -57,6 +59,8 @@ pub struct Sphere {
     pub radius: f32,
     /// Index into [`Scene::materials`](super::Scene::materials).
     pub material: u32,
+    /// Index into [`Scene::objects`](super::Scene::objects).
+    pub object: u32,
 }
 
 impl Sphere {

@@ -1,6 +1,7 @@
 //! Settings of a render, by stage. Every value has a unit, a range and a default.
 
 mod estimate;
+mod layers;
 mod lights;
 mod loading;
 mod passes;
@@ -11,6 +12,7 @@ mod range;
 mod render_settings;
 
 pub use estimate::{EstimateSettings, Search};
+pub use layers::ExtraLayers;
 pub use lights::{LightSampling, LightSettings, LightUnit};
 pub use loading::LoadOptions;
 pub use passes::{PassRange, PassSettings};

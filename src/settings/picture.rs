@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::range::{Range, fail};
+use super::{
+    layers::ExtraLayers,
+    range::{Range, fail},
+};
 use crate::{error::Result, pixel_filter::PixelFilter};
 
 /// Rectangular part of a picture, in pixels of the whole picture from its upper left corner. It has
@@ -53,6 +56,8 @@ pub struct PictureSettings {
     /// Samples of the direct light of emissive surfaces, the environment and more than 16 punctual
     /// lights per visible point, in [`Self::LIGHT_SAMPLES`].
     pub light_samples: u32,
+    /// Further layers of the picture.
+    pub layers: Vec<ExtraLayers>,
 }
 
 impl Default for PictureSettings {
@@ -66,6 +71,7 @@ impl Default for PictureSettings {
             aperture: 0.0,
             focus: None,
             light_samples: 4,
+            layers: Vec::new(),
         }
     }
 }

@@ -45,19 +45,7 @@ impl MaterialBuffers {
             return Err(Error::Scene { path: scene.path.clone(), place: "materials".to_owned(), problem });
         }
         let mut texels = Texels::new(&scene.images);
-        let first = scene.materials.len() as u32 * MATERIAL_TEXELS;
-        let mut textures = Vec::new();
-        let mut rows: Vec<[u32; 4]> = Vec::with_capacity(first as usize);
-        for material in &scene.materials {
-            let record = record(material, unit, |texture, is_color| {
-                let at = first + textures.len() as u32;
-                let rows: [[u32; 4]; 3] = bytemuck::cast(texture_record(texture, is_color, &mut texels));
-                textures.extend(rows);
-                at
-            });
-            rows.extend::<[[u32; 4]; MATERIAL_TEXELS as usize]>(bytemuck::cast(record));
-        }
-        rows.extend(textures);
+        let rows = rows(scene, unit, &mut texels);
         let materials = || scene.materials.iter();
         let attributes: Vec<_> = in_order(scene).iter().map(attributes).collect();
         Ok(Self {
@@ -72,11 +60,38 @@ impl MaterialBuffers {
         })
     }
 
+    /// The materials of the same scene with other emission.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn relit(&self, gpu: &Gpu, scene: &Scene, unit: LightUnit) -> Result<Self> {
+        let rows = rows(scene, unit, &mut Texels::new(&scene.images));
+        let (attributes, texels) = (self.attributes.clone(), self.texels.clone());
+        Ok(Self { materials: Table::new(gpu, "materials", &rows)?, attributes, texels, ..*self })
+    }
     /// The tables by name.
     #[must_use]
     pub fn tables(&self) -> [(&'static str, &Table); 3] {
         [("materials", &self.materials), ("attributes", &self.attributes), ("texels", &self.texels)]
     }
+}
+
+/// Rows of the table of materials, followed by those of their textures.
+fn rows(scene: &Scene, unit: LightUnit, texels: &mut Texels<'_>) -> Vec<[u32; 4]> {
+    let first = scene.materials.len() as u32 * MATERIAL_TEXELS;
+    let mut textures = Vec::new();
+    let mut rows: Vec<[u32; 4]> = Vec::with_capacity(first as usize);
+    for material in &scene.materials {
+        let record = record(material, unit, |texture, is_color| {
+            let at = first + textures.len() as u32;
+            let rows: [[u32; 4]; 3] = bytemuck::cast(texture_record(texture, is_color, texels));
+            textures.extend(rows);
+            at
+        });
+        rows.extend::<[[u32; 4]; MATERIAL_TEXELS as usize]>(bytemuck::cast(record));
+    }
+    rows.extend(textures);
+    rows
 }
 
 /// Whether a material has more lobes than the kernels' shorter code follows.

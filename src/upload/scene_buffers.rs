@@ -1,5 +1,7 @@
 //! Bind group 0: the scene on the device. Owner of `shaders/bindings/scene.wesl`.
 
+use std::sync::Arc;
+
 use bytemuck::Pod;
 use glam::Vec3;
 
@@ -20,7 +22,7 @@ use crate::{
 /// The scene's buffers.
 #[derive(Debug)]
 pub struct SceneBuffers {
-    nodes: Buffer,
+    nodes: Arc<Buffer>,
     primitives: Windows,
     normals: Table,
     pub materials: MaterialBuffers,
@@ -82,7 +84,7 @@ impl SceneBuffers {
         let lights = LightBuffers::new(gpu, (scene, bvh), &MediaProbe::new(scene, bvh, &solids), settings)?;
         let contacts = contacts(scene, bvh);
         Ok(Self {
-            nodes: gpu.storage_with("bvh nodes", &bvh.nodes)?,
+            nodes: Arc::new(gpu.storage_with("bvh nodes", &bvh.nodes)?),
             primitives: Windows::new::<Primitive>(
                 gpu,
                 "primitives",
@@ -106,6 +108,26 @@ impl SceneBuffers {
             stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
             solids,
             lights,
+        })
+    }
+
+    /// The buffers of the same scene in another light; it shares what does not depend on the light.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn relit(&self, gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
+        let lights = LightBuffers::new(gpu, (scene, bvh), &MediaProbe::new(scene, bvh, &self.solids), settings)?;
+        let contacts = contacts(scene, bvh);
+        let primitives = marked(&bvh.primitives, scene, &self.solids, &contacts, &lights.table);
+        Ok(Self {
+            nodes: Arc::clone(&self.nodes),
+            primitives: Windows::new::<Primitive>(gpu, "primitives", &primitives)?,
+            normals: self.normals.clone(),
+            materials: self.materials.relit(gpu, scene, settings.unit)?,
+            media: self.media.clone(),
+            solids: self.solids.clone(),
+            lights,
+            ..*self
         })
     }
 
@@ -153,7 +175,7 @@ impl SceneBuffers {
     #[must_use]
     pub fn with<'a>(&'a self, others: &[(&'a str, &'a Buffer)]) -> Vec<(&'a str, &'a Buffer)> {
         let mut all = vec![
-            ("nodes", &self.nodes),
+            ("nodes", &*self.nodes),
             ("primitives", &self.primitives.low),
             ("primitives_high", &self.primitives.high),
         ];

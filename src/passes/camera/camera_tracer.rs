@@ -338,6 +338,14 @@ impl CameraTracer {
         gpu.read(&self.pixel_rows, 0, u64::from(tile.pixels))
     }
 
+    /// Reads the first hits of the tile's samples, pixel by pixel.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn first_hits(&self, gpu: &Gpu, tile: &Tile) -> Result<Vec<FirstHit>> {
+        gpu.read(&self.first_hits, 0, u64::from(tile.pixels) * u64::from(tile.samples))
+    }
+
     pub(crate) fn tile_view(&self, tile: &Tile) -> CameraTile {
         CameraTile {
             first_column: tile.first_column,

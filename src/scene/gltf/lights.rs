@@ -9,6 +9,7 @@ use json::extensions::scene::khr_lights_punctual as punctual;
 use json::validation::Checked;
 use punctual::{Spot, Type};
 
+use super::extras;
 use super::fault::{Notes, Read, fault};
 use super::nodes::{self, PlacedNode};
 use crate::scene::{Light, LightKind};
@@ -50,12 +51,16 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
     }
     if intensity == Vec3::ZERO {
         notes.add(format!("light {name:?} has no intensity"));
-        let dark = Light { name, kind: LightKind::Point, position: Vec3::ZERO, direction: Vec3::NEG_Z, intensity };
+        let dark = Light { name, group: None, kind: LightKind::Point, position: Vec3::ZERO, direction: Vec3::NEG_Z, intensity };
         return Ok(Some((None, dark)));
     }
     if light.range.is_some() {
         notes.add("the range of lights is not read: they reach everywhere");
     }
+    let group = match extras::group(&node.extras, &format!("nodes[{}]", placed.node))? {
+        None => extras::group(&light.extras, &place)?,
+        own => own,
+    };
     let direction = match kind {
         LightKind::Point => Vec3::NEG_Z,
         LightKind::Spot { .. } | LightKind::Directional => {
@@ -67,7 +72,7 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
         }
     };
     let position = (kind != LightKind::Directional).then(|| placed.world.w_axis.truncate());
-    Ok(Some((position, Light { name, kind, position: Vec3::ZERO, direction, intensity })))
+    Ok(Some((position, Light { name, group, kind, position: Vec3::ZERO, direction, intensity })))
 }
 
 /// Cones of the spot light at JSON path `place`.

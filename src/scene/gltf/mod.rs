@@ -24,6 +24,7 @@ mod container;
 mod doubled_lamps;
 mod draco;
 mod extensions;
+mod extras;
 mod fault;
 mod files;
 mod format;
@@ -160,6 +161,7 @@ fn assemble(
     let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges);
     warnings.into_iter().for_each(|warning| notes.add(warning));
     (scene.triangles, scene.attributes, scene.shells) = (triangles, attributes, shells);
+    name_objects(root, &mut scene);
     doubled_lamps::remove(&mut scene, &mut notes);
     placing::turn_tangents(&scene.triangles, &mut scene.attributes);
     placing::keep_attributes_in_use(&mut scene.triangles, &mut scene.attributes);
@@ -167,6 +169,26 @@ fn assemble(
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     scene.warnings = notes.into_lines();
     Ok(scene)
+}
+
+/// Names the nodes that show something, and lets triangles and spheres refer to these names instead
+/// of the nodes. A node without a name has that of its mesh.
+fn name_objects(root: &json::Root, scene: &mut Scene) {
+    let mut indices = vec![u32::MAX; root.nodes.len()];
+    let objects = &mut scene.objects;
+    let mut renumber = |object: &mut u32| {
+        let node = *object as usize;
+        if indices[node] == u32::MAX {
+            let mesh = root.nodes[node].mesh.map(|mesh| mesh.value());
+            let fallback = mesh.and_then(|mesh| root.meshes[mesh].name.clone()).filter(|name| !name.is_empty());
+            let name = root.nodes[node].name.clone().filter(|name| !name.is_empty()).or(fallback);
+            indices[node] = objects.len() as u32;
+            objects.push(name.unwrap_or_else(|| format!("node {node}")));
+        }
+        *object = indices[node];
+    };
+    scene.triangles.iter_mut().for_each(|triangle| renumber(&mut triangle.object));
+    scene.spheres.iter_mut().for_each(|sphere| renumber(&mut sphere.object));
 }
 
 /// A copy of a mesh with its name in messages.
@@ -233,6 +255,7 @@ impl NodeContents {
 
 impl PlacedSphere {
     fn relative_to(&self, center: DVec3, slot: &impl Fn(Option<usize>) -> u32) -> Sphere {
-        Sphere { center: (self.center - center).as_vec3(), radius: self.radius as f32, material: slot(self.material) }
+        let (center, radius) = ((self.center - center).as_vec3(), self.radius as f32);
+        Sphere { center, radius, material: slot(self.material), object: self.node as u32 }
     }
 }

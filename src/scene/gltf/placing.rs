@@ -77,7 +77,7 @@ pub(super) struct Placed {
     pub(super) meshes: Vec<PlacedMesh>,
 }
 
-/// All shown triangles relative to `center`.
+/// All shown triangles relative to `center`. Their objects are the indices of nodes.
 pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut Notes) -> Read<Placed> {
     let sum = |of: fn(&MeshPrimitive) -> usize| -> usize {
         instances.iter().map(|instance| instance.copies() * total(instance.primitives, of)).sum()
@@ -97,6 +97,7 @@ pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut N
                     place_skinned(instance, primitive, center, &mut placed);
                 }
             }
+            placed.triangles[first..].iter_mut().for_each(|triangle| triangle.object = instance.node as u32);
             placed.meshes.push((first..placed.triangles.len(), instance.node));
         }
     }
@@ -116,7 +117,7 @@ impl Placed {
         // Each triangle has attributes of its own: equal ones have different indices.
         let values = |triangle: &Triangle| {
             let own = attributes.get((triangle.attributes as usize).wrapping_sub(1));
-            (Triangle { attributes: 0, ..*triangle }, own)
+            (Triangle { attributes: 0, object: 0, ..*triangle }, own)
         };
         let alike = |a: &[Triangle], b: &[Triangle]| a.iter().map(values).eq(b.iter().map(values));
         let mut known: HashMap<_, Vec<Range<usize>>> = HashMap::new();

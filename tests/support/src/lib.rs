@@ -43,6 +43,7 @@ pub fn scene(surfaces: &[Surface]) -> Scene {
 pub fn point_light(position: Vec3, intensity: f32) -> Light {
     Light {
         name: String::new(),
+        group: None,
         kind: LightKind::Point,
         position,
         direction: Vec3::NEG_Z,
@@ -76,7 +77,7 @@ pub fn camera(position: Vec3, target: Vec3, degrees: f32) -> Camera {
 }
 
 pub fn sphere(center: Vec3, radius: f32, material: u32) -> Sphere {
-    Sphere { center, radius, material }
+    Sphere { center, radius, material, object: 0 }
 }
 
 /// The parallelogram `corner, corner + a, corner + a + b, corner + b`; its normal is along a × b.

@@ -99,6 +99,7 @@ fn room(light: Vec3) -> Scene {
         materials: vec![material],
         lights: vec![Light {
             name: String::new(),
+            group: None,
             kind: LightKind::Point,
             position: light,
             direction: Vec3::NEG_Z,
@@ -207,7 +208,7 @@ fn spheres(random: &mut Random, count: usize) -> Place {
     let mut scene = room(vec3(0.0, 2.0, 0.0));
     floor(&mut scene, 0.0, 1.0);
     let spots = (0..25).map(|i| vec3(0.35 * ((i % 5) as f32 - 2.0), 0.3, 0.35 * ((i / 5) as f32 - 2.0)));
-    scene.spheres = spots.map(|center| Sphere { center, radius: RADIUS, material: 0 }).collect();
+    scene.spheres = spots.map(|center| Sphere { center, radius: RADIUS, material: 0, object: 0 }).collect();
     let mut points = Vec::new();
     while points.len() < count {
         let sphere = scene.spheres[points.len() % 25];

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use gltf::json;
 
+use super::extras;
 use super::fault::{Notes, Read, fault};
 use super::images::ImageList;
 use crate::scene::{Alpha, Material, SHARP_ROUGHNESS, Surface};
@@ -61,7 +62,8 @@ impl Reader<'_> {
         let mut material = Material::new(&self.name, Surface::Diffuse { albedo: base.color });
         material.double_sided = self.material.double_sided;
         (material.alpha, material.opacity) = (alpha, if alpha == Alpha::Opaque { 1.0 } else { base.opacity });
-        material.priority = priority(self.material, &self.place)?;
+        material.priority = extras::priority(&self.material.extras, &self.place)?;
+        material.group = extras::group(&self.material.extras, &self.place)?;
         material.textures.base_color = base.color_texture;
         material.unlit = unlit;
         material.roughness = base.roughness;
@@ -147,20 +149,6 @@ impl Reader<'_> {
 fn absorption(color: Vec3, distance: f32) -> Vec3 {
     let of = |channel: f32| (channel.max(f32::MIN_POSITIVE).recip().ln() / distance).clamp(0.0, f32::MAX);
     Vec3::from_array(color.to_array().map(of))
-}
-
-/// Rank among overlapping solids: `extras.caustica.priority`, an integer; 0 without one.
-fn priority(material: &json::Material, place: &str) -> Read<i32> {
-    let extras =
-        material.extras.as_ref().and_then(|extras| serde_json::from_str::<serde_json::Value>(extras.get()).ok());
-    let Some(priority) = extras.as_ref().and_then(|extras| extras.get("caustica")?.get("priority")) else {
-        return Ok(0);
-    };
-    let integer = priority.as_i64().and_then(|priority| i32::try_from(priority).ok());
-    integer.map_or_else(
-        || fault(format!("{place}.extras.caustica.priority"), format!("{priority} is not an integer of 32 bits")),
-        Ok,
-    )
 }
 
 /// Emitted radiance: emissive factor times strength, with nits read as W/(m² sr).
