@@ -147,8 +147,12 @@ mod tests {
         let surfaces = [Surface::Glass { ior: 1.5, tint: Vec3::ONE }, Surface::Diffuse { albedo: Vec3::ONE }];
         let material = |surface| Material::new("", surface);
         let triangle = |(positions, material): &([Vec3; 3], u32)| Triangle::new(*positions, [Vec3::Y; 3], *material);
-        let sphere =
-            |(radius, material): &(f32, u32)| Sphere { center: Vec3::ONE, radius: *radius, material: *material, object: 0 };
+        let sphere = |(radius, material): &(f32, u32)| Sphere {
+            center: Vec3::ONE,
+            radius: *radius,
+            material: *material,
+            object: 0,
+        };
         let scene = Scene {
             materials: surfaces.map(material).to_vec(),
             triangles: triangles.iter().map(triangle).collect(),

@@ -36,7 +36,12 @@ fn random_scene(triangles: usize, spheres: usize, size: f32, seed: u32) -> Scene
         scene.triangles.push(triangle([at, at + random.point() * size, at + random.point() * size]));
     }
     for _ in 0..spheres {
-        scene.spheres.push(Sphere { center: random.point(), radius: (random.next() + 0.1) * size, material: 0, object: 0 });
+        scene.spheres.push(Sphere {
+            center: random.point(),
+            radius: (random.next() + 0.1) * size,
+            material: 0,
+            object: 0,
+        });
     }
     scene
 }

@@ -349,8 +349,8 @@ value_enum!(QualityArg => Quality {
 });
 
 value_enum!(LayerArg => ExtraLayers {
-    /// emission, direct, global, caustic: parts whose sum is the picture
-    Parts,
+    /// emission, direct, global, caustic: what the picture is the sum of
+    Components,
     /// light.NAME: what each light gives, with photons of its own; lights of one
     /// extras.caustica.group are one
     Lights,

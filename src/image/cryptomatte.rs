@@ -1,6 +1,6 @@
-//! Mattes by the Cryptomatte specification (Friedman and Jones 2015, "Fully automatic ID mattes with
-//! support for motion blur and transparency", and Psyop's "Cryptomatte specification" 1.2): for
-//! each pixel the hashes of what it shows, with the part of the pixel that each covers.
+//! Mattes by the Cryptomatte specification (Friedman and Jones 2015, "Fully automatic ID mattes
+//! with support for motion blur and transparency", and Psyop's "Cryptomatte specification" 1.2):
+//! for each pixel the hashes of what it shows, with the part of the pixel that each covers.
 
 use crate::settings::ExtraLayers;
 
@@ -62,13 +62,14 @@ impl Matte {
                 _ => (f64::from(count) / samples as f64) as f32,
             }
         };
-        let name = |channel: usize| format!("{}{:02}.{}", Self::name(self.of), channel / 4, b"RGBA"[channel % 4] as char);
+        let name =
+            |channel: usize| format!("{}{:02}.{}", Self::name(self.of), channel / 4, b"RGBA"[channel % 4] as char);
         let of = |channel| (name(channel), sorted.iter().map(|ranks| number(ranks, channel)).collect());
         (0..2 * RANKS).map(of).collect()
     }
 
-    /// Attributes of a file with the matte, by their full names; the manifest gives the hash of each
-    /// name.
+    /// Attributes of a file with the matte, by their full names; the manifest gives the hash of
+    /// each name.
     pub fn attributes<'a>(of: ExtraLayers, names: impl Iterator<Item = &'a str>) -> Vec<(String, String)> {
         let layer = Self::name(of);
         let key = &format!("{:08x}", hash(layer))[..7];

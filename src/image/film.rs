@@ -171,7 +171,7 @@ impl Film {
             let add = |into: &mut [f32], from: &[f32]| into.iter_mut().zip(from).for_each(|(a, b)| *a += b);
             add(&mut total.sums[radiance], &film.sums[radiance]);
             for (layer, other) in total.extras.iter_mut().zip(&film.extras) {
-                if matches!(layer.source, Some(Source::Part(_))) {
+                if matches!(layer.source, Some(Source::Component(_))) {
                     add(&mut layer.sums, &other.sums);
                 }
             }

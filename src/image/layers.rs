@@ -1,9 +1,9 @@
 //! Table of output layers, from the device's sums to the channels of a file.
 //!
-//! To add a layer: add a row to [`LAYERS`], or to [`EXTRA_LAYERS`] if only some want it, and the line
-//! in `shaders/trace_camera.wesl` that writes its numbers into the sample's rows (`FirstHit`; with
-//! more than those have room for, [`crate::layout::LAYER_ROWS`] grows). Film, frame and file follow
-//! from the tables.
+//! To add a layer: add a row to [`LAYERS`], or to [`EXTRA_LAYERS`] if only some want it, and the
+//! line in `shaders/trace_camera.wesl` that writes its numbers into the sample's rows (`FirstHit`;
+//! with more than those have room for, [`crate::layout::LAYER_ROWS`] grows). Film, frame and file
+//! follow from the tables.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,14 +17,14 @@ pub enum Rule {
     PerSample,
     /// Mean over the samples whose first ray hit something; 0 if none did.
     PerHit,
-    /// Mean over what the layer counts itself, by a number after those of its channels; 0 if that is
-    /// 0.
+    /// Mean over what the layer counts itself, by a number after those of its channels; 0 if that
+    /// is 0.
     PerCount,
 }
 
-/// Parts of the radiance, in the order in which it is added up: each by another estimator.
+/// Components of the radiance, each by another estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightPart {
+pub enum LightComponent {
     /// Emission that camera paths meet, and the light of rough lobes.
     Emission,
     /// Direct light, by shadow rays.
@@ -39,8 +39,8 @@ pub enum LightPart {
 pub enum Source {
     /// The samples' rows, as [`Layer::source`].
     Rows((usize, usize)),
-    /// A part of the radiance.
-    Part(LightPart),
+    /// A component of the radiance.
+    Component(LightComponent),
     /// Radius and number of photons of a map's estimates.
     Estimate(MapKind),
     /// Nowhere: all are 0.
@@ -99,22 +99,27 @@ const fn extra(of: ExtraLayers, channels: &'static [&'static str], source: Sourc
 /// lights, and mattes have no sums.
 pub const EXTRA_LAYERS: [ExtraLayer; 9] = [
     extra(
-        ExtraLayers::Parts,
+        ExtraLayers::Components,
         &["emission.R", "emission.G", "emission.B"],
-        Source::Part(LightPart::Emission),
+        Source::Component(LightComponent::Emission),
         Rule::PerSample,
     ),
-    extra(ExtraLayers::Parts, &["direct.R", "direct.G", "direct.B"], Source::Part(LightPart::Direct), Rule::PerSample),
     extra(
-        ExtraLayers::Parts,
+        ExtraLayers::Components,
+        &["direct.R", "direct.G", "direct.B"],
+        Source::Component(LightComponent::Direct),
+        Rule::PerSample,
+    ),
+    extra(
+        ExtraLayers::Components,
         &["global.R", "global.G", "global.B"],
-        Source::Part(LightPart::Map(MapKind::Global)),
+        Source::Component(LightComponent::Map(MapKind::Global)),
         Rule::PerSample,
     ),
     extra(
-        ExtraLayers::Parts,
+        ExtraLayers::Components,
         &["caustic.R", "caustic.G", "caustic.B"],
-        Source::Part(LightPart::Map(MapKind::Caustic)),
+        Source::Component(LightComponent::Map(MapKind::Caustic)),
         Rule::PerSample,
     ),
     extra(
@@ -129,12 +134,7 @@ pub const EXTRA_LAYERS: [ExtraLayer; 9] = [
         Source::Estimate(MapKind::Caustic),
         Rule::PerCount,
     ),
-    extra(
-        ExtraLayers::Position,
-        &["position.X", "position.Y", "position.Z"],
-        Source::Rows((3, 0)),
-        Rule::PerHit,
-    ),
+    extra(ExtraLayers::Position, &["position.X", "position.Y", "position.Z"], Source::Rows((3, 0)), Rule::PerHit),
     extra(ExtraLayers::Uv, &["UV.U", "UV.V"], Source::Rows((4, 0)), Rule::PerHit),
     extra(ExtraLayers::Motion, &["motion.X", "motion.Y"], Source::Nothing, Rule::PerHit),
 ];

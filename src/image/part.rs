@@ -3,7 +3,8 @@
 //! A part shows as a picture: `R G B A` are the means of its passes. Each block of passes has the
 //! channels `passesA-B.sum.C`, the sums over all samples of each channel C of [`LAYERS`], and if it
 //! has several passes, `passesA-B.deviations.C` and `passesA-B.withBandwidth.C`, their second
-//! moments. All are 32-bit floats as they are in memory. `caustica:blocks` holds the rest as JSON.
+//! moments. Layers on request have sums, and mattes the hashes and counts of their ranks. All are
+//! 32-bit floats as they are in memory. `caustica:blocks` holds the rest as JSON.
 
 use std::{io::BufReader, path::Path};
 
@@ -275,7 +276,8 @@ fn no_part(path: &Path) -> Error {
 mod tests {
     use super::*;
     use crate::{
-        image::{read_exr, write_exr_with},
+        image::{cryptomatte::hash, layers::Source, read_exr, write_exr_with},
+        map_kind::MapKind,
         stats::Stats,
     };
 
@@ -285,10 +287,14 @@ mod tests {
     fn sum(passes: std::ops::Range<u32>) -> PassSum {
         let mut sum = PassSum::default();
         for index in passes {
-            let mut film = Film::new((5, 7), WINDOW, 4);
+            let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL);
             for pixel in 0..6 {
                 let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
-                film.add((pixel % 3, pixel / 3), &[[value, value * 1e-9, 1e9, 0.0], [value; 4], [2.0; 4]], 4);
+                let place = (pixel % 3, pixel / 3);
+                let rows = [[value, value * 1e-9, 1e9, 0.0], [value; 4], [2.0; 4], [value * 7.0; 4], [value * 8.0; 4]];
+                film.add(place, &rows, 4);
+                film.add_to(Source::Estimate(MapKind::Caustic), place, &[value, 3.0, 1.0]);
+                film.add_to_matte(ExtraLayers::Objects, place, [hash("a"), hash("b"), hash("a")].into_iter());
             }
             let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3));
             sum.push(Block::of_pass(index, film, &Stats::default())).expect("of one picture");

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     error::Result,
     gpu::Gpu,
-    image::{Film, layers::LightPart},
+    image::{Film, layers::LightComponent},
     layout::{Gathered, RecordGrid, VisiblePoint},
     map_kind::MapKind,
     passes::{
@@ -98,7 +98,7 @@ impl<'a> MapGatherer<'a> {
         let mut answer = |request: &EstimateRequest| search.answer(pass, maps, index, estimate, request, progress);
         timed(&mut stats.seconds.gather, || sharing.run(pass.gpu, number, &shared, &mut answer))?;
         let kind = self.maps.by_kind().nth(index).expect("one of the maps").0;
-        pass.finished_part(tile, LightPart::Map(kind), film)?;
+        pass.finished_component(tile, LightComponent::Map(kind), film)?;
         pass.finished_estimates(tile, kind, film)?;
         if let Some(observer) = &mut self.observer {
             observer.observe(kind, &pass.gpu.read(gathered, 0, pass.tracer.point_count(tile).into())?);
@@ -243,7 +243,7 @@ impl Gatherer for MapGatherer<'_> {
         stats.non_finite.gather += count.non_finite;
         tally::add_step(stats, count);
         if final_gathering {
-            pass.finished_part(tile, LightPart::Map(MapKind::Global), film)?;
+            pass.finished_component(tile, LightComponent::Map(MapKind::Global), film)?;
         }
         Ok(())
     }

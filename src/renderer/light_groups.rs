@@ -1,5 +1,5 @@
-//! Pictures of groups of lights: the scene is rendered once for each group, with photons of its own,
-//! and the picture is the sum.
+//! Pictures of groups of lights: the scene is rendered once for each group, with photons of its
+//! own, and the picture is the sum.
 
 use super::session::Session;
 use crate::{
@@ -45,10 +45,7 @@ impl<'a> LightGroups<'a> {
     ///
     /// # Errors
     /// Those of `render`.
-    pub fn film(
-        &self,
-        mut render: impl FnMut(usize, &Session<'a>) -> Result<(Film, Stats)>,
-    ) -> Result<(Film, Stats)> {
+    pub fn film(&self, mut render: impl FnMut(usize, &Session<'a>) -> Result<(Film, Stats)>) -> Result<(Film, Stats)> {
         let mut rendered = self.sessions.iter().enumerate().map(|(i, session)| render(i, session));
         let first = rendered.next().expect("a session")?;
         if self.names.is_empty() {

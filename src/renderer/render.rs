@@ -2,11 +2,7 @@
 
 use std::time::Instant;
 
-use super::{
-    light_groups::LightGroups,
-    session::Render,
-    size::picture_size,
-};
+use super::{light_groups::LightGroups, session::Render, size::picture_size};
 use crate::{error::Result, gpu::Gpu, progress::Progress, scene::Scene, settings::Settings};
 
 /// Renders the scene. The caller adds the seconds of `load` to the statistics.

@@ -59,7 +59,8 @@ impl<'a> Session<'a> {
         Ok(Self::open_lit(gpu, scene, lights, None, progress)?.remove(0))
     }
 
-    /// As [`Self::open`], once for each group of the scene's lights, of which there is one at least.
+    /// As [`Self::open`], once for each group of the scene's lights, of which there is one at
+    /// least.
     pub(super) fn open_groups(
         gpu: &'a Gpu,
         scene: &'a Scene,

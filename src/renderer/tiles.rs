@@ -10,7 +10,7 @@ use crate::{
     image::{
         Film,
         cryptomatte::hash,
-        layers::{LightPart, Source},
+        layers::{LightComponent, Source},
     },
     layout::{ArrivingLight, Gathered, VisiblePoint},
     map_kind::MapKind,
@@ -24,8 +24,8 @@ use crate::{
 
 /// Source of the photons' light at the visible points of a tile.
 pub(crate) trait Gatherer {
-    /// Adds the light to the radiance of the tile's points. `pass` is told when that of a map is
-    /// complete, see [`CameraPass::finished_map`].
+    /// Adds the light to the radiance of the tile's points. `film` gets what is known of
+    /// it: components and estimates.
     fn gather(
         &mut self,
         pass: &CameraPass,
@@ -82,8 +82,8 @@ pub(crate) struct CameraPass<'a> {
     /// Direct light comes from shadow rays.
     direct: bool,
     geometry: &'a Scene,
-    /// Sums of the tile's pixels when the last part of the light was finished.
-    parts: RefCell<Vec<[f32; 4]>>,
+    /// Sums of the tile's pixels when the last component of the light was finished.
+    finished: RefCell<Vec<[f32; 4]>>,
     /// Layers that the film has besides.
     layers: Vec<ExtraLayers>,
     /// Hashes of names for mattes, of objects and of materials.
@@ -120,7 +120,7 @@ impl<'a> CameraPass<'a> {
             spp: picture.spp,
             direct: photons.mode.direct_by_rays(),
             geometry,
-            parts: RefCell::default(),
+            finished: RefCell::default(),
             layers: picture.layers.clone(),
             hashes: [
                 geometry.objects.iter().map(|name| hash(name)).collect(),
@@ -176,30 +176,30 @@ impl<'a> CameraPass<'a> {
         let count = timed(&mut stats.seconds.camera, || self.tracer.trace(gpu, scene, tile))?;
         stats.non_finite.camera += count.non_finite;
         tally::add_step(stats, count);
-        self.parts.borrow_mut().clear();
-        self.finished_part(tile, LightPart::Emission, film)?;
+        self.finished.borrow_mut().clear();
+        self.finished_component(tile, LightComponent::Emission, film)?;
         if self.direct {
             let count = timed(&mut stats.seconds.direct, || self.tracer.light_directly(gpu, scene, tile))?;
             stats.non_finite.direct += count.non_finite;
             tally::add_step(stats, count);
-            self.finished_part(tile, LightPart::Direct, film)?;
+            self.finished_component(tile, LightComponent::Direct, film)?;
         }
         Ok(())
     }
 
-    /// Adds what the tile's radiance has more than before to the layer of a part of the light.
-    pub fn finished_part(&self, tile: &Tile, part: LightPart, film: &mut Film) -> Result<()> {
-        if !self.layers.contains(&ExtraLayers::Parts) {
+    /// Adds what the tile's radiance has more than before to the layer of a component of the light.
+    pub fn finished_component(&self, tile: &Tile, component: LightComponent, film: &mut Film) -> Result<()> {
+        if !self.layers.contains(&ExtraLayers::Components) {
             return Ok(());
         }
         let sums = self.tracer.resolve(self.gpu, tile)?;
-        let mut before = self.parts.borrow_mut();
+        let mut before = self.finished.borrow_mut();
         before.resize(sums.len(), [0.0; 4]);
         for (i, (sums, before)) in (0..).zip(sums.iter().zip(before.iter_mut())) {
             let added = [0, 1, 2].map(|c| sums[0][c] - before[c]);
             *before = sums[0];
             if let Some(pixel) = self.tracer.pixel(tile, i) {
-                film.add_to(Source::Part(part), pixel, &added);
+                film.add_to(Source::Component(component), pixel, &added);
             }
         }
         Ok(())
@@ -244,7 +244,9 @@ impl<'a> CameraPass<'a> {
         let (triangles, spheres) = (&self.geometry.triangles, &self.geometry.spheres);
         let owner = |id: u32| match triangles.get(id as usize) {
             Some(triangle) => (triangle.object, triangle.material),
-            None => spheres.get(id as usize - triangles.len()).map_or((0, 0), |sphere| (sphere.object, sphere.material)),
+            None => {
+                spheres.get(id as usize - triangles.len()).map_or((0, 0), |sphere| (sphere.object, sphere.material))
+            }
         };
         let hits = self.tracer.first_hits(self.gpu, tile)?;
         for (i, hits) in (0..).zip(hits.chunks(tile.samples as usize)) {
@@ -253,7 +255,11 @@ impl<'a> CameraPass<'a> {
             let of = |hashes: &[u32], index: u32| hashes.get(index as usize).copied();
             let [objects, materials] = &self.hashes;
             film.add_to_matte(ExtraLayers::Objects, pixel, owners().filter_map(|(object, _)| of(objects, object)));
-            film.add_to_matte(ExtraLayers::Materials, pixel, owners().filter_map(|(_, material)| of(materials, material)));
+            film.add_to_matte(
+                ExtraLayers::Materials,
+                pixel,
+                owners().filter_map(|(_, material)| of(materials, material)),
+            );
         }
         Ok(())
     }

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExtraLayers {
-    /// The parts of the radiance, whose sum it is: emission that the camera sees, direct light,
-    /// light of the global and of the caustic map.
-    Parts,
+    /// The components of the radiance, whose sum it is: emission that the camera sees, direct
+    /// light, light of the global and of the caustic map.
+    Components,
     /// The radiance that each group of lights gives. Each has photons of its own.
     Lights,
     /// Radius, and number of photons, of the estimates of each map.
@@ -28,7 +28,7 @@ pub enum ExtraLayers {
 impl ExtraLayers {
     /// All of them.
     pub const ALL: [Self; 8] = [
-        Self::Parts,
+        Self::Components,
         Self::Lights,
         Self::Estimates,
         Self::Position,

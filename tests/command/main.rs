@@ -6,6 +6,7 @@ mod compare;
 mod compare_page;
 mod drivers;
 mod farm;
+mod layers;
 mod passes;
 mod study;
 mod study_page;

@@ -42,7 +42,8 @@ fn shapes(triangles: usize, spheres: usize, size: f32, middle: Vec3) -> Scene {
         scene.triangles.push(Triangle::new(positions, [Vec3::X; 3], 0));
     }
     for _ in 0..spheres {
-        let sphere = Sphere { center: middle + random.point(), radius: (random.next() + 0.1) * size, material: 0, object: 0 };
+        let sphere =
+            Sphere { center: middle + random.point(), radius: (random.next() + 0.1) * size, material: 0, object: 0 };
         scene.spheres.push(sphere);
     }
     scene

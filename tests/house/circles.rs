@@ -203,7 +203,21 @@ fn circles_are_found() {
 /// The files and folders of a folder from the lowest to the highest: each uses those before it
 /// only. Its `mod.rs` may use all.
 const ORDERS: [(&str, &[&str]); 5] = [
-    ("renderer", &["size", "ray_start", "tally", "maps", "tiles", "gatherer", "session", "render", "progressive"]),
+    (
+        "renderer",
+        &[
+            "size",
+            "ray_start",
+            "tally",
+            "maps",
+            "tiles",
+            "gatherer",
+            "session",
+            "light_groups",
+            "render",
+            "progressive",
+        ],
+    ),
     ("passes", &["maps", "wavefront", "photons", "estimate", "camera"]),
     (
         "passes/estimate",
@@ -236,6 +250,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "topology",
             "container",
             "extensions",
+            "extras",
             "files",
             "memory",
             "strict_json",

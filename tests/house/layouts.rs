@@ -68,7 +68,7 @@ fn twins() -> Vec<Twin> {
             pad2,
         }
         IrradianceCell { place, level, position, split, normal, pad0, irradiance, pad1 }
-        FirstHit { normal, depth, albedo, alpha }
+        FirstHit { normal, depth, albedo, alpha, position, id, uv, pad0, pad1 }
         DirectLight { light, points, pad0, pad1 }
         EmitterSample { points, sample, samples, roots }
         Cell { lo, wi_lo, hi, wi_hi }

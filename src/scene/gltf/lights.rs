@@ -51,7 +51,14 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
     }
     if intensity == Vec3::ZERO {
         notes.add(format!("light {name:?} has no intensity"));
-        let dark = Light { name, group: None, kind: LightKind::Point, position: Vec3::ZERO, direction: Vec3::NEG_Z, intensity };
+        let dark = Light {
+            name,
+            group: None,
+            kind: LightKind::Point,
+            position: Vec3::ZERO,
+            direction: Vec3::NEG_Z,
+            intensity,
+        };
         return Ok(Some((None, dark)));
     }
     if light.range.is_some() {
