@@ -89,7 +89,7 @@ pub struct SharedOptions {
     pub loading: LoadingOptions,
 
     /// Photon paths emitted at most, for each map by itself unless --emission unaimed [default: 100
-    /// times the larger capacity]
+    /// times the larger capacity, fewer where little light goes from surface to surface]
     #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true, help_heading = "Photons")]
     pub max_paths: Option<u64>,
 

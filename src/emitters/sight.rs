@@ -16,6 +16,11 @@ const MAX_CAMERAS: usize = 16;
 /// that they see.
 const RAYS: u32 = 64;
 const BOUNCES: u32 = 2;
+/// Side of the blocks of rays; and points next to each other whose rays tell of one place.
+const BLOCK: usize = 8;
+const POINTS_TOGETHER: usize = 64;
+/// Part of the places that are less enclosed than the one that tells.
+const ENCLOSED: f64 = 0.9;
 /// Maximum number of mirrors and panes that a ray passes.
 const MAX_CHAIN: u32 = 12;
 /// Minimum number of points that spheres are made of.
@@ -33,39 +38,75 @@ const MAX_SPHERES: usize = 12;
 /// Effectiveness of Quasirandom Sequences").
 const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
 
-/// Spheres around what the scene's cameras see and what lies around that, from the smallest to the
-/// largest; none if that is most of the scene.
-#[must_use]
-pub fn seen_targets(scene: &Scene, bvh: &Bvh) -> Vec<Target> {
-    let step = scene.cameras.len().div_ceil(MAX_CAMERAS).max(1);
-    let points = scene.cameras.iter().step_by(step).flat_map(|camera| points_seen(scene, bvh, camera)).collect();
-    spheres_around(points, &scene_target(scene))
+/// What the scene's cameras see.
+#[derive(Clone, Debug)]
+pub struct Sight {
+    /// Spheres around that and what lies around it, from the smallest to the largest; none if that
+    /// is most of the scene.
+    pub targets: Vec<Target>,
+    /// Part of the light that leaves a surface, 0 to 1, which meets another one: exceeded by that
+    /// of a tenth of what the cameras see. 1 if they see nothing diffuse.
+    pub enclosure: f64,
 }
 
-/// Points on diffuse surfaces that the camera sees, and those that are seen from there.
-fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<Vec3> {
+impl Sight {
+    #[must_use]
+    pub fn new(scene: &Scene, bvh: &Bvh) -> Self {
+        let step = scene.cameras.len().div_ceil(MAX_CAMERAS).max(1);
+        let cameras = scene.cameras.iter().step_by(step);
+        let seen: Vec<SeenPoint> = cameras.flat_map(|camera| points_seen(scene, bvh, camera)).collect();
+        let enclosure = enclosure(&seen);
+        let points = seen.into_iter().flat_map(|seen| std::iter::once(seen.position).chain(seen.around)).collect();
+        Self { targets: spheres_around(points, &scene_target(scene)), enclosure }
+    }
+}
+
+/// A point on a diffuse surface that a camera sees, and those that are seen from there.
+struct SeenPoint {
+    position: Vec3,
+    around: Vec<Vec3>,
+}
+
+/// Points that lie near each other follow each other in the list: their rays together tell a part.
+fn enclosure(seen: &[SeenPoint]) -> f64 {
+    let part = |points: &[SeenPoint]| {
+        let met: usize = points.iter().map(|point| point.around.len()).sum();
+        met as f64 / (points.len() * BOUNCES as usize) as f64
+    };
+    let mut parts: Vec<f64> = seen.chunks(POINTS_TOGETHER).map(part).collect();
+    parts.sort_by(f64::total_cmp);
+    parts.get((ENCLOSED * parts.len() as f64) as usize).copied().unwrap_or(1.0)
+}
+
+/// What the camera sees, block by block of the picture.
+fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<SeenPoint> {
     let aspect = camera.aspect.filter(|aspect| *aspect > 0.0).unwrap_or(1.0);
     let side = |part: f32| ((RAYS as f32 * part) as u32).max(1);
     let size = (side(aspect.min(1.0)), side((1.0 / aspect).min(1.0)));
     let half_height = camera.half_height_at(1.0, size);
     let half = (half_height * size.0 as f32 / size.1 as f32, half_height);
-    let pixel = |i: u32| {
+    let pixel = |(column, row): (u32, u32)| {
         let at = |i: u32, n: u32| (2 * i + 1) as f32 / n as f32 - 1.0;
-        let aside = half.0 * at(i % size.0, size.0) * camera.right - half.1 * at(i / size.0, size.1) * camera.up;
+        let aside = half.0 * at(column, size.0) * camera.right - half.1 * at(row, size.1) * camera.up;
         let (origin, direction) = match camera.projection {
             Projection::Orthographic { .. } => (camera.position + aside, camera.forward),
             Projection::Perspective { .. } => (camera.position, (camera.forward + aside).normalize()),
         };
         let origin = origin + camera.near.min(0.0) * camera.forward;
-        let mut points = Vec::new();
-        if let Some((position, normal)) = diffuse_hit(scene, bvh, origin, direction) {
-            points.push(position);
-            let directions = (0..BOUNCES).map(|bounce| cosine_direction(normal, BOUNCES * i + bounce));
-            points.extend(directions.filter_map(|d| diffuse_hit(scene, bvh, position, d).map(|(seen, _)| seen)));
-        }
-        points
+        let (position, normal) = diffuse_hit(scene, bvh, origin, direction)?;
+        let directions =
+            (0..BOUNCES).map(|bounce| cosine_direction(normal, BOUNCES * (row * size.0 + column) + bounce));
+        let around = directions.filter_map(|d| diffuse_hit(scene, bvh, position, d).map(|(seen, _)| seen)).collect();
+        Some(SeenPoint { position, around })
     };
-    (0..size.0 * size.1).into_par_iter().flat_map_iter(pixel).collect()
+    let blocks = (0..size.1).step_by(BLOCK).flat_map(|row| (0..size.0).step_by(BLOCK).map(move |column| (column, row)));
+    let side = BLOCK as u32;
+    let pixels = |(column, row): (u32, u32)| {
+        let rows = row..(row + side).min(size.1);
+        rows.flat_map(move |y| (column..(column + side).min(size.0)).map(move |x| (x, y)))
+    };
+    let blocks: Vec<(u32, u32)> = blocks.collect();
+    blocks.into_par_iter().flat_map_iter(|block| pixels(block).filter_map(pixel)).collect()
 }
 
 /// The first surface with a diffuse lobe along a ray, by way of mirrors and straight through glass.
@@ -130,7 +171,7 @@ mod tests {
     use crate::scene::{Sphere, Triangle};
 
     /// A ball of radius 1 on a floor of half side `reach`, seen from 6 m.
-    fn seen(reach: f32) -> Vec<Target> {
+    fn seen(reach: f32) -> Sight {
         let corner = |x: f32, z: f32| vec3(x * reach, 0.0, z * reach);
         let triangle = |corners| Triangle::new(corners, [Vec3::Y; 3], 0);
         let floor = [
@@ -153,12 +194,12 @@ mod tests {
             projection: Projection::Perspective { yfov: 0.7 },
             ..Camera::framing(scene.bounds())
         }];
-        seen_targets(&scene, &Bvh::build(&scene))
+        Sight::new(&scene, &Bvh::build(&scene))
     }
 
     #[test]
     fn what_is_seen_of_a_wide_floor_has_spheres() {
-        let spheres = seen(1000.0);
+        let spheres = seen(1000.0).targets;
         assert!(!spheres.is_empty());
         let smallest = spheres.first().expect("a sphere");
         assert!(smallest.radius < 8.0 && smallest.center.length() < 4.0, "{spheres:?}");
@@ -168,6 +209,37 @@ mod tests {
 
     #[test]
     fn a_scene_that_is_seen_whole_has_none() {
-        assert_eq!(seen(3.0), Vec::new());
+        assert_eq!(seen(3.0).targets, Vec::new());
+    }
+
+    #[test]
+    fn a_ball_on_a_floor_is_little_enclosed_and_a_box_is_wholly() {
+        // The ball's lower half sees the floor: at most a half of what leaves it.
+        let open = seen(1000.0).enclosure;
+        assert!(open > 0.05 && open < 0.7, "{open}");
+        let corner = |i: u32| vec3((i & 1) as f32, ((i >> 1) & 1) as f32, (i >> 2) as f32);
+        let sides = [
+            [0, 1, 2],
+            [1, 2, 3],
+            [4, 5, 6],
+            [5, 6, 7],
+            [0, 1, 4],
+            [1, 4, 5],
+            [2, 3, 6],
+            [3, 6, 7],
+            [0, 2, 4],
+            [2, 4, 6],
+            [1, 3, 5],
+            [3, 5, 7],
+        ];
+        let mut scene = Scene {
+            materials: vec![Material::new("", Surface::Diffuse { albedo: Vec3::splat(0.5) })],
+            triangles: sides.map(|side| Triangle::new(side.map(corner), [Vec3::Y; 3], 0)).to_vec(),
+            ..Scene::default()
+        };
+        scene.cameras = vec![Camera { position: Vec3::splat(0.5), ..Camera::framing(scene.bounds()) }];
+        let closed = Sight::new(&scene, &Bvh::build(&scene)).enclosure;
+        assert!(closed > 0.95, "{closed}");
+        assert_eq!(enclosure(&[]), 1.0);
     }
 }

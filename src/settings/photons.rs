@@ -111,7 +111,8 @@ pub struct PhotonSettings {
     /// Photons that the caustic map can hold, in [`Self::CAPACITY`].
     pub caustic: u32,
     /// Maximum number of emitted photon paths, in [`Self::MAX_PATHS`], for each map by itself
-    /// unless emission is unaimed; `None`: 100 times the larger capacity.
+    /// unless emission is unaimed; `None`: 100 times the larger capacity, and fewer for a map of
+    /// indirect light where little light goes from surface to surface.
     pub max_paths: Option<u64>,
     /// Aim of photon paths.
     pub emission: Emission,

@@ -9,7 +9,7 @@ use crate::{
         environment_map::EnvironmentMap,
         light_table::{Choices, LightTable},
         set_media,
-        sight::seen_targets,
+        sight::Sight,
         targets::{scene_target, specular_targets},
     },
     error::Result,
@@ -41,6 +41,8 @@ pub struct LightBuffers {
     /// The smallest sphere around what the cameras see, centre and radius, metres; radius 0: none.
     pub seen: [f32; 4],
     pub specular_targets: u32,
+    /// See [`Sight::enclosure`].
+    pub enclosure: f64,
     pub has_environment: bool,
     pub warnings: Vec<String>,
     lights: Buffer,
@@ -61,7 +63,7 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, (scene, bvh): (&Scene, &Bvh), probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = specular_targets(scene);
-        let seen = seen_targets(scene, bvh);
+        let Sight { targets: seen, enclosure } = Sight::new(scene, bvh);
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
@@ -88,6 +90,7 @@ impl LightBuffers {
             seen_targets: seen.len() as u32,
             seen: seen.first().map_or([0.0; 4], |target| target.center.extend(target.radius).to_array()),
             specular_targets: targets.len() as u32,
+            enclosure,
             has_environment: map.is_some(),
             warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,

@@ -29,6 +29,9 @@ const MAX_BATCH: u64 = layout::PATH_MASK as u64 + 1;
 /// Minimum number of paths over which the growth of a map is measured. The capacity of the map is
 /// used if it is larger.
 const GROWTH_WINDOW: u64 = 1 << 17;
+/// Paths for each photon that a map has room for, at most and at least.
+const PATHS_PER_PHOTON: u64 = 100;
+const MIN_PATHS_PER_PHOTON: f64 = 4.0;
 /// Fixed-point unit of lost flux, as a fraction of a path's mean flux.
 const LOST_UNIT: f64 = 1.0 / 4096.0;
 
@@ -135,12 +138,14 @@ impl PhotonTracer {
             warnings: Vec::new(),
         };
         let largest = u64::from(settings.global.max(settings.caustic));
-        let max_paths = settings.max_paths.unwrap_or(100 * largest);
+        let max_paths = settings.max_paths.unwrap_or(PATHS_PER_PHOTON * largest);
         let batch_limit = (largest / 4).clamp(MIN_BATCH, MAX_BATCH).min(max_paths.max(1));
         let groups = scene.lights.table.groups.len();
         let buffers = BatchBuffers::new(gpu, batch_limit, groups)?;
         for plan in plans(scene, settings, caustics, paths) {
-            let max_paths = plan.paths.count.unwrap_or(max_paths);
+            let enough =
+                paths_that_matter(scene.lights.enclosure, largest).filter(|_| plan.is_for_little_light(settings));
+            let max_paths = plan.paths.count.or(enough).unwrap_or(max_paths);
             self.run(gpu, scene, &plan, settings, (&buffers, batch_limit, max_paths), &mut traced, progress)?;
         }
         traced.of_lights = gpu.read(&buffers.light_photons, 0, groups as u64)?;
@@ -207,6 +212,14 @@ impl PhotonTracer {
     }
 }
 
+/// Number of paths of a map of light that other surfaces send, in a scene where a part `enclosure`
+/// of it meets anything. Its noise counts by that part of the light of the picture: its variance by
+/// the square.
+fn paths_that_matter(enclosure: f64, capacity: u64) -> Option<u64> {
+    let each = (PATHS_PER_PHOTON as f64 * enclosure * enclosure).max(MIN_PATHS_PER_PHOTON);
+    (each < PATHS_PER_PHOTON as f64).then(|| (each * capacity as f64) as u64)
+}
+
 /// The emissions that fill the maps, without those that have no light to choose.
 fn plans<'a>(
     scene: &'a SceneBuffers,
@@ -248,6 +261,11 @@ fn plans<'a>(
 }
 
 impl EmissionPlan<'_> {
+    /// Whether the map has only light over other surfaces, and nobody asks for a number of paths.
+    fn is_for_little_light(&self, settings: &PhotonSettings) -> bool {
+        settings.max_paths.is_none() && self.fills == [MapKind::Global] && !settings.mode.stores_direct()
+    }
+
     /// Settings that all batches of the emission share, and the rules for the maps that are still
     /// open.
     fn batch(&self, scene: &SceneBuffers, settings: &PhotonSettings, traced: &TracedPhotons) -> PhotonBatch {
@@ -273,5 +291,17 @@ impl EmissionPlan<'_> {
             aim: self.aim,
             ..Default::default()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::paths_that_matter;
+
+    #[test]
+    fn open_scenes_take_fewer_paths() {
+        assert_eq!(paths_that_matter(1.0, 1000), None, "as many as any map");
+        assert_eq!(paths_that_matter(0.5, 1000), Some(25_000));
+        assert_eq!(paths_that_matter(0.0, 1000), Some(4000));
     }
 }

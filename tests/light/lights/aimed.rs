@@ -6,6 +6,7 @@
 //! | picture | aimed and unaimed give the same picture | general paths keep L S+ D as well |
 //! | ground | a wall on a wide ground has the indirect light of one on a small ground | unaimed emission; a darker ground |
 //! | paths | aimed, a caustic photon takes far fewer paths | the unaimed count |
+//! | open figure | a figure under the sky takes few paths, for the same picture | a number of paths that is asked for; the figure in a room |
 
 use caustica::{
     layout::Photon,
@@ -201,4 +202,39 @@ fn a_wall_on_a_wide_ground_has_the_indirect_light_of_one_on_a_small_ground() {
         assert!((0.6..1.6).contains(&(aimed / right)), "sky {sky}: photons bring {aimed} instead of {right}");
         assert!(unaimed < 0.1 * right, "control: sky {sky}: unaimed paths find {unaimed} of {right}");
     }
+}
+
+#[test]
+fn a_figure_under_the_sky_takes_few_paths() {
+    const PHOTONS: u32 = 3000;
+    let figure = |in_a_room: bool| {
+        let mut scene = scene(&[diffuse(0.7)]);
+        scene.spheres.push(sphere(vec3(0.0, 0.0, 0.0), 0.5, 0));
+        // A block, whose light the ball's lower half gets.
+        add_box(&mut scene, vec3(-0.2, -0.8, -0.2), vec3(0.2, -0.7, 0.2), 0);
+        if in_a_room {
+            add_box(&mut scene, vec3(-3.0, -3.0, -3.0), vec3(3.0, 3.0, 3.0), 0);
+            scene.lights.push(point_light(vec3(0.5, 2.0, 1.5), 3.0));
+        } else {
+            scene.environment = Some(Environment::uniform(Vec3::ONE));
+        }
+        scene.cameras.push(camera(vec3(0.0, 0.6, 2.5), vec3(0.0, -0.1, 0.0), 40.0));
+        scene
+    };
+    let of = |in_a_room: bool, max_paths: Option<u64>| {
+        let settings = settings(Mode::Hybrid, PHOTONS, 16).with(|s| {
+            s.photons.max_paths = max_paths;
+            s.estimate.neighbors = 30;
+        });
+        let render = render_scene(&figure(in_a_room), &settings);
+        (mean(&render), render.stats.photons.global)
+    };
+    let capacity = u64::from(PHOTONS);
+    let (open, global) = of(false, None);
+    assert!(global.emitted < 40 * capacity && global.stored < capacity, "{global:?}");
+    let (right, asked) = of(false, Some(1_000_000));
+    assert!(asked.emitted > 4 * global.emitted, "control: {asked:?}, {global:?}");
+    assert!(within(open, right, 0.005), "{open} instead of {right}");
+    let (_, room) = of(true, None);
+    assert!(room.stored == capacity, "control: a room fills its map: {room:?}");
 }
