@@ -66,19 +66,26 @@ Examples:
   caustica render scene.gltf -o preview.png --mode direct-rays --spp 1 --exposure 1
   caustica render scene.glb -o out.exr --stats out.json -q --seed 7
   caustica render scene.glb -o out.exr --target-error 0.01 --checkpoint out.part.exr --resume
-  caustica render scene.glb --passes 16..32 --part part-16.exr";
+  caustica render scene.glb --passes 16..32 --part part-16.exr
+  caustica render a.glb b.glb c.glb --output-dir pictures";
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct RenderArgs {
-    /// glTF 2.0 file, .gltf or .glb
-    pub scene: PathBuf,
+    /// glTF 2.0 file, .gltf or .glb; several with --output-dir
+    #[arg(required = true, value_name = "SCENE")]
+    pub scenes: Vec<PathBuf>,
 
     /// File to write, .exr or .png; may be given several times
     #[arg(short, long = "output", value_name = "FILE", value_parser = PathBufValueParser::new().try_map(output))]
-    #[arg(required_unless_present = "part")]
+    #[arg(required_unless_present_any = ["part", "output_dir"])]
     #[arg(action = ArgAction::Append)]
     pub outputs: Vec<PathBuf>,
+
+    /// Write NAME.exr and NAME.png of each scene to this folder, made if it is not there; a scene
+    /// that fails does not keep the others from being rendered
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["outputs", "part", "checkpoint", "stats"])]
+    pub output_dir: Option<PathBuf>,
 
     #[command(flatten)]
     pub options: RenderOptions,

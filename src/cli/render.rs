@@ -2,7 +2,7 @@
 
 use std::{
     collections::HashSet,
-    io,
+    fs, io,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -22,43 +22,104 @@ use clap::{CommandFactory, error::ErrorKind};
 
 use super::{
     args::{Args, RenderArgs},
+    bugs,
     files::{Files, identity},
     passes::{self, Inputs, Picture},
     progress::Display,
+    say::say,
     values::{Exposure, extension},
 };
 
-/// Refuses wrong usage that no single argument shows: two outputs that are one file.
+/// A scene and the pictures that are made of it.
+struct Job {
+    scene: PathBuf,
+    pictures: Vec<PathBuf>,
+}
+
+/// What is rendered, scene by scene.
+fn jobs(args: &RenderArgs) -> Vec<Job> {
+    let pictures = |scene: &PathBuf| match &args.output_dir {
+        None => args.outputs.clone(),
+        Some(folder) => {
+            let name = |extension: &str| {
+                let mut name = scene.file_stem().unwrap_or_default().to_owned();
+                name.push(extension);
+                folder.join(name)
+            };
+            vec![name(".exr"), name(".png")]
+        }
+    };
+    args.scenes.iter().map(|scene| Job { scene: scene.clone(), pictures: pictures(scene) }).collect()
+}
+
+/// Refuses wrong usage that no single argument shows: two outputs that are one file, and several
+/// scenes without a folder for their pictures.
 pub fn check(args: &RenderArgs) -> std::result::Result<(), clap::Error> {
     let mut known = HashSet::new();
-    let twice = outputs(args).find(|path| !known.insert(identity(path)));
-    let Some(path) = twice else { return Ok(()) };
+    let jobs = jobs(args);
+    let twice = (args.scenes.len() == 1 || args.output_dir.is_some())
+        .then(|| jobs.iter().flat_map(|job| outputs(args, job)).find(|path| !known.insert(identity(path))))
+        .flatten();
+    let problem = match twice {
+        Some(path) => format!("{} is another output as well", path.display()),
+        None if args.scenes.len() > 1 && args.output_dir.is_none() => {
+            format!("{} scenes need --output-dir for their pictures", args.scenes.len())
+        }
+        None => return Ok(()),
+    };
     let mut command = Args::command();
     command.build();
     let usage_of = command.find_subcommand_mut("render").expect("this is its check");
-    Err(usage_of.error(ErrorKind::ArgumentConflict, format!("{} is another output as well", path.display())))
+    Err(usage_of.error(ErrorKind::ArgumentConflict, problem))
 }
 
-/// All files that the run writes.
-fn outputs(args: &RenderArgs) -> impl Iterator<Item = &PathBuf> {
-    args.outputs.iter().chain(&args.stats).chain(&args.passes.part).chain(&args.passes.checkpoint)
+/// All files that a run over one scene writes.
+fn outputs<'a>(args: &'a RenderArgs, job: &'a Job) -> impl Iterator<Item = &'a PathBuf> {
+    job.pictures.iter().chain(&args.stats).chain(&args.passes.part).chain(&args.passes.checkpoint)
 }
 
-/// Loads the scene, renders it and writes the outputs.
+/// Renders all scenes on one device.
 pub fn render(args: &RenderArgs) -> Result<()> {
+    let shared = &args.options.shared;
+    let display = Display::new(shared.quiet, shared.verbose);
+    let (jobs, mut device) = (jobs(args), None);
+    let Some(folder) = &args.output_dir else { return render_one(args, &jobs[0], &display, &mut device) };
+    fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
+    let mut failed = 0;
+    for (done, job) in jobs.iter().enumerate() {
+        display.note(&format!("scene {} of {}: {}", done + 1, jobs.len(), job.scene.display()));
+        let problem = match bugs::caught(|| render_one(args, job, &display, &mut device)) {
+            Ok(Ok(())) => continue,
+            Ok(Err(Error::Stopped)) => return Err(Error::Stopped),
+            Ok(Err(error)) => error.to_string(),
+            Err(bug) => bug,
+        };
+        display.finish();
+        failed += 1;
+        let (scene, problem) = (job.scene.display().to_string(), problem.lines().collect::<Vec<_>>().join(" "));
+        say(&if problem.contains(&scene) { format!("error: {problem}") } else { format!("error: {scene}: {problem}") });
+    }
+    if failed == 0 {
+        return Ok(());
+    }
+    Err(Error::Incomplete(format!("{failed} of {} scenes were not rendered", jobs.len())))
+}
+
+/// Loads a scene, renders it and writes its outputs. The device is opened when the first scene
+/// needs it.
+fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Option<Gpu>) -> Result<()> {
     let started = Instant::now();
     let options = &args.options;
-    let display = Display::new(options.shared.quiet, options.shared.verbose);
     let mut files = Files::default();
-    files.read(&args.scene, "the scene")?;
+    files.read(&job.scene, "the scene")?;
     options.shared.environment.env.iter().try_for_each(|path| files.read(path, "the environment"))?;
-    outputs(args).try_for_each(|path| files.write(path))?;
+    outputs(args, job).try_for_each(|path| files.write(path))?;
     let settings = args.settings();
 
     let mut load_seconds = 0.0;
     display.report(Stage::Load, 0, 0);
     let scene = timed(&mut load_seconds, || -> Result<Scene> {
-        let mut scene = Scene::load_with(&args.scene, &options.shared.loading.options())?;
+        let mut scene = Scene::load_with(&job.scene, &options.shared.loading.options())?;
         options.shared.environment.light([&mut scene])?;
         Ok(scene)
     })?;
@@ -75,16 +136,19 @@ pub fn render(args: &RenderArgs) -> Result<()> {
         display.note(&format!("warning: {warning}"));
     }
 
-    let gpu = Gpu::open(options.shared.device.as_deref())?;
+    let gpu = match device {
+        Some(gpu) => gpu,
+        None => device.insert(Gpu::open(options.shared.device.as_deref())?),
+    };
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
     let write = |frame: &Frame, attributes: &Attributes| {
-        args.outputs.iter().try_for_each(|path| write_picture(path, frame, attributes, args))
+        job.pictures.iter().try_for_each(|path| write_picture(path, frame, attributes, args))
     };
     let picture = if args.passes.are_given() {
-        let (gpu, scene, settings, display) = (&gpu, &scene, &settings, &display);
+        let (gpu, scene, settings) = (&*gpu, &scene, &settings);
         passes::render(&Inputs { gpu, scene, settings, args, display, write: &write })?
     } else {
-        let result = renderer::render(&gpu, &scene, &settings, &display);
+        let result = renderer::render(gpu, &scene, &settings, display);
         display.finish();
         let renderer::Render { frame, stats } = result?;
         Some(Picture { frame, attributes: scene.origin(&settings, &stats).attributes(), stats })
@@ -97,7 +161,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     warnings.extend(stats.warnings.iter().filter(|w| !scene.warnings.contains(w)).cloned());
     stats.warnings = warnings;
 
-    for path in &args.outputs {
+    for path in &job.pictures {
         display.check()?;
         write_picture(path, &frame, &attributes, args)?;
         if extension(path) == "png" {

@@ -426,3 +426,41 @@ fn quiet_says_nothing_and_equal_runs_give_equal_files() {
         |name: &str| caustica::image::read_exr(&folder.path().join(name)).expect("an EXR").radiance().to_vec();
     assert!(radiance("a.exr") != radiance("c.exr"));
 }
+
+#[test]
+fn many_files_are_rendered_by_one_process() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    fs::write(folder.join("broken.gltf"), "{").expect("it is written");
+    let scene = |name: &str| format!("{}/scenes/{name}.gltf", env!("CARGO_MANIFEST_DIR"));
+    let options = "--size 16x16 --spp 1 --photons 1k -k 20 -q";
+    let many = format!(
+        "render {} broken.gltf none.gltf {} --output-dir made/here {options}",
+        scene("diffuse"),
+        scene("area-light")
+    );
+    let output = command(folder, &many).output().expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let lines: Vec<&str> = said.lines().collect();
+    assert!(lines[0].starts_with("error: broken.gltf: ") && lines[1].starts_with("error: none.gltf: "), "{said}");
+    assert_eq!(lines[2..], ["error: 2 of 4 scenes were not rendered"]);
+    let alone = format!("render {} -o alone.exr -o alone.png {options}", scene("area-light"));
+    assert!(command(folder, &alone).output().expect("it starts").status.success());
+    let bytes = |name: &str| fs::read(folder.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    for extension in ["exr", "png"] {
+        let name = |stem: &str| format!("{stem}.{extension}");
+        assert!(bytes(&format!("made/here/{}", name("area-light"))) == bytes(&name("alone")), "{extension}");
+        assert!(bytes(&format!("made/here/{}", name("diffuse"))) != bytes(&name("alone")), "control");
+    }
+    assert_eq!(fs::read_dir(folder.join("made/here")).expect("it is there").count(), 4);
+    for (wrong, expected) in [
+        (format!("render {0} {0} --output-dir made {options}", scene("sky")), "sky.exr is another output as well"),
+        (format!("render {} {} -o a.exr", scene("sky"), scene("spot")), "2 scenes need --output-dir"),
+        (format!("render {} -o a.exr --output-dir made", scene("sky")), "cannot be used with"),
+    ] {
+        let output = command(folder, &wrong).output().expect("it starts");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && said.contains(expected), "{wrong}: {said}");
+    }
+}
