@@ -1,0 +1,186 @@
+//! Benchmark: error of a picture of many passes, estimated and true, against a reference at 128 x 128.
+//!
+//! `cargo bench --bench convergence [-- PASSES [PLOT.svg]]`. Errors are relative, as
+//! [`ErrorEstimate`] has them. The noise of the reference is found by the correlation of the errors
+//! of disjoint passes, early and late ones, whose bias is proportional to their squared radius; it is
+//! taken off. Fits are slopes over the logarithm of the number of passes.
+
+use std::{error::Error, path::Path};
+
+use caustica::{
+    Gpu, Progressive, Scene, Session, Settings, Silent,
+    image::{Block, ErrorEstimate, Film, PassSum, difference::rel_mse, read_exr},
+    settings::{PassSettings, Quality},
+};
+use plotters::prelude::*;
+
+const SIZE: u32 = 128;
+const PHOTONS: u32 = 50_000;
+const PASSES: u32 = 64;
+/// Part of the mean radiance that is added to that of each pixel, as in [`ErrorEstimate`].
+const FLOOR: f64 = 0.1;
+const SCENE: &str = "S1";
+
+/// The state after some passes; errors are roots of mean squares.
+struct Row {
+    passes: u32,
+    mean: f64,
+    blocks: f64,
+    estimate: Option<ErrorEstimate>,
+    noise: f64,
+    squared: f64,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let passes = words.first().map_or(Ok(PASSES), |word| word.parse())?;
+    let mut curves = Vec::new();
+    for (name, settings) in [("final gathering", Quality::Normal.settings()), ("photons alone", Settings::default())] {
+        let (rows, noise) = measure(settings, passes)?;
+        print(name, &rows, noise);
+        curves.push((name, rows, noise));
+    }
+    words.get(1).map_or(Ok(()), |path| plot(Path::new(path), &curves))
+}
+
+/// Renders the passes. Also returns the mean square of the reference's own noise.
+fn measure(settings: Settings, passes: u32) -> Result<(Vec<Row>, f64), Box<dyn Error>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
+    let scene = Scene::load(&folder.join(format!("{SCENE}.glb")))?;
+    let reference = read_exr(&folder.join(format!("{SCENE}_{SIZE}.exr")))?;
+    let settings = settings.with(|s| {
+        (s.photons.global, s.photons.caustic) = (PHOTONS, PHOTONS);
+        s.picture.size = Some((SIZE, SIZE));
+    });
+    let right: Vec<f64> = reference.layer("radiance").iter().map(|x| f64::from(*x)).collect();
+    let mean = right.iter().sum::<f64>() / right.len() as f64;
+    // Mean over all numbers, each relative to the reference.
+    let relative = |term: &dyn Fn(usize) -> f64| {
+        let terms = right.iter().enumerate().map(|(i, x)| term(i) / (x * x + (FLOOR * mean).powi(2)));
+        terms.sum::<f64>() / right.len() as f64
+    };
+    let gpu = Gpu::open(None)?;
+    let session = Session::open(&gpu, &scene, &settings.lights, &Silent)?;
+    let progressive = Progressive::new(&session, &settings, PassSettings::default())?;
+    let (mut all, mut rows) = (PassSum::default(), Vec::new());
+    // Even and odd passes of the first and of the second half.
+    let mut quarters: [Option<Film>; 4] = Default::default();
+    let mut bandwidths = [0.0; 2];
+    for index in 0..passes {
+        let (film, stats) = progressive.render(index, &Silent)?;
+        let half = usize::from(2 * index >= passes);
+        bandwidths[half] += 2.0 * PassSettings::default().bandwidth(&settings.estimate, index) / f64::from(passes);
+        let quarter = &mut quarters[2 * half + index as usize % 2];
+        match quarter {
+            Some(sum) => sum.merge(&film)?,
+            None => *quarter = Some(film.clone()),
+        }
+        all.push(Block::of_pass(index, film, &stats))?;
+        if !(index + 1).is_power_of_two() {
+            continue;
+        }
+        let total = all.total()?.ok_or("no pass")?;
+        let frame = total.film().finish();
+        let here = frame.layer("radiance");
+        let square = |i: usize| (f64::from(here[i]) - right[i]).powi(2);
+        let halves = both_halves(&quarters);
+        let noise = halves.map(|(a, b)| relative(&|i| (f64::from(a[i] - b[i]) / 2.0).powi(2)));
+        rows.push(Row {
+            passes: index + 1,
+            mean: here.iter().map(|x| f64::from(*x)).sum::<f64>() / (mean * right.len() as f64),
+            blocks: rel_mse(&blocks(frame.radiance()), &blocks(reference.radiance()), None),
+            estimate: ErrorEstimate::of(total.film(), None),
+            noise: noise.unwrap_or(f64::NAN).sqrt(),
+            squared: relative(&square),
+        });
+    }
+    let [a, b, c, d] = quarters.map(|film| film.map(|film| film.finish().layer("radiance").to_vec()));
+    let product = |a: &[f32], b: &[f32]| relative(&|i| (f64::from(a[i]) - right[i]) * (f64::from(b[i]) - right[i]));
+    let (Some(a), Some(b), Some(c), Some(d)) = (a, b, c, d) else { return Ok((rows, 0.0)) };
+    let (early, late) = (product(&a, &b), product(&c, &d));
+    let [wide, narrow] = bandwidths.map(|bandwidth: f64| bandwidth.powi(2));
+    Ok((rows, ((late * wide - early * narrow) / (wide - narrow)).max(0.0)))
+}
+
+/// Means of even and of odd passes so far.
+fn both_halves(quarters: &[Option<Film>; 4]) -> Option<(Vec<f32>, Vec<f32>)> {
+    let half = |first: usize| -> Option<Vec<f32>> {
+        let mut sum = quarters[first].clone()?;
+        if let Some(later) = &quarters[first + 2] {
+            sum.merge(later).ok()?;
+        }
+        Some(sum.finish().layer("radiance").to_vec())
+    };
+    Some((half(0)?, half(1)?))
+}
+
+/// Means of blocks of 8 x 8 pixels.
+fn blocks(radiance: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let side = SIZE as usize / 8;
+    let mut means = vec![[0.0; 3]; side * side];
+    for (i, pixel) in radiance.iter().enumerate() {
+        let mean = &mut means[i / SIZE as usize / 8 * side + i % SIZE as usize / 8];
+        (0..3).for_each(|c| mean[c] += pixel[c] / 64.0);
+    }
+    means
+}
+
+fn truth(row: &Row, noise: f64) -> f64 {
+    (row.squared - noise).max(0.0).sqrt()
+}
+
+fn print(name: &str, rows: &[Row], noise: f64) {
+    println!("{SCENE}, {name}: {PHOTONS} photons a map; noise of the reference {:.2} %", 100.0 * noise.sqrt());
+    println!(
+        "{:>7} {:>8} {:>10} {:>9} {:>9} {:>9} {:>9} {:>11}",
+        "passes", "mean", "8x8 relMSE", "noise %", "est. %", "bias e. %", "error %", "est. / true"
+    );
+    for row in rows {
+        let estimate = row.estimate.unwrap_or(ErrorEstimate { noise: f64::NAN, bias: f64::NAN });
+        let (Row { passes, mean, blocks, .. }, error) = (row, truth(row, noise));
+        println!(
+            "{passes:>7} {mean:>8.4} {blocks:>10.2e} {:>9.2} {:>9.2} {:>9.2} {:>9.2} {:>11.2}",
+            100.0 * row.noise,
+            100.0 * estimate.noise,
+            100.0 * estimate.bias,
+            100.0 * error,
+            estimate.total() / error,
+        );
+    }
+    let slope = |of: &dyn Fn(&Row) -> f64| {
+        let points: Vec<(f64, f64)> =
+            rows.iter().map(|row| (f64::from(row.passes).ln(), of(row).ln())).filter(|(_, y)| y.is_finite()).collect();
+        let n = points.len() as f64;
+        let (x, y) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+        let (above, below) =
+            points.iter().fold((0.0, 0.0), |(a, b), (px, py)| (a + (px - x) * (py - y), b + (px - x).powi(2)));
+        above / below
+    };
+    println!("slopes: noise {:.2}, error {:.2}\n", slope(&|row| row.noise), slope(&|row| truth(row, noise)));
+}
+
+/// Draws estimated and true errors over the number of passes.
+fn plot(path: &Path, curves: &[(&str, Vec<Row>, f64)]) -> Result<(), Box<dyn Error>> {
+    let colors = [RGBColor(0, 114, 178), RGBColor(213, 94, 0)];
+    let most = curves.iter().flat_map(|(_, rows, _)| rows.iter().map(|row| row.passes)).max().ok_or("no pass")?;
+    let area = SVGBackend::new(path, (680, 420)).into_drawing_area();
+    let mut chart = ChartBuilder::on(&area)
+        .margin(12)
+        .caption("Error over passes: true (line) and estimated (dots)", ("sans-serif", 18))
+        .x_label_area_size(44)
+        .y_label_area_size(60)
+        .build_cartesian_2d((1.0..f64::from(most)).log_scale(), (0.5..20.0_f64).log_scale())?;
+    chart.configure_mesh().x_desc("passes").y_desc("relative error, %").draw()?;
+    for ((name, rows, noise), color) in curves.iter().zip(colors) {
+        let points = rows.iter().map(|row| (f64::from(row.passes), 100.0 * truth(row, *noise)));
+        chart
+            .draw_series(LineSeries::new(points, color.stroke_width(2)))?
+            .label(*name)
+            .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 20, y)], color.stroke_width(2)));
+        let estimated = rows.iter().filter_map(|row| Some((f64::from(row.passes), 100.0 * row.estimate?.total())));
+        chart.draw_series(estimated.map(|point| Circle::new(point, 4, color.filled())))?;
+    }
+    chart.configure_series_labels().position(SeriesLabelPosition::LowerLeft).border_style(BLACK).draw()?;
+    area.present()?;
+    Ok(())
+}
