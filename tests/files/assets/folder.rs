@@ -82,7 +82,11 @@ fn load(path: &Path) -> Result<Scene, String> {
 /// Renders in this process. Returns what is wrong with the picture.
 fn render(path: &Path) -> Result<(), String> {
     let scene = load(path)?;
-    let settings = support::settings(Mode::Hybrid, 500, 16).with(|s| s.estimate.neighbors = 10);
+    let settings = support::settings(Mode::Hybrid, 500, 16).with(|s| {
+        s.estimate.neighbors = 10;
+        // In the open most paths leave no photon; the maps need not fill.
+        s.photons.max_paths = Some(2000);
+    });
     let silent = caustica::progress::Silent;
     let render = caustica::renderer::render(support::gpu(), &scene, &settings, &silent).map_err(|e| e.to_string())?;
     let pixels = render.frame.radiance().as_flattened();
