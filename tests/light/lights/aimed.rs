@@ -82,7 +82,7 @@ fn lit_balls() -> Vec<(&'static str, Scene)> {
 fn caustic_flux(scene: &Scene, emission: Emission) -> [(f64, f64); 3] {
     let settings = settings(Mode::DirectPhotons, 1, 1).with(|s| {
         s.photons.emission = emission;
-        s.photons.caustic = 100_000;
+        s.photons.caustic = 30_000;
         s.photons.max_paths = Some(150_000);
     });
     let map = traced(scene, &settings).maps.caustic;
@@ -141,6 +141,8 @@ fn aimed_paths_make_the_picture_of_unaimed_ones() {
     scene.cameras.push(camera(vec3(0.0, 1.4, 2.9), vec3(0.0, 0.2, 0.0), 40.0));
     let picture = |emission, mode| {
         let settings = settings(mode, 100_000, 32).with(|s| {
+            // Unaimed, each takes dozens of paths.
+            s.photons.caustic = 30_000;
             s.photons.emission = emission;
             s.estimate.neighbors = 50;
         });
