@@ -122,7 +122,7 @@ fn a_lamp_in_pieces_lights_like_one() {
     {
         let seen = |side, gap| {
             let settings = settings(Mode::DirectRays, 1, 48).with(|s| {
-                s.picture.spp = 32;
+                s.picture.spp = 8;
                 s.picture.light_samples = 8;
             });
             mean(&render_scene(&under_a_lamp((surface, roughness), side, gap), &settings))
@@ -149,6 +149,8 @@ fn photons_and_rays_agree_under_many_lights() {
     let seen = |mode, bounces| {
         let settings = settings(mode, 150_000, 40).with(|s| {
             s.photons.max_bounces = bounces;
+            // The second bounce is a twentieth of the light and needs few photons.
+            s.photons.max_paths = Some(600_000);
             s.picture.spp = 6;
         });
         mean(&render_scene(&scene, &settings))
