@@ -75,18 +75,18 @@ fn a_slab_shifts_the_view_as_snell_says() {
 /// A light above a slab or pane above a floor; photons that reach the floor near the axis, W/m².
 fn irradiance_below(cover: Option<Surface>) -> f64 {
     let mut scene = scene(&[diffuse(1.0), cover.unwrap_or(diffuse(0.0))]);
-    add_quad(&mut scene, vec3(-9.0, 0.0, 9.0), vec3(18.0, 0.0, 0.0), vec3(0.0, 0.0, -18.0), 0);
+    add_quad(&mut scene, vec3(-2.0, 0.0, 2.0), vec3(4.0, 0.0, 0.0), vec3(0.0, 0.0, -4.0), 0);
     match cover {
         Some(Surface::Pane { .. }) => {
-            add_quad(&mut scene, vec3(-9.0, 0.5, 9.0), vec3(18.0, 0.0, 0.0), vec3(0.0, 0.0, -18.0), 1);
+            add_quad(&mut scene, vec3(-2.0, 0.5, 2.0), vec3(4.0, 0.0, 0.0), vec3(0.0, 0.0, -4.0), 1);
         }
-        Some(_) => add_box(&mut scene, vec3(-9.0, 0.5, -9.0), vec3(9.0, 0.51, 9.0), 1),
+        Some(_) => add_box(&mut scene, vec3(-2.0, 0.5, -2.0), vec3(2.0, 0.51, 2.0), 1),
         None => {}
     }
     scene.lights.push(point_light(vec3(0.0, 5.0, 0.0), 1.0));
     // Below the cover, so that the camera's own path stays clear.
     scene.cameras.push(camera(vec3(0.0, 0.4, 0.001), Vec3::ZERO, 100.0));
-    let settings = settings(Mode::DirectPhotons, 400_000, 8).with(|s| s.estimate.neighbors = 300);
+    let settings = settings(Mode::DirectPhotons, 80_000, 8).with(|s| s.estimate.neighbors = 300);
     mean(&render_scene(&scene, &settings)) * PI
 }
 
