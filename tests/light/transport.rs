@@ -73,7 +73,14 @@ fn every_lobe_reflects_what_it_gets() {
     let mean_of = |material: &Material, strength: f32| {
         let mut scene = furnace(material.clone());
         scene.environment.as_mut().expect("a sky").strength = strength;
-        mean(&render_scene(&scene, &settings(Mode::Hybrid, 1000, 16).with(|s| s.picture.spp = 64)))
+        mean(&render_scene(
+            &scene,
+            &settings(Mode::Hybrid, 1000, 16).with(|s| {
+                s.picture.spp = 64;
+                // None stays.
+                s.photons.max_paths = Some(1000);
+            }),
+        ))
     };
     // Rough glass loses what meets several of its microfacets. The other bounds are what is left
     // of the noise, and Schlick's weights above a coat.
@@ -125,7 +132,10 @@ fn unlit_surfaces_show_their_colour_alone() {
 #[test]
 fn rays_and_photons_agree_on_every_lobe() {
     let of = |material: &Material, mode| {
-        let settings = settings(mode, 40_000, 20).with(|s| s.picture.spp = 9);
+        let settings = settings(mode, 40_000, 20).with(|s| {
+            s.photons.caustic = 10_000;
+            s.picture.spp = 4;
+        });
         mean(&render_scene(&room(material.clone()), &settings))
     };
     for (name, material) in lobes() {
@@ -140,7 +150,14 @@ fn rays_and_photons_agree_on_every_lobe() {
 fn light_in_metal_is_seen_by_rays() {
     for roughness in [0.0, 0.3] {
         let scene = furnace(metal(roughness));
-        let of = |mode| mean(&render_scene(&scene, &settings(mode, 1000, 8).with(|s| s.picture.spp = 16)));
+        let of = |mode| {
+            let settings = settings(mode, 1000, 8).with(|s| {
+                s.picture.spp = 16;
+                // None stays.
+                s.photons.max_paths = Some(1000);
+            });
+            mean(&render_scene(&scene, &settings))
+        };
         for mode in [Mode::Hybrid, Mode::Photons, Mode::DirectRays, Mode::DirectPhotons] {
             assert!((of(mode) - 1.0).abs() < 0.02, "roughness {roughness}, {mode:?}: {}", of(mode));
         }
@@ -219,7 +236,7 @@ fn grid_and_tree_agree_on_every_lobe() {
 #[test]
 fn the_caustic_of_rough_metal_is_that_of_photons() {
     // Few paths of general light end where the floor is seen.
-    let settings = |mode| settings(mode, 40_000, 24).with(|s| s.photons.max_paths = Some(600_000));
+    let settings = |mode| settings(mode, 40_000, 24).with(|s| s.photons.max_paths = Some(250_000));
     let of = |turned, mode| mean(&render_scene(&caustic(0.2, turned), &settings(mode)));
     let hybrid = of(false, Mode::Hybrid);
     assert!(hybrid > 0.001, "{hybrid}");
@@ -238,7 +255,7 @@ fn photons_above_the_bound_are_those_of_the_global_map() {
             *base = Vec3::splat(tint);
         }
         scene.options.caustic_roughness = bound;
-        let settings = settings(Mode::Hybrid, 40_000, 24).with(|s| s.photons.max_paths = Some(600_000));
+        let settings = settings(Mode::Hybrid, 40_000, 24).with(|s| s.photons.max_paths = Some(250_000));
         let render = render_scene(&scene, &settings);
         (mean(&render), render.stats.photons.caustic.stored, render.stats.photons.global.stored)
     };
