@@ -1,9 +1,10 @@
-//! Benchmark: error of a picture of many passes, estimated and true, against a reference at 128 x 128.
+//! Benchmark: error of a picture of many passes, estimated and true, against a reference at 128 x
+//! 128.
 //!
 //! `cargo bench --bench convergence [-- PASSES [PLOT.svg]]`. Errors are relative, as
 //! [`ErrorEstimate`] has them. The noise of the reference is found by the correlation of the errors
-//! of disjoint passes, early and late ones, whose bias is proportional to their squared radius; it is
-//! taken off. Fits are slopes over the logarithm of the number of passes.
+//! of disjoint passes, early and late ones, whose bias is proportional to their squared radius; it
+//! is taken off. Fits are slopes over the logarithm of the number of passes.
 
 use std::{error::Error, path::Path};
 

@@ -184,7 +184,6 @@ impl FinalGather {
             ("directions", &self.directions),
             ("radiance", &tracer.radiance),
             ("arriving", &self.arriving),
-            ("seen", &self.ends),
             ("points", &tracer.points),
         ];
         let mut encoder = gpu.encoder();

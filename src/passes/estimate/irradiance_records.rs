@@ -94,6 +94,8 @@ impl Records {
             let part = NEAR_PART * distance / radius(record.position.into());
             record.direction_and_reach |= snorm8(part.clamp(1.0 / 127.0, 1.0)) << 24;
         }
+        // What lies beyond the grid has the slot behind all others.
+        self.records.push(NO_RECORD);
         self.records
     }
 
