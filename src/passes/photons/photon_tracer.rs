@@ -217,7 +217,7 @@ impl PhotonTracer {
 /// the square.
 fn paths_that_matter(enclosure: f64, capacity: u64) -> Option<u64> {
     let each = (PATHS_PER_PHOTON as f64 * enclosure * enclosure).max(MIN_PATHS_PER_PHOTON);
-    (each < PATHS_PER_PHOTON as f64).then(|| (each * capacity as f64) as u64)
+    (each < PATHS_PER_PHOTON as f64).then_some((each * capacity as f64) as u64)
 }
 
 /// The emissions that fill the maps, without those that have no light to choose.
