@@ -60,7 +60,12 @@ pub fn check(args: &RenderArgs) -> std::result::Result<(), clap::Error> {
     let twice = (args.scenes.len() == 1 || args.output_dir.is_some())
         .then(|| jobs.iter().flat_map(|job| outputs(args, job)).find(|path| !known.insert(identity(path))))
         .flatten();
+    // A negative number is no option, and reads like one more scene.
+    let stray = args.scenes[1..].iter().find(|scene| scene.to_string_lossy().starts_with('-'));
     let problem = match twice {
+        _ if stray.is_some() => {
+            format!("unexpected argument '{}' found", stray.map_or("".into(), |s| s.to_string_lossy()))
+        }
         Some(path) => format!("{} is another output as well", path.display()),
         None if args.scenes.len() > 1 && args.output_dir.is_none() => {
             format!("{} scenes need --output-dir for their pictures", args.scenes.len())
