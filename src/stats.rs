@@ -1,6 +1,9 @@
 //! Statistics of a render, for scripts: the `--stats` file.
 
-use std::time::{Duration, Instant};
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -152,6 +155,10 @@ pub struct Stats {
     pub non_finite: NonFinite,
     /// Peak device memory of buffers, bytes.
     pub peak_device_bytes: u64,
+    /// Seconds that the device itself took for each kernel; none where it is software or has no
+    /// clock.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub kernel_seconds: BTreeMap<String, f64>,
     /// Passes, of a picture that is rendered in passes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub passes: Option<PassStats>,
@@ -184,6 +191,9 @@ impl Stats {
         self.unfinished_rays += pass.unfinished_rays;
         self.non_finite.add(pass.non_finite);
         self.peak_device_bytes = self.peak_device_bytes.max(pass.peak_device_bytes);
+        for (kernel, seconds) in &pass.kernel_seconds {
+            *self.kernel_seconds.entry(kernel.clone()).or_default() += seconds;
+        }
         let words = |line: &String| line.chars().filter(|c| !c.is_ascii_digit()).collect::<String>();
         for warning in &pass.warnings {
             if self.warnings.iter().all(|told| words(told) != words(warning)) {

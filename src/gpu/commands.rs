@@ -9,7 +9,7 @@ use std::{
 };
 
 use super::{
-    pace::{MIN_TIMED, Pace, Pacing, Part},
+    pace::{Pace, Pacing, Part},
     parts::Parts,
     timer::{Timed, Timer, Timings},
 };
@@ -121,8 +121,11 @@ impl<'g> Commands<'g> {
     fn record(&mut self, stem: &'static str, part: &Part, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
         self.submissions.dispatches.fetch_add(1, Ordering::Relaxed);
         self.seconds += part.seconds.unwrap_or(f64::INFINITY);
-        let timer = self.submissions.timer.as_ref().filter(|_| part.invocations >= MIN_TIMED);
-        let timed = timer.map(|timer| timer.time(&mut self.timings, Timed { stem, invocations: part.invocations }));
+        let timed = self
+            .submissions
+            .timer
+            .as_ref()
+            .map(|timer| timer.time(&mut self.timings, Timed { stem, invocations: part.invocations }));
         let mut pass = self
             .encoder
             .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(stem), timestamp_writes: timed });

@@ -1,6 +1,9 @@
 //! An open device: memory, submissions, and what goes wrong with them.
 
-use std::sync::{Arc, mpsc};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, mpsc},
+};
 
 use super::{
     adapter,
@@ -31,6 +34,9 @@ pub struct Gpu {
     pub driver: String,
     /// Device memory that buffers and tables take, bytes.
     pub memory: Arc<MemoryCount>,
+    /// Points and paths that are handed to the device at once, a power of 2: enough to keep it
+    /// busy.
+    pub batch: u64,
     pub(super) submissions: Submissions,
     pub(super) compiler: Compiler,
     /// The kernels' override `LANES`.
@@ -41,6 +47,16 @@ pub struct Gpu {
 /// Maximum number of lanes of a subgroup that share the parts of a cell, one each: as many as a
 /// cell has parts.
 const MAX_LANES: u32 = crate::layout::CELL_FAN;
+
+/// [`Gpu::batch`] of an adapter of that kind. A tile takes about half a kilobyte a point, and a
+/// search as much. Software is busy with few points, and caches keep them.
+fn batch_of(kind: &str) -> u64 {
+    match kind {
+        "discrete" => 1 << 20,
+        "software" => 1 << 16,
+        _ => 1 << 18,
+    }
+}
 
 impl Gpu {
     /// Opens the adapter of that name or index, or the best one, with the pacing that suits it:
@@ -74,19 +90,28 @@ impl Gpu {
         let faults = Faults::of(&device);
         let submissions = Submissions::new(&device, &queue, pacing);
         let lanes = chosen.subgroup.0.min(MAX_LANES);
+        let batch = batch_of(chosen.kind);
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);
         let memory = Arc::<MemoryCount>::default();
         // Memory of software is the host's, which gives more than it has and then ends the process.
         if let Some(bytes) = available().filter(|_| chosen.kind == "software") {
             memory.set_limit(bytes);
         }
-        Ok(Self { device, queue, limits, name, driver, memory, submissions, compiler: Compiler::new(), lanes, faults })
+        let compiler = Compiler::new();
+        Ok(Self { device, queue, limits, name, driver, memory, batch, submissions, compiler, lanes, faults })
     }
 
     /// Number of dispatches recorded so far; each part of a cut one counts.
     #[must_use]
     pub fn dispatches(&self) -> u64 {
         self.submissions.dispatches()
+    }
+
+    /// Seconds that the device itself took for each kernel since this was last asked. None where it
+    /// is software or has no clock.
+    #[must_use]
+    pub fn take_kernel_seconds(&self) -> BTreeMap<String, f64> {
+        self.submissions.pace.take_seconds()
     }
 
     /// Maximum size of a storage binding, bytes.

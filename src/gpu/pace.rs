@@ -8,7 +8,8 @@
 //! invocation knows its number, never its part.
 
 use std::{
-    collections::HashMap,
+    collections::{BTreeMap, HashMap},
+    mem,
     sync::{Mutex, PoisonError},
     time::Duration,
 };
@@ -33,7 +34,7 @@ const MAX_PER_SUBMISSION: Duration = Duration::from_millis(100);
 pub(super) const MIN_PART: u64 = 4096;
 /// Invocations of a part of a kernel that was never measured.
 pub(super) const UNMEASURED: u64 = 1 << 14;
-/// Invocations of a part that is timed, at least: fewer tell of latency, not of cost.
+/// Invocations of a part that tells of the cost, at least: fewer tell of latency.
 pub(super) const MIN_TIMED: u64 = MIN_PART / 2;
 /// What is left of a cost that later measures fall below. Slow, for a queue of paths that dries up
 /// measures less and less.
@@ -53,11 +54,13 @@ pub(super) struct Pace {
     pub pacing: Pacing,
     /// Seconds per invocation, by stem.
     costs: Mutex<HashMap<&'static str, f64>>,
+    /// Seconds in all, by stem.
+    seconds: Mutex<BTreeMap<String, f64>>,
 }
 
 impl Pace {
     pub fn new(pacing: Pacing) -> Self {
-        Self { pacing, costs: Mutex::default() }
+        Self { pacing, costs: Mutex::default(), seconds: Mutex::default() }
     }
 
     /// The next part of a dispatch of which `left` invocations are left. Parts but the last are
@@ -82,11 +85,22 @@ impl Pace {
         seconds == 0.0 || seconds + part.seconds.unwrap_or(f64::INFINITY) <= MAX_PER_SUBMISSION.as_secs_f64()
     }
 
-    /// Takes note of what a part of at least [`MIN_TIMED`] invocations took.
+    /// Takes note of what a part took.
     pub fn measured(&self, stem: &'static str, invocations: u64, seconds: f64) {
+        let mut all = self.seconds.lock().unwrap_or_else(PoisonError::into_inner);
+        *all.entry(stem.to_string()).or_default() += seconds;
+        drop(all);
+        if invocations < MIN_TIMED {
+            return;
+        }
         let cost = (seconds / invocations as f64).max(1e-15);
         let mut costs = self.costs.lock().unwrap_or_else(PoisonError::into_inner);
         costs.entry(stem).and_modify(|old| *old = cost.max(DECAY * *old)).or_insert(cost);
+    }
+
+    /// Seconds of all parts measured since this was last asked, by stem.
+    pub fn take_seconds(&self) -> BTreeMap<String, f64> {
+        mem::take(&mut self.seconds.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Seconds per invocation, if it was measured.

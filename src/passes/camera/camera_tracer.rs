@@ -25,8 +25,10 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Maximum number of visible points of a tile, without its margin.
-const TILE_POINTS: u64 = 1 << 16;
+/// Rays of final gathering of each visible point of a small picture for which a tile has room.
+const RAYS_AT_ONCE: u64 = 16;
+/// Visible points for which a tile has room at least, without its margin.
+const MIN_ROOM: u64 = 1 << 16;
 /// Path slots per sample if the scene has dielectrics: reflection and refraction are both followed
 /// at the first two interfaces.
 const BRANCHES: u32 = 4;
@@ -92,6 +94,8 @@ pub struct CameraTracer {
     filter_table: Buffer,
     view: CameraTile,
     window: Crop,
+    /// Maximum number of visible points of a tile, without its margin.
+    room: u64,
 }
 
 impl CameraTracer {
@@ -116,21 +120,23 @@ impl CameraTracer {
             media,
             ..view(camera, size, photons, picture)?
         };
-        let margin = if shares { margin_cells(tile_sides(&view)) * MARGIN_SAMPLES } else { 0 };
-        let samples = TILE_POINTS / u64::from(branches) + u64::from(margin);
+        let room = room_for(&view, gpu.batch, photons.final_gather);
+        let margin = if shares { margin_cells(tile_sides(&view, room)) * MARGIN_SAMPLES } else { 0 };
+        let samples = room / u64::from(branches) + u64::from(margin);
         let places = samples * u64::from(branches);
         Ok(Self {
             kernels: CameraKernels::new(gpu, scene, photons, picture.light_samples),
             wavefront: Wavefront::new(gpu, "camera", places)?,
             points: gpu.storage::<VisiblePoint>("visible points", places)?,
             radiance: gpu.storage::<[f32; 4]>("radiance", places)?,
-            gathered: gpu.storage::<Gathered>("gathered", TILE_POINTS)?,
+            gathered: gpu.storage::<Gathered>("gathered", room)?,
             first_hits: gpu.storage::<FirstHit>("first hits", samples)?,
             lobe_points: gpu.storage::<LobePoint>("lit lobes", if scene.materials.has_rough { places } else { 1 })?,
-            pixel_rows: gpu.storage::<PixelSums>("sums of pixels", TILE_POINTS / u64::from(branches))?,
+            pixel_rows: gpu.storage::<PixelSums>("sums of pixels", room / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
             view: CameraTile { margin, ..view },
             window: picture.window(size),
+            room,
         })
     }
 
@@ -158,7 +164,7 @@ impl CameraTracer {
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
-        let (width, height) = tile_sides(&self.view);
+        let (width, height) = tile_sides(&self.view, self.room);
         let mut tiles = Vec::new();
         for first_row in (0..self.view.height).step_by(height as usize) {
             for first_column in (0..self.view.width).step_by(width as usize) {
@@ -202,7 +208,7 @@ impl CameraTracer {
     /// Maximum number of visible points of any tile, without its margin.
     #[must_use]
     pub fn room(&self) -> u64 {
-        TILE_POINTS
+        self.room
     }
 
     /// The visible points of a tile, which share estimates.
@@ -259,7 +265,7 @@ impl CameraTracer {
         (lobes, radiance): (Option<&Kernel>, &Buffer),
     ) -> Result<StepCount> {
         let most_paths = (u64::from(invocations) * u64::from(self.view.branches))
-            .min(TILE_POINTS + u64::from(self.view.margin * self.view.branches));
+            .min(self.room + u64::from(self.view.margin * self.view.branches));
         let tile = [("first_hits", &self.first_hits), ("radiance", radiance), ("lobe_points", &self.lobe_points)];
         let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
         let start = Step { kernel: start.kernel, buffers: &started };
@@ -358,9 +364,17 @@ impl CameraTracer {
     }
 }
 
+/// Visible points for which a tile has room: those of a batch of the device, or of the whole picture
+/// and some of their rays of final gathering.
+fn room_for(view: &CameraTile, batch: u64, final_rays: u32) -> u64 {
+    let points = u64::from(view.width) * u64::from(view.height) * u64::from(view.branches) * u64::from(view.spp);
+    let rays = u64::from(final_rays).clamp(1, RAYS_AT_ONCE);
+    (points * rays).next_power_of_two().clamp(MIN_ROOM.min(batch), batch)
+}
+
 /// Pixels along the sides of each tile, powers of 2.
-fn tile_sides(view: &CameraTile) -> (u32, u32) {
-    let pixels = (TILE_POINTS as u32 / (view.branches * view.spp.min(PIXEL_SAMPLES))).max(MIN_TILE_PIXELS);
+fn tile_sides(view: &CameraTile, room: u64) -> (u32, u32) {
+    let pixels = (room as u32 / (view.branches * view.spp.min(PIXEL_SAMPLES))).max(MIN_TILE_PIXELS);
     let side_bits = |side: u32| side.next_power_of_two().ilog2();
     let needed = 2 * side_bits(view.width.max(view.height)).max(MIN_TILE_PIXELS.ilog2() / 2);
     let bits = pixels.ilog2().min(needed);

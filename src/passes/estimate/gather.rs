@@ -17,8 +17,9 @@ use crate::{
 
 pub use super::gather_kernels::GatherOptions;
 
-/// Maximum number of points of one batch.
-const BATCH: u32 = 32_768;
+/// Points of one batch, as a part of those that the device is handed at once: an invocation answers
+/// four of them.
+const BATCH_PART: u64 = 2;
 /// Packets of a block, which are searched or deferred together.
 const BLOCK: u64 = layout::PACKET_BLOCK as u64;
 /// Queries of one invocation.
@@ -151,16 +152,17 @@ impl<'s> Gather<'s> {
     ) -> Result<GatherStats> {
         let polynomial = settings.density.softened(settings.softness);
         let compiled = self.kernels.compile(gpu, settings.variant(map.windows()));
-        if self.scratch.as_ref().is_none_or(|s| s.capacity < count.min(BATCH)) {
-            self.scratch = Some(Scratch::new(gpu, count.min(BATCH))?);
+        let most = count.min(largest_batch(gpu));
+        if self.scratch.as_ref().is_none_or(|s| s.capacity < most) {
+            self.scratch = Some(Scratch::new(gpu, most)?);
         }
         let [first_four @ .., fifth] = polynomial.from_rim().map(|c| c as f32);
         let quantile = |i| polynomial.quantile((i as f64 + 0.5) / SURVEY_SAMPLES as f64) as f32;
         let radii = gpu.storage_with("survey radii", &(0..SURVEY_SAMPLES).map(quantile).collect::<Vec<_>>())?;
         let mut stats = GatherStats::default();
-        for first in (0..count).step_by(BATCH as usize) {
+        for first in (0..count).step_by(most.max(1) as usize) {
             let info = GatherInfo {
-                count: BATCH.min(count - first),
+                count: most.min(count - first),
                 first,
                 neighbors: settings.neighbors,
                 fixed_radius: u32::from(settings.radius.is_some()),
@@ -246,6 +248,12 @@ impl<'s> Gather<'s> {
             }
         }
     }
+}
+
+/// Maximum number of points of one batch.
+fn largest_batch(gpu: &Gpu) -> u32 {
+    let held = gpu.max_binding() / GATHER_STATE_BYTES as u64 * u64::from(PACKET);
+    (gpu.batch / BATCH_PART).min(held) as u32
 }
 
 impl Scratch {
