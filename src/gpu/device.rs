@@ -39,13 +39,14 @@ pub struct Gpu {
     pub batch: u64,
     pub(super) submissions: Submissions,
     pub(super) compiler: Compiler,
-    /// The kernels' override `LANES`.
+    /// The kernels' overrides `LANES` and `HAS_SEVERAL_GROUPS`.
     pub(super) lanes: u32,
+    pub(super) several_groups: bool,
     faults: Faults,
 }
 
-/// Maximum number of lanes of a subgroup that share the parts of a cell, one each: as many as a
-/// cell has parts.
+/// Maximum number of lanes of a group that share the parts of a cell, one each: as many as a cell
+/// has parts.
 const MAX_LANES: u32 = crate::layout::CELL_FAN;
 
 /// [`Gpu::batch`] of an adapter of that kind. A tile takes about half a kilobyte a point, and a
@@ -90,6 +91,7 @@ impl Gpu {
         let faults = Faults::of(&device);
         let submissions = Submissions::new(&device, &queue, pacing);
         let lanes = chosen.subgroup.0.min(MAX_LANES);
+        let several_groups = chosen.subgroup.1 > lanes;
         let batch = batch_of(chosen.kind);
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);
         let memory = Arc::<MemoryCount>::default();
@@ -98,7 +100,20 @@ impl Gpu {
             memory.set_limit(bytes);
         }
         let compiler = Compiler::new();
-        Ok(Self { device, queue, limits, name, driver, memory, batch, submissions, compiler, lanes, faults })
+        Ok(Self {
+            device,
+            queue,
+            limits,
+            name,
+            driver,
+            memory,
+            batch,
+            submissions,
+            compiler,
+            lanes,
+            several_groups,
+            faults,
+        })
     }
 
     /// Number of dispatches recorded so far; each part of a cut one counts.
