@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    gpu::Gpu,
+    gpu::{Buffer, Gpu},
     image::{Film, layers::LightComponent},
     layout::{Gathered, RecordGrid, VisiblePoint},
     map_kind::MapKind,
@@ -109,23 +109,22 @@ impl<'a> MapGatherer<'a> {
     /// Traces the rays of final gathering, and adds to each visible point the light of all maps
     /// where its rays end.
     fn gather_finally(&mut self, pass: &CameraPass, tile: &Tile, progress: &dyn Progress) -> Result<StepCount> {
-        // Ends that the cache does not light, with the index of their visible point. They are few
-        // in each step, and a search of few points leaves most of the device idle.
-        let mut left = (Vec::new(), Vec::new());
+        // Indices of the visible points of the ends that the cache does not light. They are few in
+        // each step, and a search of few points leaves most of the device idle.
+        let mut left = Vec::new();
         let Self { maps, search, estimate, cache, .. } = self;
         let done = pass.gather_finally(tile, progress, &mut |gather, rays, chosen| {
             let (points, radiance, count) = (&gather.ends, &gather.found, rays.all());
             let direct = gather.light_directly(pass.gpu, pass.scene, &pass.tracer, tile, rays)?;
             if let Some(cache) = cache {
                 cache.light(pass.gpu, points, count, radiance);
-                let ends: Vec<VisiblePoint> = pass.gpu.read(points, 0, count.into())?;
-                for (ray, end) in (0..).zip(ends).filter(|(_, end)| end.next_map != 0) {
-                    left.0.push(chosen[(ray / rays.count) as usize] as usize);
-                    left.1.push(end);
+                let waiting = gather.waiting.list(pass.gpu, points, count)?;
+                if (left.len() + waiting.len()) as u64 > pass.tracer.room() {
+                    let full = std::mem::take(&mut left);
+                    search.light_ends(pass, (maps, estimate), tile, (&full, &gather.waiting.collected), progress)?;
                 }
-                if left.0.len() as u64 >= pass.tracer.room() {
-                    search.light_ends(pass, (maps, estimate), tile, &std::mem::take(&mut left), progress)?;
-                }
+                gather.waiting.collect(pass.gpu, points, &waiting, left.len() as u32);
+                left.extend(waiting.iter().map(|ray| chosen[(ray / rays.count) as usize] as usize));
                 return Ok(direct);
             }
             for index in 0..maps.maps().len() {
@@ -135,8 +134,8 @@ impl<'a> MapGatherer<'a> {
             }
             Ok(direct)
         })?;
-        if !left.0.is_empty() {
-            search.light_ends(pass, (maps, estimate), tile, &left, progress)?;
+        if let Some(gather) = pass.final_gather.as_ref().filter(|_| !left.is_empty()) {
+            search.light_ends(pass, (maps, estimate), tile, (&left, &gather.waiting.collected), progress)?;
         }
         Ok(done)
     }
@@ -269,7 +268,7 @@ fn ends_of_rays(pass: &CameraPass, progress: &dyn Progress) -> Result<(Vec<Visib
 }
 
 impl Searches<'_> {
-    /// Radiance by all maps, and the radius of the narrowest estimate, at each point.
+    /// As [`Self::estimates_at`].
     fn estimates(
         &mut self,
         pass: &CameraPass,
@@ -278,14 +277,27 @@ impl Searches<'_> {
         points: &[VisiblePoint],
         progress: &dyn Progress,
     ) -> Result<Vec<([f32; 3], f32)>> {
-        let (gpu, count) = (pass.gpu, points.len() as u32);
-        let mut found = vec![([0.0; 3], f32::INFINITY); points.len()];
-        let points = gpu.storage_with("single points", points)?;
+        let count = points.len() as u32;
+        let points = pass.gpu.storage_with("single points", points)?;
+        self.estimates_at(pass, maps, settings, (&points, count), progress)
+    }
+
+    /// Radiance by all maps, and the radius of the narrowest estimate, at each of the first points
+    /// of a buffer.
+    fn estimates_at(
+        &mut self,
+        pass: &CameraPass,
+        maps: &PhotonMaps,
+        settings: &EstimateSettings,
+        (points, count): (&Buffer, u32),
+        progress: &dyn Progress,
+    ) -> Result<Vec<([f32; 3], f32)>> {
+        let gpu = pass.gpu;
+        let mut found = vec![([0.0; 3], f32::INFINITY); count as usize];
         let radiance = gpu.storage_with("radiance of single points", &vec![[0.0_f32; 4]; found.len()])?;
         let gathered = gpu.storage::<Gathered>("gathered at single points", count.into())?;
         for index in 0..maps.maps().len() {
-            let request =
-                EstimateRequest { points: &points, count, map_number: 1, radiance: &radiance, gathered: &gathered };
+            let request = EstimateRequest { points, count, map_number: 1, radiance: &radiance, gathered: &gathered };
             self.answer(pass, maps, index, settings, &request, progress)?;
             let all: Vec<Gathered> = gpu.read(&gathered, 0, count.into())?;
             found.iter_mut().zip(all).for_each(|((_, radius), one)| *radius = radius.min(one.radius_squared.sqrt()));
@@ -295,17 +307,17 @@ impl Searches<'_> {
         Ok(found)
     }
 
-    /// Adds the light at ends of rays to the visible points that the rays come from. The two lists
-    /// are the indices of the points and the ends.
+    /// Adds the light at ends of rays to the visible points that the rays come from: the indices of
+    /// the points, and the ends in a buffer.
     fn light_ends(
         &mut self,
         pass: &CameraPass,
         (maps, settings): (&PhotonMaps, &EstimateSettings),
         tile: &Tile,
-        (places, ends): &(Vec<usize>, Vec<VisiblePoint>),
+        (places, ends): (&[usize], &Buffer),
         progress: &dyn Progress,
     ) -> Result<()> {
-        let found = self.estimates(pass, maps, settings, ends, progress)?;
+        let found = self.estimates_at(pass, maps, settings, (ends, places.len() as u32), progress)?;
         let mut radiance = pass.radiance(tile)?;
         for (&place, (light, _)) in places.iter().zip(found) {
             (0..3).for_each(|c| radiance[place][c] += light[c]);

@@ -73,7 +73,7 @@ pub(crate) struct CameraPass<'a> {
     /// Holds the visible points and the radiance of the tile that was traced last.
     pub tracer: CameraTracer,
     /// `None` if the photons were not traced for final gathering.
-    final_gather: Option<FinalGather>,
+    pub final_gather: Option<FinalGather>,
     /// The radiance estimate that the settings ask for.
     pub estimate: GatherSettings,
     pub size: (u32, u32),
@@ -275,8 +275,7 @@ impl<'a> CameraPass<'a> {
     pub fn gather_finally(&self, tile: &Tile, progress: &dyn Progress, light: &mut RayLight) -> Result<StepCount> {
         let mut done = StepCount::default();
         let Some(gather) = &self.final_gather else { return Ok(done) };
-        let points = (0..).zip(self.points(tile)?);
-        let chosen: Vec<u32> = points.filter(|(_, point)| point.next_map != 0).map(|(i, _)| i).collect();
+        let chosen = gather.waiting.list(self.gpu, &self.tracer.points, self.tracer.point_count(tile))?;
         if chosen.is_empty() {
             return Ok(done);
         }

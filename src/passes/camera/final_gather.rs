@@ -6,6 +6,7 @@ use super::{
     camera_tracer::CameraTracer,
     direct_light::DirectLighting,
     tile::{StepCount, Tile},
+    waiting_points::WaitingPoints,
 };
 use crate::{
     error::Result,
@@ -63,6 +64,8 @@ pub struct FinalGather {
     directions: Buffer,
     /// An [`ArrivingLight`] for each visible point. Rays add to what is there.
     pub arriving: Buffer,
+    /// Those of the points and ends that nothing has lit.
+    pub waiting: WaitingPoints,
 }
 
 /// Rays from each of the chosen points that are traced at once.
@@ -97,6 +100,7 @@ impl FinalGather {
             found: gpu.storage::<[f32; 4]>("light of final-gather rays", tracer.room())?,
             directions: gpu.storage::<u32>("directions of final-gather rays", tracer.room())?,
             arriving: gpu.storage::<ArrivingLight>("arriving light", tracer.room())?,
+            waiting: WaitingPoints::new(gpu, tracer.room())?,
         })
     }
 

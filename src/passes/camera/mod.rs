@@ -5,6 +5,7 @@ mod direct_light;
 pub mod final_gather;
 pub mod tile;
 mod view;
+mod waiting_points;
 
 pub use camera_tracer::{CameraKernels, CameraTracer};
 pub use final_gather::{FinalGather, FinalRays};
