@@ -67,8 +67,8 @@ pub(super) fn add_step(stats: &mut Stats, count: StepCount) {
     count_faults(stats, count.media_overflows, count.unfinished);
 }
 
-/// Completes the statistics of a finished picture: warnings of faults, peak device memory, seconds of
-/// kernels, total seconds.
+/// Completes the statistics of a finished picture: warnings of faults, peak device memory, seconds
+/// of kernels, total seconds.
 pub(crate) fn finish_stats(gpu: &Gpu, stats: &mut Stats) {
     warn_of_faults(stats);
     stats.peak_device_bytes = gpu.memory.peak();

@@ -3,7 +3,7 @@
 use caustica::{
     density::{Density, DensityKernel},
     gpu::{Buffer, Gpu},
-    layout::{Gathered, Photon, PhotonFlux, PhotonPlace, VisiblePoint},
+    layout::{Gathered, Photon, PhotonFlux, PhotonPlace, VisiblePoint, from_octahedral},
     passes::{
         estimate::gather::{Gather, GatherOptions, GatherSettings, GatherStats, gathered_buffer},
         maps::radix_sort::RadixSort,
@@ -72,7 +72,8 @@ fn settings(k: u32) -> GatherSettings {
 }
 
 /// Number of valid points whose answer differs from brute force over `photons`: in the count, in
-/// the radius (beyond rounding) or in the estimate, which a single wrong photon changes.
+/// the radius (beyond rounding) or in the estimate, which a single wrong photon changes. Points
+/// whose answer rounding decides are left out: devices round sums of products in different ways.
 fn differences(
     answer: &Answer,
     (places, fluxes): (&[PhotonPlace], &[PhotonFlux]),
@@ -89,9 +90,25 @@ fn differences(
         let flat = VisiblePoint { ns: point.ng, ..*point };
         let expected = if side_test { *point } else { flat };
         let radiance = estimate((places, fluxes), &found, &expected, settings.density, EMITTED, side_test);
-        !agrees(&answer.gathered[i], &answer.radiance[i], &found, radiance)
+        !agrees(&answer.gathered[i], &answer.radiance[i], &found, radiance) && !is_close_call(places, point, &found)
     };
     points.iter().enumerate().filter(|(_, p)| p.next_map != 0).filter(|p| wrong(*p)).count()
+}
+
+/// Whether a photon about as far away as the last one of an estimate, or nearer, lies in the plane
+/// of the point, or one of the last three does so as far away as another.
+fn is_close_call(places: &[PhotonPlace], point: &VisiblePoint, found: &Found) -> bool {
+    let position = Vec3::from(point.position);
+    let reach = f64::from(found.radius_squared) * (1.0 + 1e-5);
+    let squared = |p: &PhotonPlace| f64::from(Vec3::from(p.position).distance_squared(position));
+    let mut near: Vec<_> = places.iter().filter(|p| squared(p) <= reach).collect();
+    near.sort_by(|a, b| squared(a).total_cmp(&squared(b)));
+    let along = |p: &PhotonPlace| from_octahedral(p.wi).dot(point.ng.into()).abs();
+    let ties = |pair: &[&PhotonPlace]| {
+        let apart = squared(pair[1]) - squared(pair[0]);
+        apart > 0.0 && apart <= 1e-6 * squared(pair[1])
+    };
+    near.iter().any(|p| along(p) < 1e-6) || near.windows(2).rev().take(3).any(ties)
 }
 
 fn agrees(gathered: &Gathered, radiance: &[f32; 4], found: &Found, expected: [f64; 3]) -> bool {

@@ -364,8 +364,8 @@ impl CameraTracer {
     }
 }
 
-/// Visible points for which a tile has room: those of a batch of the device, or of the whole picture
-/// and some of their rays of final gathering.
+/// Visible points for which a tile has room: those of a batch of the device, or of the whole
+/// picture and some of their rays of final gathering.
 fn room_for(view: &CameraTile, batch: u64, final_rays: u32) -> u64 {
     let points = u64::from(view.width) * u64::from(view.height) * u64::from(view.branches) * u64::from(view.spp);
     let rays = u64::from(final_rays).clamp(1, RAYS_AT_ONCE);

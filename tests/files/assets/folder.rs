@@ -142,8 +142,8 @@ fn every_scene_behaves_as_the_readme_of_the_assets_says() {
     let left_out: Vec<_> = large.into_iter().map(|asset| text(asset, "id")).collect();
     let mut counts = [0; 4];
     small.iter().for_each(|asset| counts[expected(asset) as usize] += 1);
-    // Each thread takes the next scene. Most of the time goes into compiling kernels, which a driver may
-    // do one after the other for each device.
+    // Each thread takes the next scene. Most of the time goes into compiling kernels, which a
+    // driver may do one after the other for each device.
     let (next, wrong) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let other = Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("the adapter opens twice");
     let work = |gpu: &Gpu| {
