@@ -420,13 +420,16 @@ pub struct Photon {
     pub normal: u32,
 }
 
+/// [`VisiblePoint::next_map`] of a point for which irradiance kept in cells will do.
+pub const BY_CELL: u32 = 1 << 16;
+
 /// A visible point: where a camera path hit a diffuse surface, and the outgoing light is sought.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct VisiblePoint {
     /// Metres.
     pub position: [f32; 3],
-    /// 0: no point. Otherwise the first map, from 1, that is not gathered here yet.
+    /// 0: no point. Otherwise the first map, from 1, that is not gathered here yet, or [`BY_CELL`].
     pub next_map: u32,
     /// Weight of the camera path times the BRDF, albedo/π: multiplies irradiance.
     pub weight: [f32; 3],
@@ -677,7 +680,9 @@ pub struct CameraTile {
     pub far_depth: f32,
     /// Depth at which parallel rays start, metres, at most 0.
     pub start_depth: f32,
-    pub pad: u32,
+    /// Width of what a sample sees by rough lobes, metres, from which on irradiance kept in cells
+    /// will do; 0: nowhere.
+    pub cells_from: f32,
 }
 
 /// First hit of a camera sample.
@@ -760,6 +765,11 @@ pub struct CellGrid {
     /// Number of entries less 1; the number is a power of 2.
     pub mask: u32,
     pub points: u32,
+    /// Points with this [`VisiblePoint::next_map`] are lit.
+    pub asked: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// What the rays of final gathering of a point tell of the light's way there: sums over rays.
@@ -806,13 +816,8 @@ pub struct RecordGrid {
     pub rows_per_pixel: f32,
     /// Radius of the filter per metre between camera and point; metres if rays are parallel.
     pub reach: f32,
-    /// Visible points.
-    pub points: u32,
     /// Pixels of the grid on each side of a point among which the filter looks for records.
     pub window: u32,
-    pub pad0: u32,
-    pub pad1: u32,
-    pub pad2: u32,
 }
 
 /// Irradiance kept for the points of a cell that lie on one surface.

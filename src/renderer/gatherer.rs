@@ -106,6 +106,14 @@ impl<'a> MapGatherer<'a> {
         Ok(())
     }
 
+    /// Lights the tile's points that are seen blurred.
+    fn light_blurred(&self, pass: &CameraPass, tile: &Tile) {
+        if let Some(cache) = self.cache.as_ref().filter(|_| pass.tracer.sees_by_cells()) {
+            let (points, count) = (&pass.tracer.points, pass.tracer.point_count(tile));
+            cache.light_blurred(pass.gpu, points, count, &pass.tracer.radiance);
+        }
+    }
+
     /// Traces the rays of final gathering, and adds to each visible point the light of all maps
     /// where its rays end.
     fn gather_finally(&mut self, pass: &CameraPass, tile: &Tile, progress: &dyn Progress) -> Result<StepCount> {
@@ -156,6 +164,10 @@ impl Gatherer for MapGatherer<'_> {
         Ok(())
     }
 
+    fn blur(&self) -> f32 {
+        self.cache.as_ref().map_or(0.0, IrradianceCache::width)
+    }
+
     /// Final gathering at the visible points of the coarse picture.
     fn keep_records(
         &mut self,
@@ -173,6 +185,7 @@ impl Gatherer for MapGatherer<'_> {
             let mut step = timed(&mut stats.seconds.camera, || coarse.tracer.trace(coarse.gpu, coarse.scene, tile))?;
             let mut seconds = 0.0;
             let found = timed(&mut seconds, || {
+                self.light_blurred(coarse, tile);
                 // Irradiance itself, by the geometric normal.
                 let flat = |point: &VisiblePoint| VisiblePoint { ns: point.ng, ..bare(point) };
                 let points: Vec<_> = coarse.points(tile)?.iter().map(flat).collect();
@@ -207,7 +220,6 @@ impl Gatherer for MapGatherer<'_> {
             rows_per_pixel: per_pixel(coarse.size.1, size.1),
             reach,
             window: filter_window(self.estimate.gather_radius, spacing),
-            ..Default::default()
         };
         let records = taken.finish(|position| reach * coarse.tracer.scale_at(position));
         self.records = Some(IrradianceRecords::new(coarse.gpu, &records, grid)?);
@@ -224,6 +236,8 @@ impl Gatherer for MapGatherer<'_> {
         stats: &mut Stats,
         progress: &dyn Progress,
     ) -> Result<()> {
+        let mut seconds = 0.0;
+        timed(&mut seconds, || self.light_blurred(pass, tile));
         let final_gathering = pass.final_rays() > 0;
         let gathered_here = |kind: MapKind| !final_gathering || kind == MapKind::Caustic;
         let kinds: Vec<MapKind> = self.maps.by_kind().map(|(kind, _)| kind).collect();
@@ -231,11 +245,10 @@ impl Gatherer for MapGatherer<'_> {
         for (index, number) in here.zip(1..) {
             self.gather_map(pass, tile, (index, number), (film, stats), progress)?;
         }
-        let mut seconds = 0.0;
         if let Some(records) = &self.records {
-            let (count, view) = (pass.tracer.point_count(tile), pass.tracer.tile_view(tile));
+            let view = pass.tracer.tile_view(tile);
             let buffers = (&pass.tracer.points, &pass.tracer.radiance);
-            timed(&mut seconds, || records.light(pass.gpu, &view, count, buffers));
+            timed(&mut seconds, || records.light(pass.gpu, &view, buffers));
         }
         let count = timed(&mut seconds, || self.gather_finally(pass, tile, progress))?;
         stats.seconds.gather += seconds;

@@ -235,9 +235,10 @@ impl<'a> Session<'a> {
             let single = EstimateSettings { share_reach: 0.0, ..estimate.clone() };
             let records = CameraPass::new(self.gpu, scene, camera, maps.settings(), &single, &coarse)?;
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
-            let records = records.of_pass(&coarse, index)?.with_joint_rays();
+            let records = records.of_pass(&coarse, index)?.with_joint_rays().seeing_by_cells(gatherer.blur());
             gatherer.keep_records(&records, pass.size, &mut stats, progress)?;
         }
+        let pass = pass.seeing_by_cells(gatherer.blur());
         let films = pass.render(gatherer, stage, &mut stats, progress)?;
         Ok((films, stats))
     }

@@ -41,6 +41,11 @@ pub(crate) trait Gatherer {
         Ok(())
     }
 
+    /// Width of what is seen blurred from which on this gatherer has light for it, metres; 0: none.
+    fn blur(&self) -> f32 {
+        0.0
+    }
+
     /// Receives a pass over a picture that is coarser by `spacing`, before the picture, to keep
     /// records of irradiance at its visible points. The default does nothing with it.
     fn keep_records(
@@ -133,6 +138,16 @@ impl<'a> CameraPass<'a> {
     pub fn of_pass(self, picture: &PictureSettings, first_sample: Option<u32>) -> Result<Self> {
         let Some(first) = first_sample else { return Ok(self) };
         Ok(Self { tracer: self.tracer.of_pass(self.gpu, picture, first)?, ..self })
+    }
+
+    /// Leaves points that are seen as blurred as that, metres, to the gatherer's cells; 0: none. Layers
+    /// of components and of estimates are about each point.
+    pub fn seeing_by_cells(mut self, blur: f32) -> Self {
+        let is_apart = [ExtraLayers::Components, ExtraLayers::Estimates].iter().any(|l| self.layers.contains(l));
+        if !is_apart {
+            self.tracer.see_by_cells(blur);
+        }
+        self
     }
 
     /// Makes the rays of final gathering of all points one set of numbers.

@@ -148,6 +148,18 @@ impl CameraTracer {
         Self { view: CameraTile { start_depth: depth, near_depth, ..self.view }, ..self }
     }
 
+    /// Has points wait for irradiance kept in cells, [`layout::BY_CELL`], where what a sample sees by
+    /// rough lobes is at least as wide, metres.
+    pub fn see_by_cells(&mut self, width: f32) {
+        self.view.cells_from = width;
+    }
+
+    /// Whether points may wait for irradiance kept in cells.
+    #[must_use]
+    pub fn sees_by_cells(&self) -> bool {
+        self.view.cells_from > 0.0
+    }
+
     /// Takes the samples of a pass from index `first` on. All passes together have many samples a
     /// pixel, so that even a single one is spread over the pixel filter.
     ///

@@ -5,7 +5,7 @@ use super::cell_table::{CellTable, Irradiances};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{CellGrid, VisiblePoint},
+    layout::{BY_CELL, CellGrid, VisiblePoint},
 };
 
 /// The kernel and the table that it reads.
@@ -30,7 +30,7 @@ impl IrradianceCache {
     ) -> Result<Option<Self>> {
         let Some(table) = CellTable::build(marks, spacing, irradiances)? else { return Ok(None) };
         let CellTable { places, per_metre, levels } = table;
-        let grid = CellGrid { per_metre, levels, mask: places.len() as u32 - 1, points: 0 };
+        let grid = CellGrid { per_metre, levels, mask: places.len() as u32 - 1, ..CellGrid::default() };
         let cells = gpu.storage_with("irradiance cells", &places)?;
         Ok(Some(Self { kernel: Kernel::new(gpu, "reuse_irradiance", &[]), cells, grid }))
     }
@@ -40,10 +40,26 @@ impl IrradianceCache {
         let _ = Kernel::new(gpu, "reuse_irradiance", &[]);
     }
 
-    /// Adds the light of the first `points` points to `radiance`, where their cell has one. Those
-    /// then wait for no map.
+    /// Width of the largest cells, metres.
+    #[must_use]
+    pub fn width(&self) -> f32 {
+        1.0 / self.grid.per_metre
+    }
+
+    /// Adds the light of those of the first `count` points that wait for the first map to `radiance`,
+    /// where their cell has one. Those then wait for no map.
     pub fn light(&self, gpu: &Gpu, points: &Buffer, count: u32, radiance: &Buffer) {
-        let grid = gpu.uniform("cell grid", &CellGrid { points: count, ..self.grid });
+        self.light_asked(gpu, points, (count, 1), radiance);
+    }
+
+    /// The same for points that are seen blurred, [`BY_CELL`]. Others of these then wait for the first
+    /// map.
+    pub fn light_blurred(&self, gpu: &Gpu, points: &Buffer, count: u32, radiance: &Buffer) {
+        self.light_asked(gpu, points, (count, BY_CELL), radiance);
+    }
+
+    fn light_asked(&self, gpu: &Gpu, points: &Buffer, (count, asked): (u32, u32), radiance: &Buffer) {
+        let grid = gpu.uniform("cell grid", &CellGrid { points: count, asked, ..self.grid });
         let buffers = [("cell_grid", &grid), ("points", points), ("cells", &self.cells), ("radiance", radiance)];
         let mut encoder = gpu.encoder();
         self.kernel.dispatch(&mut encoder, &self.kernel.bind(gpu, &buffers), count.into());

@@ -130,7 +130,7 @@ pub struct IrradianceRecords {
 }
 
 impl IrradianceRecords {
-    /// Takes records by the rows of `grid`, whose number of points is left open.
+    /// Takes records by the rows of `grid`.
     ///
     /// # Errors
     /// Limits of the adapter.
@@ -146,8 +146,9 @@ impl IrradianceRecords {
 
     /// Adds the light of the records to the radiance of a tile's points. Those that it lights wait
     /// for no map then; others have too few records about them.
-    pub fn light(&self, gpu: &Gpu, tile: &CameraTile, count: u32, (points, radiance): (&Buffer, &Buffer)) {
-        let grid = gpu.uniform("record grid", &RecordGrid { points: count, ..self.grid });
+    pub fn light(&self, gpu: &Gpu, tile: &CameraTile, (points, radiance): (&Buffer, &Buffer)) {
+        let invocations = u64::from(tile.pixels) * u64::from(tile.branches);
+        let grid = gpu.uniform("record grid", &self.grid);
         let tile = gpu.uniform("camera tile", tile);
         let buffers = [
             ("tile", &tile),
@@ -157,7 +158,7 @@ impl IrradianceRecords {
             ("radiance", radiance),
         ];
         let mut encoder = gpu.encoder();
-        self.kernel.dispatch(&mut encoder, &self.kernel.bind(gpu, &buffers), count.into());
+        self.kernel.dispatch(&mut encoder, &self.kernel.bind(gpu, &buffers), invocations);
         gpu.submit(encoder);
     }
 }
