@@ -50,12 +50,12 @@ pub struct Gpu {
 const MAX_LANES: u32 = crate::layout::CELL_FAN;
 
 /// [`Gpu::batch`] of an adapter of that kind. A tile takes about half a kilobyte a point, and a
-/// search as much. Software is busy with few points, and caches keep them.
+/// search as much. Software is busy with few points, but each wait for it leaves cores idle.
 fn batch_of(kind: &str) -> u64 {
     match kind {
-        "discrete" => 1 << 20,
+        "discrete" => 1 << 19,
         "software" => 1 << 16,
-        _ => 1 << 18,
+        _ => 1 << 17,
     }
 }
 

@@ -140,8 +140,8 @@ impl<'a> CameraPass<'a> {
         Ok(Self { tracer: self.tracer.of_pass(self.gpu, picture, first)?, ..self })
     }
 
-    /// Leaves points that are seen as blurred as that, metres, to the gatherer's cells; 0: none. Layers
-    /// of components and of estimates are about each point.
+    /// Leaves points that are seen as blurred as that, metres, to the gatherer's cells; 0: none.
+    /// Layers of components and of estimates are about each point.
     pub fn seeing_by_cells(mut self, blur: f32) -> Self {
         let is_apart = [ExtraLayers::Components, ExtraLayers::Estimates].iter().any(|l| self.layers.contains(l));
         if !is_apart {

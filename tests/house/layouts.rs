@@ -145,6 +145,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         STORE_CAUSTIC,
         FOLLOW_DIFFUSE,
         AIM,
+        BY_CELL,
         CAUSTICS_APART,
         EVENLY,
         MAX_TARGETS,

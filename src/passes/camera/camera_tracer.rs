@@ -148,8 +148,8 @@ impl CameraTracer {
         Self { view: CameraTile { start_depth: depth, near_depth, ..self.view }, ..self }
     }
 
-    /// Has points wait for irradiance kept in cells, [`layout::BY_CELL`], where what a sample sees by
-    /// rough lobes is at least as wide, metres.
+    /// Has points wait for irradiance kept in cells, [`layout::BY_CELL`], where what a sample sees
+    /// by rough lobes is at least as wide, metres.
     pub fn see_by_cells(&mut self, width: f32) {
         self.view.cells_from = width;
     }
@@ -376,12 +376,14 @@ impl CameraTracer {
     }
 }
 
-/// Visible points for which a tile has room: those of a batch of the device, or of the whole
-/// picture and some of their rays of final gathering.
+/// Visible points for which a tile has room: those of a batch of the device, with final gathering
+/// twice as many since each step of its rays waits for the device; or those of the whole picture
+/// and some of their rays.
 fn room_for(view: &CameraTile, batch: u64, final_rays: u32) -> u64 {
     let points = u64::from(view.width) * u64::from(view.height) * u64::from(view.branches) * u64::from(view.spp);
     let rays = u64::from(final_rays).clamp(1, RAYS_AT_ONCE);
-    (points * rays).next_power_of_two().clamp(MIN_ROOM.min(batch), batch)
+    let most = if final_rays > 0 { 2 * batch } else { batch };
+    (points * rays).next_power_of_two().clamp(MIN_ROOM.min(most), most)
 }
 
 /// Pixels along the sides of each tile, powers of 2.

@@ -46,14 +46,14 @@ impl IrradianceCache {
         1.0 / self.grid.per_metre
     }
 
-    /// Adds the light of those of the first `count` points that wait for the first map to `radiance`,
-    /// where their cell has one. Those then wait for no map.
+    /// Adds the light of those of the first `count` points that wait for the first map to
+    /// `radiance`, where their cell has one. Those then wait for no map.
     pub fn light(&self, gpu: &Gpu, points: &Buffer, count: u32, radiance: &Buffer) {
         self.light_asked(gpu, points, (count, 1), radiance);
     }
 
-    /// The same for points that are seen blurred, [`BY_CELL`]. Others of these then wait for the first
-    /// map.
+    /// The same for points that are seen blurred, [`BY_CELL`]. Others of these then wait for the
+    /// first map.
     pub fn light_blurred(&self, gpu: &Gpu, points: &Buffer, count: u32, radiance: &Buffer) {
         self.light_asked(gpu, points, (count, BY_CELL), radiance);
     }
