@@ -42,6 +42,8 @@ pub struct Gpu {
     /// The kernels' overrides `LANES` and `HAS_SEVERAL_GROUPS`.
     pub(super) lanes: u32,
     pub(super) several_groups: bool,
+    /// Whether searches run some queries ahead of the others: the kernels' override `HAS_PILOTS`.
+    pub(crate) has_pilots: bool,
     faults: Faults,
 }
 
@@ -93,6 +95,7 @@ impl Gpu {
         let lanes = chosen.subgroup.0.min(MAX_LANES);
         let several_groups = chosen.subgroup.1 > lanes;
         let batch = batch_of(chosen.kind);
+        let has_pilots = chosen.kind == "software";
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);
         let memory = Arc::<MemoryCount>::default();
         // Memory of software is the host's, which gives more than it has and then ends the process.
@@ -112,6 +115,7 @@ impl Gpu {
             compiler,
             lanes,
             several_groups,
+            has_pilots,
             faults,
         })
     }

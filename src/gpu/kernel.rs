@@ -41,8 +41,12 @@ impl Kernel {
             let is_known = SHADERS.iter().chain([shader]).any(|s| s.overrides.contains(name));
             assert!(is_known, "{}: no kernel has an override {name}", shader.stem);
         }
-        let several_groups = f64::from(u8::from(gpu.several_groups));
-        let of_device = [("LANES", f64::from(gpu.lanes)), ("HAS_SEVERAL_GROUPS", several_groups)];
+        let flag = |is: bool| f64::from(u8::from(is));
+        let of_device = [
+            ("LANES", f64::from(gpu.lanes)),
+            ("HAS_SEVERAL_GROUPS", flag(gpu.several_groups)),
+            ("HAS_PILOTS", flag(gpu.has_pilots)),
+        ];
         let value = |name: &str| overrides.iter().chain(&of_device).find(|(n, _)| *n == name).map(|(_, value)| *value);
         let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();
         let program = gpu.compiler.program(&gpu.device, &gpu.submissions.parts.layout, shader, constants);

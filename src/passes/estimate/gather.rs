@@ -214,8 +214,10 @@ impl<'s> Gather<'s> {
             ("gathered", gathered),
         ]);
         let with_info = |info| [buffers.as_slice(), &[("gather_info", info)]].concat();
-        let infos = STRIDES.map(|stride| gpu.uniform("gather info", &GatherInfo { count: waiting, stride, ..*info }));
-        let search_bindings = infos.each_ref().map(|info| search.bind(gpu, &with_info(info)));
+        let strides = if gpu.has_pilots { &STRIDES[..] } else { &[1] };
+        let info = |stride| gpu.uniform("gather info", &GatherInfo { count: waiting, stride, ..*info });
+        let infos: Vec<_> = strides.iter().map(|&stride| info(stride)).collect();
+        let search_bindings: Vec<_> = infos.iter().map(|info| search.bind(gpu, &with_info(info))).collect();
         let (sum_bindings, finish_bindings) =
             (sum.bind(gpu, &with_info(&infos[0])), finish.bind(gpu, &with_info(&infos[0])));
         let survey = survey.as_ref().zip(self.kernels.scene);
@@ -232,7 +234,7 @@ impl<'s> Gather<'s> {
                 encoder.clear_buffer(&scratch.sums, 0, None);
             }
             encoder.clear_buffer(&scratch.open, 0, None);
-            for (bindings, stride) in search_bindings.iter().zip(STRIDES) {
+            for (bindings, &stride) in search_bindings.iter().zip(strides) {
                 let packets = packets.div_ceil(BLOCK).div_ceil(stride.into()) * BLOCK;
                 search.dispatch(&mut encoder, bindings, packets);
             }
