@@ -120,7 +120,7 @@ fn missing(has: &wgpu::Limits, needs: &wgpu::Limits) -> Option<String> {
 }
 
 /// Invocations that share what they load; the smallest subgroup that the kernels work with.
-const NEEDED_SUBGROUP: u32 = 4;
+pub(super) const NEEDED_SUBGROUP: u32 = 4;
 
 /// Why subgroups of so many invocations, or none at all, do not do.
 fn no_subgroups(least: u32) -> Option<String> {

@@ -50,6 +50,8 @@ pub struct Gpu {
 /// Maximum number of lanes of a group that share the parts of a cell, one each: as many as a cell
 /// has parts.
 const MAX_LANES: u32 = crate::layout::CELL_FAN;
+/// Minimum number of lanes of a group.
+const MIN_LANES: u32 = super::adapter::NEEDED_SUBGROUP;
 
 /// [`Gpu::batch`] of an adapter of that kind. A tile takes about half a kilobyte a point, and a
 /// search as much. Software is busy with few points, but each wait for it leaves cores idle.
@@ -92,8 +94,11 @@ impl Gpu {
         .map_err(|e| Error::Device(format!("adapter {} cannot be opened: {e}", chosen.name)))?;
         let faults = Faults::of(&device);
         let submissions = Submissions::new(&device, &queue, pacing);
-        let lanes = chosen.subgroup.0.min(MAX_LANES);
-        let several_groups = chosen.subgroup.1 > lanes;
+        // Where a subgroup has several groups, the smaller are the faster: queries of few share less,
+        // and wait for fewer others.
+        let (least, most) = chosen.subgroup;
+        let lanes = if most > MAX_LANES { MIN_LANES } else { least.min(MAX_LANES) };
+        let several_groups = most > lanes;
         let batch = batch_of(chosen.kind);
         let has_pilots = chosen.kind == "software";
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);

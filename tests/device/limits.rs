@@ -118,10 +118,11 @@ fn memory_is_bounded_by_photons_alone() {
     };
     let (few, many) = (peak(1000, 16, 1), peak(500_000, 16, 1));
     // Each of the two maps has its own capacity.
-    let bound = |photons: u64| 96 * 2 * photons + 35 * MIB * gpu.batch.div_ceil(1 << 16);
+    let (per_photon, tile) = (96 * 2, 35 * MIB * gpu.batch.div_ceil(1 << 16));
+    let bound = |photons: u64| per_photon * photons + tile;
     assert!(few <= bound(1000), "{few} bytes for 1 k photons");
     assert!(many <= bound(500_000), "{many} bytes for 500 k photons");
-    assert!(many > bound(500_000) / 10, "control: {many} bytes are too few to be true");
+    assert!(many > per_photon * 500_000 / 10, "control: {many} bytes are too few to be true");
     let full_tile = peak(1000, 200, 1);
     let (large, deep) = (peak(1000, 300, 1), peak(1000, 64, 16));
     assert!(large <= full_tile && deep <= full_tile, "device memory grows: {large} by --size, {deep} by --spp");

@@ -96,19 +96,15 @@ fn differences(
 }
 
 /// Whether a photon about as far away as the last one of an estimate, or nearer, lies in the plane
-/// of the point, or one of the last three does so as far away as another.
+/// of the point, or two lie at different distances that are about that of the last one.
 fn is_close_call(places: &[PhotonPlace], point: &VisiblePoint, found: &Found) -> bool {
     let position = Vec3::from(point.position);
-    let reach = f64::from(found.radius_squared) * (1.0 + 1e-5);
+    let (last, slack) = (f64::from(found.radius_squared), 2e-6 * f64::from(found.radius_squared));
     let squared = |p: &PhotonPlace| f64::from(Vec3::from(p.position).distance_squared(position));
-    let mut near: Vec<_> = places.iter().filter(|p| squared(p) <= reach).collect();
-    near.sort_by(|a, b| squared(a).total_cmp(&squared(b)));
     let along = |p: &PhotonPlace| from_octahedral(p.wi).dot(point.ng.into()).abs();
-    let ties = |pair: &[&PhotonPlace]| {
-        let apart = squared(pair[1]) - squared(pair[0]);
-        apart > 0.0 && apart <= 1e-6 * squared(pair[1])
-    };
-    near.iter().any(|p| along(p) < 1e-6) || near.windows(2).rev().take(3).any(ties)
+    let in_plane = places.iter().any(|p| squared(p) <= last + slack && along(p) < 2e-6);
+    let at_the_end: Vec<f64> = places.iter().map(squared).filter(|d| (d - last).abs() <= slack).collect();
+    in_plane || at_the_end.iter().any(|d| *d != at_the_end[0])
 }
 
 fn agrees(gathered: &Gathered, radiance: &[f32; 4], found: &Found, expected: [f64; 3]) -> bool {
