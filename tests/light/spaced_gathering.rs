@@ -4,12 +4,13 @@
 //! |---|---|---|
 //! | a ball on the floor, leaves, a slit, mirrors that face each other, a glass ball before all | final gathering with many rays at every sample | the estimate from the photons around the point |
 //! | a floor whose interpolated normals lean | the same | the floor without them |
+//! | a wall of rough metal | estimates at all that it shows, in place of cells | smooth metal has the same bits without cells |
 //! | a crop | the bits of the whole | another seed |
 
 use caustica::{
     renderer::Render,
-    scene::{Scene, Surface},
-    settings::{Crop, Mode, Settings},
+    scene::{Material, Scene, Surface},
+    settings::{Crop, ExtraLayers, Mode, Settings},
 };
 use glam::{Vec3, vec3};
 use support::{photons::Random, *};
@@ -134,6 +135,32 @@ fn leaning_normals_take_light_from_their_side() {
         assert!(within(found, right, 0.06), "{lean}: {found} instead of {right}");
         assert!(!matters || !within(flat, right, 0.15), "control: {flat} without them instead of {right}");
     }
+}
+
+#[test]
+fn what_rough_metal_shows_takes_the_light_of_cells() {
+    let walled = |roughness: f32| {
+        with(|s| {
+            let layered =
+                Surface::Layered { base: Vec3::splat(0.9), metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
+            s.materials.push(Material { roughness, metallic: 1.0, ..Material::new("metal", layered) });
+            add_quad(s, vec3(-0.9, -0.9, -0.9), vec3(1.8, 0.0, 0.0), vec3(0.0, 1.8, 0.0), s.materials.len() as u32 - 1);
+        })
+    };
+    // Layers of the estimates are about each point, so that no cell speaks for one.
+    let pictures = |roughness: f32| {
+        let cells = gathering(16, 0);
+        let estimates = cells.clone().with(|s| s.picture.layers = vec![ExtraLayers::Estimates]);
+        let other = estimates.clone().with(|s| s.photons.seed = 1);
+        [cells, estimates, other].map(|settings| render_scene(&walled(roughness), &settings))
+    };
+    let [cells, estimates, other] = pictures(0.6);
+    assert!(cells.stats.rays < estimates.stats.rays * 9 / 10, "{} and {}", cells.stats.rays, estimates.stats.rays);
+    assert!(within(mean(&cells), mean(&estimates), 0.01), "{} and {}", mean(&cells), mean(&estimates));
+    let (off, noise) = (error(&cells, &estimates), error(&other, &estimates));
+    assert!(off < 0.1 * noise, "{off}, and {noise} of two seeds");
+    let [cells, estimates, _] = pictures(0.05);
+    assert_eq!(cells.frame.radiance(), estimates.frame.radiance(), "control: a sharp lobe shows all");
 }
 
 #[test]
