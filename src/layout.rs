@@ -48,12 +48,17 @@ pub struct BvhNode {
 /// Set in [`Primitive::material`] when the primitive is a sphere.
 pub const SPHERE_BIT: u32 = 0x8000_0000;
 
-/// Set there when the primitive's material is a mirror, a pane or glass: where surfaces coincide,
-/// the others are met first.
-pub const SPECULAR_BIT: u32 = 0x4000_0000;
+/// Set there when light passes through the primitive's surface, a pane or glass: where surfaces
+/// coincide, the others are met first.
+pub const TRANSMITS_BIT: u32 = 0x4000_0000;
 /// Set there when another surface lies in the same plane: hits within rounding are one interface.
 pub const CONTACT_BIT: u32 = 0x2000_0000;
-/// Position there of the slot of the solid that the primitive bounds, and its mask;
+/// Position in [`Primitive::id`] of the rank of a surface among those in contact with it, and the
+/// largest one; the mask of the index below it.
+pub const RANK_SHIFT: u32 = 28;
+pub const MAX_RANK: u32 = 15;
+pub const ID_MASK: u32 = (1 << RANK_SHIFT) - 1;
+/// Position in the material of the slot of the solid that the primitive bounds, and its mask;
 /// [`crate::scene::NO_SLOT`] if it bounds none.
 pub const SLOT_SHIFT: u32 = 22;
 pub const SLOT_MASK: u32 = 127;
@@ -75,10 +80,11 @@ pub const LOST_SCALE: u32 = 4096;
 pub struct Primitive {
     pub v0: [f32; 3],
     /// Index into the materials, with [`SPHERE_BIT`] for a sphere; on the device also
-    /// [`SPECULAR_BIT`], [`CONTACT_BIT`] and the slot at [`SLOT_SHIFT`].
+    /// [`TRANSMITS_BIT`], [`CONTACT_BIT`] and the slot at [`SLOT_SHIFT`].
     pub material: u32,
     pub e1: [f32; 3],
-    /// Index of the primitive in the scene before the BVH reordered it.
+    /// Index of the primitive in the scene before the BVH reordered it; on the device with its rank
+    /// among those in contact with it at [`RANK_SHIFT`].
     pub id: u32,
     pub e2: [f32; 3],
     /// Index of the primitive's first [`Light`], plus one; 0 if it does not emit light.

@@ -14,7 +14,7 @@ use crate::{
         Buffer, Gpu, Kernel, Table,
         shaders::{Shader, shader},
     },
-    layout::{self, ALPHA_BIT, CONTACT_BIT, Primitive, SLOT_SHIFT, SPECULAR_BIT, SPHERE_BIT},
+    layout::{self, ALPHA_BIT, CONTACT_BIT, Primitive, RANK_SHIFT, SLOT_SHIFT, SPHERE_BIT, TRANSMITS_BIT},
     scene::{Alpha, Medium, Scene, Solids},
     settings::{LightSettings, Sampler},
 };
@@ -30,8 +30,8 @@ pub struct SceneBuffers {
     has_spheres: bool,
     /// Maximum number of deferred children in a traversal.
     stack: usize,
-    /// Surfaces lie in each other.
-    has_contacts: bool,
+    /// Ranks of primitives that lie in each other.
+    contacts: Arc<[Option<u32>]>,
     /// Some solid absorbs light.
     has_absorption: bool,
     has_dispersion: bool,
@@ -82,7 +82,7 @@ impl SceneBuffers {
         };
         let media: Vec<_> = solids.media.iter().map(row).collect();
         let lights = LightBuffers::new(gpu, (scene, bvh), &MediaProbe::new(scene, bvh, &solids), settings)?;
-        let contacts = contacts(scene, bvh);
+        let contacts: Arc<[_]> = contacts(scene, bvh).into();
         Ok(Self {
             nodes: Arc::new(gpu.storage_with("bvh nodes", &bvh.nodes)?),
             primitives: Windows::new::<Primitive>(
@@ -97,7 +97,7 @@ impl SceneBuffers {
             single_scattering: scene.options.single_scattering,
             has_dispersion: solids.media.iter().any(|m| m.dispersion > 0.0),
             media: Table::new(gpu, "media", &media)?,
-            has_contacts: contacts.contains(&true),
+            contacts,
             has_lobes: scene.has_lobes(),
             splits: scene
                 .materials
@@ -117,8 +117,7 @@ impl SceneBuffers {
     /// As [`Self::new`].
     pub fn relit(&self, gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         let lights = LightBuffers::new(gpu, (scene, bvh), &MediaProbe::new(scene, bvh, &self.solids), settings)?;
-        let contacts = contacts(scene, bvh);
-        let primitives = marked(&bvh.primitives, scene, &self.solids, &contacts, &lights.table);
+        let primitives = marked(&bvh.primitives, scene, &self.solids, &self.contacts, &lights.table);
         Ok(Self {
             nodes: Arc::clone(&self.nodes),
             primitives: Windows::new::<Primitive>(gpu, "primitives", &primitives)?,
@@ -126,6 +125,7 @@ impl SceneBuffers {
             materials: self.materials.relit(gpu, scene, settings.unit)?,
             media: self.media.clone(),
             solids: self.solids.clone(),
+            contacts: Arc::clone(&self.contacts),
             lights,
             ..*self
         })
@@ -149,7 +149,7 @@ impl SceneBuffers {
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
-            ("HAS_CONTACTS", f64::from(u8::from(self.has_contacts))),
+            ("HAS_CONTACTS", f64::from(u8::from(self.contacts.iter().any(Option::is_some)))),
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_LAYERS", f64::from(u8::from(self.materials.has_layers))),
             ("HAS_FINISHES", f64::from(u8::from(self.materials.has_finishes))),
@@ -203,17 +203,19 @@ fn marked(
     primitives: &[Primitive],
     scene: &Scene,
     solids: &Solids,
-    contacts: &[bool],
+    contacts: &[Option<u32>],
     lights: &LightTable,
 ) -> Vec<Primitive> {
-    let is_specular: Vec<bool> = scene.materials.iter().map(|m| m.surface.is_specular()).collect();
+    let transmits: Vec<bool> = scene.materials.iter().map(|m| m.surface.transmits()).collect();
     let has_alpha: Vec<bool> = scene.materials.iter().map(|m| m.alpha != Alpha::Opaque).collect();
-    let mark = |(p, contact): (&Primitive, &bool)| {
+    let mark = |(p, rank): (&Primitive, &Option<u32>)| {
         let of = |marks: &[bool]| marks.get((p.material & !SPHERE_BIT) as usize) == Some(&true);
         let alpha = if of(&has_alpha) { ALPHA_BIT } else { 0 };
-        let bits = alpha | if of(&is_specular) { SPECULAR_BIT } else { 0 } | if *contact { CONTACT_BIT } else { 0 };
+        let transmits = if of(&transmits) { TRANSMITS_BIT } else { 0 };
+        let bits = alpha | transmits | if rank.is_some() { CONTACT_BIT } else { 0 };
         let material = p.material | bits | (solids.slot(p.id) << SLOT_SHIFT);
-        Primitive { emitter: lights.emitter(p.id), material, ..*p }
+        let id = p.id | rank.unwrap_or(0) << RANK_SHIFT;
+        Primitive { emitter: lights.emitter(p.id), material, id, ..*p }
     };
     primitives.iter().zip(contacts).map(mark).collect()
 }

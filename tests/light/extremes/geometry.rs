@@ -136,27 +136,26 @@ fn degenerate_triangles_leave_no_trace() {
 
 #[test]
 fn of_coincident_quads_always_one_is_seen() {
-    let seen = |materials: &[u32], eye: Vec3| {
-        let mut scene = scene(&[diffuse(0.2), diffuse(0.8)]);
+    // Quads in one plane around one point, each of a size and a material.
+    let seen = |quads: &[(f32, u32)], eye: Vec3| {
+        let mut scene = scene(&[diffuse(0.2), diffuse(0.8), Surface::Mirror { tint: Vec3::ONE }]);
         let (a, b) = (vec3(1.9, 0.2, 0.1), vec3(-0.3, 0.3, -1.8));
-        for &material in materials {
-            add_quad(&mut scene, vec3(-0.9, -0.1, 0.8), a, b, material);
+        for &(size, material) in quads {
+            let corner = vec3(-0.9, -0.1, 0.8) + 0.5 * (1.0 - size) * (a + b);
+            add_quad(&mut scene, corner, size * a, size * b, material);
         }
         scene.lights.push(point_light(vec3(0.0, 2.0, 0.0), 1.0));
-        scene.cameras.push(camera(eye, Vec3::splat(0.1), 20.0));
+        scene.cameras.push(camera(eye, vec3(-0.1, 0.15, -0.05), 20.0));
         let frame = render_scene(&scene, &settings(Mode::DirectRays, 1000, 24)).frame;
         frame.albedo().iter().map(|albedo| albedo[0]).collect::<Vec<_>>()
     };
-    // From any point each half of the quad has one colour: a row changes colour at the diagonal
-    // only.
     for eye in [vec3(0.3, 2.0, 0.4), vec3(-1.0, 1.5, 1.0), vec3(0.2, 3.0, -0.4)] {
-        let both = seen(&[0, 1], eye);
-        let changes = |row: &[f32]| row.windows(2).filter(|pair| pair[0] != pair[1]).count();
-        assert!(both.chunks(24).all(|row| changes(row) <= 1), "speckled from {eye}");
-        assert!(both.iter().all(|albedo| [0.2, 0.8].contains(albedo)), "a hole from {eye}");
+        let all = |quads: &[(f32, u32)], right: f32| seen(quads, eye).iter().all(|albedo| *albedo == right);
+        assert!(all(&[(1.0, 0), (1.0, 1)], 0.2) && all(&[(1.0, 1), (1.0, 0)], 0.8), "not the first from {eye}");
+        assert!(all(&[(1.7, 0), (1.0, 1)], 0.8) && all(&[(1.0, 1), (1.7, 0)], 0.8), "not the smaller from {eye}");
+        assert!(all(&[(1.7, 0), (1.0, 2)], 1.0) && all(&[(1.0, 0), (1.7, 2)], 0.2), "not the smaller from {eye}");
+        assert!(all(&[(1.0, 0)], 0.2) && all(&[(1.0, 1)], 0.8) && all(&[(1.0, 2)], 1.0), "control: alone from {eye}");
     }
-    let eye = vec3(0.3, 2.0, 0.4);
-    assert!(seen(&[0], eye)[0] == 0.2 && seen(&[1], eye)[0] == 0.8, "control: alone each is seen");
 }
 
 #[test]
