@@ -1,7 +1,7 @@
 //! Geometry on which rounding errors would show.
 
 use caustica::{
-    scene::{Light, LightKind, Scene, Triangle},
+    scene::{Light, LightKind, Scene, Surface, Triangle},
     settings::{Mode, Settings},
     stats::NonFinite,
 };
