@@ -110,6 +110,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         TRANSMITS_BIT,
         CONTACT_BIT,
         RANK_SHIFT,
+        MAX_RANK,
         ID_MASK,
         ALPHA_BIT,
         DIFFUSE,
