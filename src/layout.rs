@@ -619,11 +619,11 @@ pub const CAUSTIC_MAP: u32 = 1;
 pub const MAP_KINDS: u32 = 2;
 
 /// Key of a staged photon. The lowest bits ([`PATH_MASK`]) are the index of the path in its batch.
-/// From bit [`PLACE_SHIFT`] on, the bits of [`PLACE_MASK`] are the photon's number on its path.
-/// From bit [`KIND_SHIFT`] on comes the kind of the map.
+/// From bit [`PHOTON_INDEX_SHIFT`] on, the bits of [`PHOTON_INDEX_MASK`] are the photon's index
+/// among those of its path in that map. From bit [`KIND_SHIFT`] on comes the kind of the map.
 pub const PATH_MASK: u32 = 0x3_ffff;
-pub const PLACE_SHIFT: u32 = 18;
-pub const PLACE_MASK: u32 = 0xfff;
+pub const PHOTON_INDEX_SHIFT: u32 = 18;
+pub const PHOTON_INDEX_MASK: u32 = 0xfff;
 pub const KIND_SHIFT: u32 = 30;
 
 /// Arguments of `store_photons`; see there.
@@ -831,7 +831,7 @@ pub struct RecordGrid {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct IrradianceCell {
     /// Coordinates of the cell, in cells of its level.
-    pub place: [i32; 3],
+    pub coordinates: [i32; 3],
     /// Level + 1; 0: no entry.
     pub level: u32,
     /// The point that speaks for the cell, metres, and its geometric normal.
@@ -891,7 +891,7 @@ pub struct Cell {
 /// Position and incident direction of a sorted photon: all that a search reads.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct PhotonPlace {
+pub struct PhotonPosition {
     /// Metres.
     pub position: [f32; 3],
     /// Direction to where the photon came from, octahedral.

@@ -87,8 +87,8 @@ pub fn status(args: &StatusArgs) -> Result<()> {
     for parts in &found.windows {
         let window = parts.window;
         let passes: Vec<_> = parts.passes().iter().map(ToString::to_string).collect();
-        let place = format!("{},{},{},{}", window.column, window.row, window.width, window.height);
-        line("pixels", &format!("{place}: passes {} in {} parts", passes.join(", "), parts.parts.len()));
+        let rectangle = format!("{},{},{},{}", window.column, window.row, window.width, window.height);
+        line("pixels", &format!("{rectangle}: passes {} in {} parts", passes.join(", "), parts.parts.len()));
     }
     missing.iter().for_each(|missing| line("missing", missing));
     found.overlaps.iter().for_each(|overlap| line("twice", overlap));

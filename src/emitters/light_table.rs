@@ -110,10 +110,10 @@ impl LightTable {
     /// builds the trees.
     fn plant_trees(&mut self, environment: Option<&EnvironmentMap>) {
         let count = |kinds: &[u32]| self.lights.iter().filter(|light| kinds.contains(&light.kind)).count();
-        let sums_places = count(&[layout::POINT_LIGHT, layout::SPOT_LIGHT]) <= MAX_SUMMED;
+        let sums_punctual = count(&[layout::POINT_LIGHT, layout::SPOT_LIGHT]) <= MAX_SUMMED;
         let sums_directions = count(&[layout::DIRECTIONAL_LIGHT]) <= MAX_SUMMED;
         let root = |light: &layout::Light| match light.kind {
-            layout::POINT_LIGHT | layout::SPOT_LIGHT if sums_places => PUNCTUAL_ROOT,
+            layout::POINT_LIGHT | layout::SPOT_LIGHT if sums_punctual => PUNCTUAL_ROOT,
             layout::DIRECTIONAL_LIGHT => DIRECTIONAL_ROOT,
             layout::ENVIRONMENT_LIGHT => layout::ENVIRONMENT_ROOT,
             _ => EMITTER_ROOT,

@@ -46,7 +46,7 @@ struct Item {
 
 /// A part of a tree.
 struct Subtree {
-    /// Its uppermost node, which the caller puts in its place.
+    /// Its uppermost node, which the caller stores.
     node: LightNode,
     bounds: LightBounds,
 }
@@ -219,9 +219,9 @@ mod tests {
 
     #[test]
     fn every_light_that_shines_has_one_leaf() {
-        let place = |i: usize| vec3((i as f32 * 0.7).sin(), (i as f32 * 1.3).cos(), i as f32 * 0.01);
+        let position = |i: usize| vec3((i as f32 * 0.7).sin(), (i as f32 * 1.3).cos(), i as f32 * 0.01);
         let kind = |i: usize| if i.is_multiple_of(2) { TRIANGLE_LIGHT } else { POINT_LIGHT };
-        let lights: Vec<Light> = (0..20_000).map(|i| light(place(i), kind(i))).collect();
+        let lights: Vec<Light> = (0..20_000).map(|i| light(position(i), kind(i))).collect();
         let all = trees(&lights, |i| if i % 5 == 0 { 0.0 } else { 1.0 + i as f64 });
         assert!(depth_of(&all) < MAX_UNEVEN_DEPTH);
         for (i, leaf) in all.leaves.iter().enumerate() {

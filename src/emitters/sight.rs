@@ -16,10 +16,10 @@ const MAX_CAMERAS: usize = 16;
 /// that they see.
 const RAYS: u32 = 64;
 const BOUNCES: u32 = 2;
-/// Side of the blocks of rays; and points next to each other whose rays tell of one place.
+/// Side of the blocks of rays; and points next to each other whose rays are counted together.
 const BLOCK: usize = 8;
 const POINTS_TOGETHER: usize = 64;
-/// Part of the places that are less enclosed than the one that tells.
+/// Fraction of those groups of points that are less enclosed than the one that decides.
 const ENCLOSED: f64 = 0.9;
 /// Maximum number of mirrors and panes that a ray passes.
 const MAX_CHAIN: u32 = 12;

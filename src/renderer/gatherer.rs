@@ -199,11 +199,11 @@ impl Gatherer for MapGatherer<'_> {
             stats.seconds.gather += seconds;
             tally::add_step(stats, step);
             for (pixel, slots) in (0..).zip(found.chunks(coarse.tracer.branches() as usize)) {
-                let Some(place) = coarse.tracer.pixel(tile, pixel) else { continue };
+                let Some(pixel) = coarse.tracer.pixel(tile, pixel) else { continue };
                 for (branch, (point, (light, arriving))) in
                     (0..).zip(slots).filter(|(_, (point, _))| point.next_map != 0)
                 {
-                    taken.put(place, branch, point, *light, arriving, coarse.final_rays());
+                    taken.put(pixel, branch, point, *light, arriving, coarse.final_rays());
                 }
             }
         }
@@ -327,13 +327,13 @@ impl Searches<'_> {
         pass: &CameraPass,
         (maps, settings): (&PhotonMaps, &EstimateSettings),
         tile: &Tile,
-        (places, ends): (&[usize], &Buffer),
+        (indices, ends): (&[usize], &Buffer),
         progress: &dyn Progress,
     ) -> Result<()> {
-        let found = self.estimates_at(pass, maps, settings, (ends, places.len() as u32), progress)?;
+        let found = self.estimates_at(pass, maps, settings, (ends, indices.len() as u32), progress)?;
         let mut radiance = pass.radiance(tile)?;
-        for (&place, (light, _)) in places.iter().zip(found) {
-            (0..3).for_each(|c| radiance[place][c] += light[c]);
+        for (&index, (light, _)) in indices.iter().zip(found) {
+            (0..3).for_each(|c| radiance[index][c] += light[c]);
         }
         pass.set_radiance(&radiance);
         Ok(())
@@ -386,6 +386,6 @@ fn kd_estimates(
 
 /// Reads a map's photons back and builds a kd-tree of them.
 fn kd_map(gpu: &Gpu, map: &PhotonMap) -> Result<KdMap> {
-    let (places, fluxes) = map.read(gpu)?;
-    Ok(KdMap::new(places, fluxes, map.emitted()))
+    let (photons, fluxes) = map.read(gpu)?;
+    Ok(KdMap::new(photons, fluxes, map.emitted()))
 }

@@ -252,9 +252,9 @@ fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSetti
     let window = picture.window(size);
     let along = |pixels: u32, origin: u32, count: u32| {
         let side = pixels.div_ceil(spacing);
-        let place = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
-        let first = place(origin).saturating_sub(reach + 1);
-        (side, first, (place(origin + count) + reach + 2).min(side) - first)
+        let scaled = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
+        let first = scaled(origin).saturating_sub(reach + 1);
+        (side, first, (scaled(origin + count) + reach + 2).min(side) - first)
     };
     let (columns, column, width) = along(size.0, window.column, window.width);
     let (rows, row, height) = along(size.1, window.row, window.height);

@@ -24,7 +24,7 @@ const MAX_PARTS: u64 = 65_536;
 const POINTS_PER_TEXEL: f32 = 2.0;
 const POINTS: [u32; 2] = [4, 32];
 
-/// Place of a part in its triangle.
+/// Position of a part in its triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Part {
     /// Its corner nearest to the triangle's first corner is that many parts along its edges.
@@ -44,8 +44,8 @@ impl Part {
     /// Weights of the triangle's second and third corner where those of the part's are `weights`.
     pub fn weights(self, side: u32, weights: Vec2) -> Vec2 {
         let corner = Vec2::new(self.column as f32, self.row as f32);
-        let place = if self.is_turned { corner + 1.0 - weights } else { corner + weights };
-        place / side as f32
+        let scaled = if self.is_turned { corner + 1.0 - weights } else { corner + weights };
+        scaled / side as f32
     }
 }
 
@@ -187,10 +187,10 @@ impl<'a> EmissionMap<'a> {
         maps.map(|map| map.extent(own.uvs[map.texture.uv_set as usize])).fold(0.0, f32::max)
     }
 
-    /// Whether the factor can be above 0 in a part; `place` gives weights in the triangle for those
-    /// in the part.
-    fn is_lit(&self, triangle: &Triangle, own: &Attributes, place: impl Fn(Vec2) -> Vec2) -> bool {
-        let corners = [Vec2::ZERO, Vec2::X, Vec2::Y].map(place);
+    /// Whether the factor can be above 0 in a part; `to_triangle` gives weights in the triangle for
+    /// those in the part.
+    fn is_lit(&self, triangle: &Triangle, own: &Attributes, to_triangle: impl Fn(Vec2) -> Vec2) -> bool {
+        let corners = [Vec2::ZERO, Vec2::X, Vec2::Y].map(to_triangle);
         let lit = |map: &TexelMap<'_>| {
             let uvs = own.uvs[map.texture.uv_set as usize];
             map.is_lit(corners.map(|weights| interpolated(uvs, weights)))
@@ -245,9 +245,9 @@ mod tests {
                 assert_eq!(before, i as u32);
                 let middle = part.weights(side, Vec2::splat(1.0 / 3.0));
                 assert!(middle.min_element() > 0.0 && middle.element_sum() < 1.0, "{part:?} lies outside");
-                let place = middle * side as f32;
-                assert_eq!((place.floor() - Vec2::new(part.column as f32, part.row as f32)).length(), 0.0);
-                assert_eq!(place.fract().element_sum() > 1.0, part.is_turned);
+                let scaled = middle * side as f32;
+                assert_eq!((scaled.floor() - Vec2::new(part.column as f32, part.row as f32)).length(), 0.0);
+                assert_eq!(scaled.fract().element_sum() > 1.0, part.is_turned);
             }
         }
     }

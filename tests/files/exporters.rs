@@ -152,9 +152,9 @@ fn shown(scene: &Scene) -> impl PartialEq + std::fmt::Debug + use<> {
         scene.attributes.iter().map(|attributes| attributes.uvs[0].map(at)).collect::<Vec<_>>()
     };
     let tangents: Vec<_> = scene.attributes.iter().map(|attributes| attributes.tangents).collect();
-    let places = [sampled(color.0), sampled(normal.0)];
+    let samples = [sampled(color.0), sampled(normal.0)];
     let lights = (scene.lights.clone(), scene.cameras.clone(), scene.center);
-    ((scene.triangles.clone(), tangents, places), (material, color.1, normal.1), lights)
+    ((scene.triangles.clone(), tangents, samples), (material, color.1, normal.1), lights)
 }
 
 #[test]

@@ -64,12 +64,12 @@ fn twins() -> Vec<Twin> {
         ArrivingLight { direction, light, nearness, pad0, pad1, pad2 }
         IrradianceRecord { position, ng, irradiance, direction_and_reach }
         RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, window }
-        IrradianceCell { place, level, position, split, normal, pad0, irradiance, pad1 }
+        IrradianceCell { coordinates, level, position, split, normal, pad0, irradiance, pad1 }
         FirstHit { normal, depth, albedo, alpha, position, id, uv, pad0, pad1 }
         DirectLight { light, points, pad0, pad1 }
         EmitterSample { points, sample, samples, roots }
         Cell { lo, wi_lo, hi, wi_hi }
-        PhotonPlace { position, wi }
+        PhotonPosition { position, wi }
         PhotonFlux { flux, normal }
         MapInfo { count, levels, split, pad }
         GatherInfo { count, first, neighbors, fixed_radius, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, map_number, pad0, pad1 }
@@ -160,8 +160,8 @@ fn constants() -> Vec<(&'static str, f64)> {
         CAUSTIC_MAP,
         MAP_KINDS,
         PATH_MASK,
-        PLACE_SHIFT,
-        PLACE_MASK,
+        PHOTON_INDEX_SHIFT,
+        PHOTON_INDEX_MASK,
         KIND_SHIFT,
         SAMPLER_RANDOM,
         SAMPLER_SOBOL,
@@ -176,8 +176,8 @@ fn constants() -> Vec<(&'static str, f64)> {
         GATHER_STATE_BYTES,
         MAX_WORKGROUPS,
         PATH_MASK,
-        PLACE_SHIFT,
-        PLACE_MASK,
+        PHOTON_INDEX_SHIFT,
+        PHOTON_INDEX_MASK,
         KEY_BITS,
         PACKET_BLOCK,
         QUERY_BLOCK,
@@ -384,7 +384,7 @@ fn bound_names(wgsl: &str) -> Vec<String> {
 const GOOD: &str = "
     const WORKGROUP_SIZE: u32 = 64u;
     const SPHERE_BIT = 1u << 31u;
-    const PLACE_MASK = 0xfffu;
+    const PHOTON_INDEX_MASK = 0xfffu;
     struct Photon { position: vec3f, wi: u32, flux: vec3f, normal: u32 }
     struct Path {
         origin: vec3f, history: u32, direction: vec3f, bounces: u32, beta: vec3f, left: u32, media: array<u32, 4>,
@@ -411,7 +411,7 @@ fn each_kind_of_disagreement_is_reported() {
         (", normal: u32 }", ", normal: u32, more: u32 }", "Photon takes"),
         ("SPHERE_BIT = 1u << 31u", "SPHERE_BIT = 1u << 30u", "SPHERE_BIT is"),
         ("= 64u", "= 32u", "WORKGROUP_SIZE is"),
-        ("PLACE_MASK = 0xfffu", "PLACE_MASK = 0x7ffu", "PLACE_MASK is"),
+        ("PHOTON_INDEX_MASK = 0xfffu", "PHOTON_INDEX_MASK = 0x7ffu", "PHOTON_INDEX_MASK is"),
         ("@workgroup_size(WORKGROUP_SIZE)", "@workgroup_size(8, 8)", "workgroups of"),
         ("media: array<u32, 4>", "media: array<Stranger, 4>", "Stranger lies in a buffer"),
         ("struct Photon", "@group(2) @binding(1) var<storage> s: array<SearchState>; struct Photon", "SearchState"),

@@ -29,9 +29,9 @@ impl IrradianceCache {
         irradiances: &mut Irradiances,
     ) -> Result<Option<Self>> {
         let Some(table) = CellTable::build(marks, spacing, irradiances)? else { return Ok(None) };
-        let CellTable { places, per_metre, levels } = table;
-        let grid = CellGrid { per_metre, levels, mask: places.len() as u32 - 1, ..CellGrid::default() };
-        let cells = gpu.storage_with("irradiance cells", &places)?;
+        let CellTable { slots, per_metre, levels } = table;
+        let grid = CellGrid { per_metre, levels, mask: slots.len() as u32 - 1, ..CellGrid::default() };
+        let cells = gpu.storage_with("irradiance cells", &slots)?;
         Ok(Some(Self { kernel: Kernel::new(gpu, "reuse_irradiance", &[]), cells, grid }))
     }
 

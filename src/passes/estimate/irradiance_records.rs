@@ -85,7 +85,7 @@ impl Records {
         self.distances[slot] = rays as f32 / arriving.nearness;
     }
 
-    /// All records, with their reach. `radius`: that of the filter at a place, metres.
+    /// All records, with their reach. `radius`: that of the filter at a position, metres.
     #[must_use]
     pub fn finish(mut self, radius: impl Fn(Vec3) -> f32) -> Vec<IrradianceRecord> {
         for slot in 0..self.records.len() {

@@ -4,8 +4,8 @@
 //! Photons come unsorted in a [`PhotonStore`]: windows of `array<Photon>`, each within one binding
 //! (4,194,304 photons where a binding holds 128 MiB, so that up to that number there is one
 //! window). [`PhotonMap::build`] sorts them along a Hilbert curve of 20 bits per axis. It splits
-//! each photon into the data that a search reads (`places`: position and direction, 16 bytes) and
-//! the data that only an estimate reads (`fluxes`, 16 bytes). Arrays that exceed a binding are
+//! each photon into the data that a search reads (`positions`: position and direction, 16 bytes)
+//! and the data that only an estimate reads (`fluxes`, 16 bytes). Arrays that exceed a binding are
 //! split into two windows.
 //!
 //! The grid is built over the sorted photons. A cell of the finest level holds 16 consecutive
@@ -22,7 +22,7 @@ use super::{
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu},
-    layout::{MapInfo, PhotonFlux, PhotonPlace},
+    layout::{MapInfo, PhotonFlux, PhotonPosition},
 };
 
 /// The kernels that build a map.
@@ -39,7 +39,7 @@ impl MapKernels {
     /// Compiles them.
     #[must_use]
     pub fn new(gpu: &Gpu) -> Self {
-        Self::windowed(gpu, window_elements::<PhotonPlace>(gpu))
+        Self::windowed(gpu, window_elements::<PhotonPosition>(gpu))
     }
 
     /// Has them compiled ahead of their use.
@@ -61,7 +61,7 @@ pub struct PhotonMap {
     emitted: u64,
     info: Buffer,
     cells: Buffer,
-    places: Vec<Buffer>,
+    positions: Vec<Buffer>,
     fluxes: Vec<Buffer>,
 }
 
@@ -78,19 +78,19 @@ impl PhotonMap {
             return Err(too_many(gpu, count.into()));
         }
         let entries = kernels.sort.order(gpu, &kernels.radix, &photons, count)?;
-        let (mut places, mut fluxes) = (Vec::new(), Vec::new());
+        let (mut positions, mut fluxes) = (Vec::new(), Vec::new());
         for first in (0..count.max(1)).step_by(window as usize) {
             let size = u64::from(window.min(count - first));
-            places.push(gpu.storage::<PhotonPlace>("photon places", size)?);
+            positions.push(gpu.storage::<PhotonPosition>("photon places", size)?);
             fluxes.push(gpu.storage::<PhotonFlux>("photon fluxes", size)?);
         }
-        kernels.sort.fetch(gpu, &entries, &photons, count, (&places, &fluxes, window));
+        kernels.sort.fetch(gpu, &entries, &photons, count, (&positions, &fluxes, window));
         drop(entries);
         drop(photons);
-        let (cells, levels) = kernels.grid.build(gpu, &places, window, count)?;
+        let (cells, levels) = kernels.grid.build(gpu, &positions, window, count)?;
         let info = gpu.uniform("map info", &MapInfo { count, levels, split: window, pad: 0 });
         gpu.wait()?;
-        Ok(Self { count, emitted, info, cells, places, fluxes })
+        Ok(Self { count, emitted, info, cells, positions, fluxes })
     }
 
     /// Photons in the map.
@@ -108,18 +108,18 @@ impl PhotonMap {
     /// Windows that the photons lie in, 1 or 2: the kernels' override `WINDOWS`.
     #[must_use]
     pub fn windows(&self) -> u32 {
-        self.places.len() as u32
+        self.positions.len() as u32
     }
 
     /// The buffers of bind group 1 by name.
     #[must_use]
     pub fn bindings(&self) -> [(&'static str, &Buffer); 6] {
-        let high = self.places.len() - 1;
+        let high = self.positions.len() - 1;
         [
             ("map_info", &self.info),
             ("cells", &self.cells),
-            ("places_low", &self.places[0]),
-            ("places_high", &self.places[high]),
+            ("positions_low", &self.positions[0]),
+            ("positions_high", &self.positions[high]),
             ("fluxes_low", &self.fluxes[0]),
             ("fluxes_high", &self.fluxes[high]),
         ]
@@ -129,14 +129,14 @@ impl PhotonMap {
     ///
     /// # Errors
     /// [`crate::Error::Gpu`] if the driver fails.
-    pub fn read(&self, gpu: &Gpu) -> Result<(Vec<PhotonPlace>, Vec<PhotonFlux>)> {
-        let (mut places, mut fluxes) = (Vec::new(), Vec::new());
-        for (place, flux) in self.places.iter().zip(&self.fluxes) {
-            let left = u64::from(self.count) - places.len() as u64;
-            let size = left.min(place.size() / size_of::<PhotonPlace>() as u64);
-            places.extend(gpu.read::<PhotonPlace>(place, 0, size)?);
+    pub fn read(&self, gpu: &Gpu) -> Result<(Vec<PhotonPosition>, Vec<PhotonFlux>)> {
+        let (mut positions, mut fluxes) = (Vec::new(), Vec::new());
+        for (position, flux) in self.positions.iter().zip(&self.fluxes) {
+            let left = u64::from(self.count) - positions.len() as u64;
+            let size = left.min(position.size() / size_of::<PhotonPosition>() as u64);
+            positions.extend(gpu.read::<PhotonPosition>(position, 0, size)?);
             fluxes.extend(gpu.read::<PhotonFlux>(flux, 0, size)?);
         }
-        Ok((places, fluxes))
+        Ok((positions, fluxes))
     }
 }

@@ -3,7 +3,7 @@
 use crate::{
     error::{Error, Result},
     gpu::{Buffer, Gpu},
-    layout::{Photon, PhotonPlace},
+    layout::{Photon, PhotonPosition},
 };
 
 /// Maximum number of windows of a sorted map; `shaders/bindings/photon_map.wesl` binds that many.
@@ -95,7 +95,7 @@ fn elements_within<T>(binding: u64) -> u32 {
 
 /// Maximum number of photons of a map, where bindings have that many bytes.
 fn most_photons(binding: u64) -> u64 {
-    MAX_WINDOWS as u64 * u64::from(elements_within::<PhotonPlace>(binding))
+    MAX_WINDOWS as u64 * u64::from(elements_within::<PhotonPosition>(binding))
 }
 
 /// Fails if a map of so many photons cannot be built. Called before any photon is traced.

@@ -87,11 +87,11 @@ impl SortPhotons {
         entries: &Buffer,
         photons: &PhotonStore,
         count: u32,
-        (places, fluxes, window): (&[Buffer], &[Buffer], u32),
+        (positions, fluxes, window): (&[Buffer], &[Buffer], u32),
     ) {
         let mut encoder = gpu.encoder();
         let mut steps = Vec::new();
-        for ((place, flux), first) in places.iter().zip(fluxes).zip((0..).step_by(window as usize)) {
+        for ((position, flux), first) in positions.iter().zip(fluxes).zip((0..).step_by(window as usize)) {
             let size = window.min(count - first);
             for (unsorted, from, part) in photons.parts(count) {
                 let move_step =
@@ -100,7 +100,7 @@ impl SortPhotons {
                 let buffers = [
                     ("entries", entries),
                     ("photons", unsorted),
-                    ("places", place),
+                    ("positions", position),
                     ("fluxes", flux),
                     ("move_step", &step),
                 ];

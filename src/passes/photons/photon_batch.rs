@@ -4,7 +4,7 @@ use super::raw_map::RawMap;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{Counters, MAP_KINDS, PLACE_MASK, Photon, PhotonBatch, Store},
+    layout::{Counters, MAP_KINDS, PHOTON_INDEX_MASK, Photon, PhotonBatch, Store},
     map_kind::MapKind,
     passes::wavefront::{Step, Wavefront},
     settings::{MAX_BOUNCES, Sampler},
@@ -15,7 +15,7 @@ use crate::{
 /// again in smaller batches.
 const STAGED_PER_PATH: u64 = 2;
 
-const _: () = assert!(MAX_BOUNCES <= PLACE_MASK, "a key has room for the photons of a path");
+const _: () = assert!(MAX_BOUNCES <= PHOTON_INDEX_MASK, "a key has room for the photons of a path");
 
 /// Kernels of the photon pass.
 #[derive(Debug)]
@@ -31,7 +31,7 @@ pub(crate) struct BatchBuffers {
     staged: Buffer,
     staged_keys: Buffer,
     counts: Buffer,
-    places: Buffer,
+    offsets: Buffer,
     /// Photons stored of each group of lights, `u32`.
     pub light_photons: Buffer,
     pub staging_capacity: u64,
@@ -91,7 +91,7 @@ impl PhotonKernels {
         first_path: u64,
     ) -> Result<()> {
         let counts = result.counts.iter().skip(kind as usize).step_by(MAP_KINDS as usize);
-        gpu.write(&buffers.places, 0, &map.place(counts.copied(), first_path));
+        gpu.write(&buffers.offsets, 0, &map.assign_offsets(counts.copied(), first_path));
         let mut encoder = gpu.encoder();
         for (window, first_photon, photons) in map.photons.parts(map.stored as u32) {
             let staged = result.counters.staged;
@@ -102,7 +102,7 @@ impl PhotonKernels {
                     ("store", &uniform),
                     ("staged", &buffers.staged),
                     ("staged_keys", &buffers.staged_keys),
-                    ("places", &buffers.places),
+                    ("offsets", &buffers.offsets),
                     ("paths", &buffers.wavefront.paths),
                     ("light_photons", &buffers.light_photons),
                     ("photons", window),
@@ -124,7 +124,7 @@ impl BatchBuffers {
             staged: gpu.storage::<Photon>("staged photons", staging_capacity)?,
             staged_keys: gpu.storage::<u32>("keys of staged photons", staging_capacity)?,
             counts: gpu.storage::<u32>("photon counts", paths * u64::from(MAP_KINDS))?,
-            places: gpu.storage::<u32>("photon places", paths)?,
+            offsets: gpu.storage::<u32>("photon places", paths)?,
             light_photons: gpu.storage::<u32>("photons of lights", groups as u64)?,
             staging_capacity,
         })

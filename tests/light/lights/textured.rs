@@ -126,7 +126,7 @@ fn half_covered_lamps_give_half_the_light() {
     assert!(!within(flux(0.55), right, 0.01), "control: {} W", flux(0.55));
 }
 
-/// Irradiance of the floor at a point by small patches of the lamp, with a factor of their place
+/// Irradiance of the floor at a point by small patches of the lamp, with a factor of their position
 /// along x.
 fn by_patches(point: Vec3, factor: impl Fn(f64) -> f64) -> f64 {
     const PATCHES: usize = 400;
