@@ -20,7 +20,7 @@ use crate::{
 const TOLERANCE: f64 = 1.0 / (1 << 21) as f64;
 /// Largest sine of the angle between the planes of two surfaces that are one.
 const MAX_SINE: f64 = 1e-3;
-/// Part of the size of the smaller triangle by which two must overlap.
+/// Fraction of the size of the smaller triangle by which two must overlap.
 const MIN_OVERLAP: f64 = 1e-4;
 
 /// The triangles of one material in one object, or its spheres.

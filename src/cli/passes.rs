@@ -10,7 +10,7 @@ use std::{
 use caustica::{
     Error, Result,
     gpu::Gpu,
-    image::{Attributes, Block, ErrorEstimate, Frame, PassSum, differences, read_part, write_part},
+    image::{Attributes, ErrorEstimate, Frame, PassBlock, PassSum, differences, read_part, write_part},
     progress::{Progress, Stage},
     renderer::{LightGroups, Progressive, size_of},
     scene::Scene,
@@ -106,7 +106,7 @@ fn run(inputs: &Inputs, range: PassRange, started: Instant, done: &mut Done) -> 
     loop {
         let (film, stats) = groups.film(|group, _| progressive[group].render(next, &stages))?;
         stages.shown.store(false, Ordering::Relaxed);
-        done.sum.push(Block::of_pass(next, film, &stats))?;
+        done.sum.push(PassBlock::of_pass(next, film, &stats))?;
         match done.passes {
             0 => done.stats = stats,
             _ => done.stats.add(&stats),
@@ -153,7 +153,7 @@ fn estimate(inputs: &Inputs, done: &Done) -> Result<Option<ErrorEstimate>> {
     Ok(total.and_then(|total| ErrorEstimate::of(total.film(), options.region)))
 }
 
-/// Part of the run that is done, and seconds left.
+/// Fraction of the run that is done, and seconds left.
 fn outlook(time: Option<Duration>, range: PassRange, next: u32, elapsed: Duration, each: Duration) -> (f64, f64) {
     let of_passes = f64::from(next - range.first) / f64::from(range.count());
     let passes_left = each.as_secs_f64() * f64::from(range.end - next);

@@ -58,7 +58,7 @@ impl LightBounds {
             layout::ENVIRONMENT_LIGHT => (point(Vec3::ZERO), Vec3::Y, PI, 0.0),
             _ => (point(position), Vec3::Y, PI, FRAC_PI_2),
         };
-        // A light whose share of the sum is too small for a float is chosen nevertheless.
+        // A light whose fraction of the sum is too small for a float is chosen nevertheless.
         let weak = intensity.max(f32::MIN_POSITIVE.into()) as f32;
         let is_finite =
             (bounds.max - bounds.min).length_squared().is_finite() && axis.is_finite() && axis != Vec3::ZERO;

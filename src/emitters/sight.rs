@@ -25,7 +25,7 @@ const ENCLOSED: f64 = 0.9;
 const MAX_CHAIN: u32 = 12;
 /// Minimum number of points that spheres are made of.
 const MIN_POINTS: usize = 64;
-/// Part of the points within the smallest sphere. The spheres have one centre.
+/// Fraction of the points within the smallest sphere. The spheres have one centre.
 const QUANTILE: f64 = 0.5;
 /// Factor on its radius, for what lies at the border.
 const MARGIN: f32 = 1.2;
@@ -44,8 +44,8 @@ pub struct Sight {
     /// Spheres around that and what lies around it, from the smallest to the largest; none if that
     /// is most of the scene.
     pub targets: Vec<Target>,
-    /// Part of the light that leaves a surface, 0 to 1, which meets another one: exceeded by that
-    /// of a tenth of what the cameras see. 1 if they see nothing diffuse.
+    /// Fraction of the light that leaves a surface, 0 to 1, which meets another one: exceeded by
+    /// that of a tenth of what the cameras see. 1 if they see nothing diffuse.
     pub enclosure: f64,
 }
 
@@ -67,21 +67,22 @@ struct SeenPoint {
     around: Vec<Vec3>,
 }
 
-/// Points that lie near each other follow each other in the list: their rays together tell a part.
+/// Points that lie near each other follow each other in the list: their rays together give one
+/// fraction.
 fn enclosure(seen: &[SeenPoint]) -> f64 {
-    let part = |points: &[SeenPoint]| {
+    let fraction = |points: &[SeenPoint]| {
         let met: usize = points.iter().map(|point| point.around.len()).sum();
         met as f64 / (points.len() * BOUNCES as usize) as f64
     };
-    let mut parts: Vec<f64> = seen.chunks(POINTS_TOGETHER).map(part).collect();
-    parts.sort_by(f64::total_cmp);
-    parts.get((ENCLOSED * parts.len() as f64) as usize).copied().unwrap_or(1.0)
+    let mut fractions: Vec<f64> = seen.chunks(POINTS_TOGETHER).map(fraction).collect();
+    fractions.sort_by(f64::total_cmp);
+    fractions.get((ENCLOSED * fractions.len() as f64) as usize).copied().unwrap_or(1.0)
 }
 
 /// What the camera sees, block by block of the picture.
 fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<SeenPoint> {
     let aspect = camera.aspect.filter(|aspect| *aspect > 0.0).unwrap_or(1.0);
-    let side = |part: f32| ((RAYS as f32 * part) as u32).max(1);
+    let side = |fraction: f32| ((RAYS as f32 * fraction) as u32).max(1);
     let size = (side(aspect.min(1.0)), side((1.0 / aspect).min(1.0)));
     let half_height = camera.half_height_at(1.0, size);
     let half = (half_height * size.0 as f32 / size.1 as f32, half_height);

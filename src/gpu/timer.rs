@@ -1,4 +1,4 @@
-//! The device's own clock: the duration of each part of a dispatch, known once the device has
+//! The device's own clock: the duration of each chunk of a dispatch, known once the device has
 //! finished it.
 
 use std::{
@@ -11,19 +11,19 @@ use std::{
 
 use super::pace::Pace;
 
-/// Maximum number of parts of a submission that are timed.
+/// Maximum number of chunks of a submission that are timed.
 const ROOM: usize = 128;
 /// Size of a time, bytes.
 const TIME: u64 = size_of::<u64>() as u64;
 
-/// A part that is timed.
+/// A chunk that is timed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timed {
     pub stem: &'static str,
     pub invocations: u64,
 }
 
-/// The timed parts of a submission, in order.
+/// The timed chunks of a submission, in order.
 #[derive(Debug, Default)]
 pub(super) struct Timings(Vec<Timed>);
 
@@ -33,7 +33,7 @@ impl Timings {
     }
 }
 
-/// Times when parts of submissions began and ended.
+/// Times when chunks of submissions began and ended.
 #[derive(Debug)]
 pub(super) struct Timer {
     set: wgpu::QuerySet,
@@ -72,9 +72,9 @@ impl Timer {
     }
 
     /// The queries that a pass writes when it begins and ends.
-    pub fn time<'t>(&'t self, timings: &mut Timings, part: Timed) -> wgpu::ComputePassTimestampWrites<'t> {
+    pub fn time<'t>(&'t self, timings: &mut Timings, chunk: Timed) -> wgpu::ComputePassTimestampWrites<'t> {
         let query = 2 * timings.0.len() as u32;
-        timings.0.push(part);
+        timings.0.push(chunk);
         wgpu::ComputePassTimestampWrites {
             query_set: &self.set,
             beginning_of_pass_write_index: Some(query),
@@ -82,7 +82,7 @@ impl Timer {
         }
     }
 
-    /// Submits the commands and has the times of their parts read back.
+    /// Submits the commands and has the times of their chunks read back.
     pub fn submit(
         &self,
         device: &wgpu::Device,

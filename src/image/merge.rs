@@ -304,7 +304,7 @@ fn joined_frames((width, height): (u32, u32), frames: &[(Crop, Frame)]) -> Frame
 mod tests {
     use super::*;
     use crate::{
-        image::{Block, Film, PassSum, write_part},
+        image::{Film, PassBlock, PassSum, write_part},
         stats::Stats,
     };
 
@@ -321,7 +321,7 @@ mod tests {
                 film.add((column, row), &[[value, value, value, 0.0], [value; 4], [2.0; 4], [0.0; 4], [0.0; 4]], 2);
             }
             let film = film.with_bandwidth(1.0 / f64::from(index + 1));
-            sum.push(Block::of_pass(index, film, &Stats::default())).unwrap();
+            sum.push(PassBlock::of_pass(index, film, &Stats::default())).unwrap();
         }
         let attributes = [("version", version)].map(|(a, b)| (a.to_owned(), b.to_owned())).into();
         write_part(path, &sum, &attributes).unwrap();

@@ -19,7 +19,7 @@ use super::{
     film::{Bandwidth, ExtraSums, Film, Moments},
     frame::DataWindow,
     layers::{EXTRA_LAYERS, LAYERS, Rule, layer_index},
-    pass_sum::{Block, PassSum, is_block},
+    pass_sum::{PassBlock, PassSum, is_block},
 };
 use crate::{
     error::{Error, Result},
@@ -98,7 +98,7 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
     let shown = ["radiance", "alpha"].map(|name| LAYERS[layer_index(name)]);
     let mut channels: Vec<_> =
         shown.iter().flat_map(|layer| channels_of(frame.layer(layer.name), layer.channels, "")).collect();
-    for Block { range, film, .. } in &sum.blocks {
+    for PassBlock { range, film, .. } in &sum.blocks {
         let before = before(*range);
         for (i, layer) in LAYERS.iter().enumerate() {
             channels.extend(channels_of(&film.sums[i], layer.channels, &format!("{before}sum.")));
@@ -139,7 +139,7 @@ fn row_of_layers(film: &Film) -> (Vec<ExtraRow>, Vec<ExtraLayers>) {
     (film.extras.iter().map(row).collect(), film.mattes.iter().map(|matte| matte.of).collect())
 }
 
-fn row(block: &Block) -> BlockRow {
+fn row(block: &PassBlock) -> BlockRow {
     let (extras, mattes) = row_of_layers(&block.film);
     let Bandwidth { mean, deviations, inverse } = block.film.bandwidth;
     BlockRow {
@@ -247,7 +247,7 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             non_finite: row.non_finite,
         };
         let photons = ByKind { global: row.global, caustic: row.caustic };
-        blocks.push(Block { range: row.passes, film, photons });
+        blocks.push(PassBlock { range: row.passes, film, photons });
     }
     Ok((PartHeader { passes: range(&rows), attributes, whole, window }, PassSum { blocks }))
 }
@@ -297,7 +297,7 @@ mod tests {
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
             }
             let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3));
-            sum.push(Block::of_pass(index, film, &Stats::default())).expect("of one picture");
+            sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");
         }
         sum
     }

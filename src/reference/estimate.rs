@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Found, above::mean_part};
+use super::{Found, above::mean_transmittance};
 use crate::{
     density::Density,
     layout::{MAX_NORMAL_WEIGHT, PhotonFlux, PhotonPosition, VisiblePoint, from_octahedral},
@@ -47,6 +47,6 @@ pub fn estimate(
         }
     }
     let area = density.mean() * std::f64::consts::PI * r2 * emitted as f64;
-    let part = f64::from(mean_part(point));
-    std::array::from_fn(|c| f64::from(point.weight[c]) * part * sum[c] / area)
+    let transmittance = f64::from(mean_transmittance(point));
+    std::array::from_fn(|c| f64::from(point.weight[c]) * transmittance * sum[c] / area)
 }

@@ -13,7 +13,7 @@ use crate::{
     map_kind::MapKind,
     passes::{
         EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
-        PhotonMap, Records, StepCount, Tile, filter_window, record_spacing,
+        PhotonMap, Records, StepCount, Tile, filter_footprint, record_spacing,
     },
     progress::{Progress, Stage},
     reference::{Estimate, KdMap},
@@ -219,7 +219,7 @@ impl Gatherer for MapGatherer<'_> {
             columns_per_pixel: per_pixel(coarse.size.0, size.0),
             rows_per_pixel: per_pixel(coarse.size.1, size.1),
             reach,
-            window: filter_window(self.estimate.gather_radius, spacing),
+            footprint: filter_footprint(self.estimate.gather_radius, spacing),
         };
         let records = taken.finish(|position| reach * coarse.tracer.scale_at(position));
         self.records = Some(IrradianceRecords::new(coarse.gpu, &records, grid)?);

@@ -13,7 +13,7 @@ use crate::{
     image::{Film, Frame},
     passes::{
         CameraKernels, EstimateSharing, FinalGather, IrradianceCache, IrradianceRecords, MapKernels, PathRanges,
-        PhotonTracer, filter_window, record_spacing,
+        PhotonTracer, filter_footprint, record_spacing,
     },
     pixel_filter::PixelFilter,
     progress::{Progress, Stage},
@@ -248,7 +248,7 @@ impl<'a> Session<'a> {
 /// as far as the filter of records reaches.
 fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSettings, branches: u32) -> PictureSettings {
     let spacing = record_spacing(size, estimate.gather_spacing, branches);
-    let reach = filter_window(estimate.gather_radius, spacing);
+    let reach = filter_footprint(estimate.gather_radius, spacing);
     let window = picture.window(size);
     let along = |pixels: u32, origin: u32, count: u32| {
         let side = pixels.div_ceil(spacing);

@@ -83,9 +83,9 @@ impl TexelMap<'_> {
         if !self.texture.is_linear {
             return texel(0, 0);
         }
-        let part = corner - low;
-        let row = |dy: i64| texel(0, dy).lerp(texel(1, dy), part.x);
-        row(0).lerp(row(1), part.y)
+        let fraction = corner - low;
+        let row = |dy: i64| texel(0, dy).lerp(texel(1, dy), fraction.x);
+        row(0).lerp(row(1), fraction.y)
     }
 
     /// Whether the texture may be other than zero within a triangle of texture coordinates: some

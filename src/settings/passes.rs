@@ -15,8 +15,8 @@ use crate::error::Result;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PassSettings {
-    /// Part of the photons that a pass keeps, α, in [`Self::ALPHA`]: the smaller, the faster radii
-    /// shrink, and the more noise is left. 1: they do not shrink.
+    /// Fraction of the photons that a pass keeps, α, in [`Self::ALPHA`]: the smaller, the faster
+    /// radii shrink, and the more noise is left. 1: they do not shrink.
     pub alpha: f64,
 }
 

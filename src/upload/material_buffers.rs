@@ -149,33 +149,33 @@ fn record(material: &Material, unit: LightUnit, mut add: impl FnMut(&Texture, bo
         Alpha::Blend => BLEND_BIT,
     };
     let all = &material.textures;
-    let mut slot = |texture: &Option<Texture>, is_color| texture.as_ref().map_or(0, |t| add(t, is_color));
+    let mut row_of = |texture: &Option<Texture>, is_color| texture.as_ref().map_or(0, |t| add(t, is_color));
     let textures = [
         [
-            slot(&all.base_color, true),
-            slot(&all.metallic_roughness, false),
-            slot(&all.normal, false),
-            slot(&all.emission, true),
+            row_of(&all.base_color, true),
+            row_of(&all.metallic_roughness, false),
+            row_of(&all.normal, false),
+            row_of(&all.emission, true),
         ],
         [
-            slot(&all.specular, false),
-            slot(&all.specular_color, true),
-            slot(&all.transmission, false),
-            slot(&all.diffuse_transmission, false),
+            row_of(&all.specular, false),
+            row_of(&all.specular_color, true),
+            row_of(&all.transmission, false),
+            row_of(&all.diffuse_transmission, false),
         ],
         [
-            slot(&all.diffuse_transmission_color, true),
-            slot(&all.clearcoat, false),
-            slot(&all.clearcoat_roughness, false),
-            slot(&all.clearcoat_normal, false),
+            row_of(&all.diffuse_transmission_color, true),
+            row_of(&all.clearcoat, false),
+            row_of(&all.clearcoat_roughness, false),
+            row_of(&all.clearcoat_normal, false),
         ],
         [
-            slot(&all.sheen_color, true),
-            slot(&all.sheen_roughness, false),
-            slot(&all.anisotropy, false),
-            slot(&all.iridescence, false),
+            row_of(&all.sheen_color, true),
+            row_of(&all.sheen_roughness, false),
+            row_of(&all.anisotropy, false),
+            row_of(&all.iridescence, false),
         ],
-        [slot(&all.iridescence_thickness, false), 0, 0, 0],
+        [row_of(&all.iridescence_thickness, false), 0, 0, 0],
     ];
     // Finishes are those of layers.
     let is_finished = material.is_finished() && !surface.transmits();

@@ -416,21 +416,21 @@ fn photons_in_several_windows_are_found_as_in_one() {
     let photons = caustic_box(&mut random, 5000, 0.3, 1e-2);
     let points: Vec<_> = (0..200).map(|_| point(&mut random, false)).collect();
     let whole = bench.map(&photons);
-    let kernels = MapKernels::windowed(bench.gpu, 4096);
+    let kernels = MapKernels::segmented(bench.gpu, 4096);
     let split = |photons: &[Photon]| {
-        let store = PhotonStore::windowed(bench.gpu, 5000, 1024).unwrap();
+        let store = PhotonStore::segmented(bench.gpu, 5000, 1024).unwrap();
         store.write(bench.gpu, photons);
         PhotonMap::build(bench.gpu, &kernels, store, 5000, EMITTED).unwrap()
     };
-    let windowed = split(&photons);
-    assert_eq!((whole.windows(), windowed.windows()), (1, 2));
-    assert!(whole.read(bench.gpu).unwrap() == windowed.read(bench.gpu).unwrap());
+    let segmented = split(&photons);
+    assert_eq!((whole.segments(), segmented.segments()), (1, 2));
+    assert!(whole.read(bench.gpu).unwrap() == segmented.read(bench.gpu).unwrap());
     let mut fewer = photons.clone();
     fewer[4999] = fewer[0];
     let other = split(&fewer);
     for k in [10, 500] {
         let expected = bench.ask(true, &whole, &points, &settings(k));
-        assert_eq!(bench.ask(true, &windowed, &points, &settings(k)), expected);
+        assert_eq!(bench.ask(true, &segmented, &points, &settings(k)), expected);
         assert!(
             k < 500 || bench.ask(true, &other, &points, &settings(k)) != expected,
             "the control: another last photon"

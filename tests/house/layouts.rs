@@ -46,7 +46,7 @@ fn twins() -> Vec<Twin> {
         TextureRecord { first, size, flags, levels, transform }
         Attributes { uvs, colors, tangents, pad }
         Medium { tint, ior, absorption, dispersion }
-        Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media, material, attributes, part, side, leaf, root, pad0, pad1 }
+        Light { position, kind, e1, named, e2, solid_angle, emission, area, media, back_media, material, attributes, subtriangle, side, leaf, root, pad0, pad1 }
         LightNode { center, half, shine }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
@@ -60,10 +60,10 @@ fn twins() -> Vec<Twin> {
         Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, pad0, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, cells_from }
         FinalStep { first_ray, rays_now, rays, chosen, joint, pad0, pad1, pad2 }
-        CellGrid { per_metre, levels, mask, points, asked, pad0, pad1, pad2 }
+        CellGrid { per_metre, levels, mask, points, next_map, pad0, pad1, pad2 }
         ArrivingLight { direction, light, nearness, pad0, pad1, pad2 }
         IrradianceRecord { position, ng, irradiance, direction_and_reach }
-        RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, window }
+        RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, footprint }
         IrradianceCell { coordinates, level, position, split, normal, pad0, irradiance, pad1 }
         FirstHit { normal, depth, albedo, alpha, position, id, uv, pad0, pad1 }
         DirectLight { light, points, pad0, pad1 }
@@ -77,8 +77,8 @@ fn twins() -> Vec<Twin> {
         ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, map_number }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
-        KeyStep { count, window_first, window_count, fine }
-        MoveStep { sorted_first, sorted_count, window_first, window_count }
+        KeyStep { count, segment_first, segment_count, fine }
+        MoveStep { sorted_first, sorted_count, segment_first, segment_count }
         GridStep { photons, level, base, finer_base, finer_count, first_cell, cell_count, pad }
     }
 }

@@ -16,13 +16,13 @@ const LEVELS: u32 = 8;
 const MAX_SURFACES: usize = 8;
 /// Maximum number of entries, so that the table has at most 2^18 slots of 64 bytes.
 const MAX_ENTRIES: usize = 1 << 17;
-/// Marks from whose radii the width of the first level is taken, and the part of them whose
+/// Marks from whose radii the width of the first level is taken, and the fraction of them whose
 /// estimates are narrower.
 const PILOTS: usize = 1024;
 const PILOT_QUANTILE: f64 = 0.9;
 
-/// Part of the wanted radius that the estimate of a cell must have to speak for parts of it that
-/// have no entry of their own.
+/// Fraction of the wanted radius that the estimate of a cell must have to speak for cells in it
+/// that have no entry of their own.
 const SUBSTITUTE: f32 = 0.5;
 
 /// Computes the irradiance, W/m², and the radius of its estimate, metres, at points.

@@ -32,7 +32,7 @@ pub(crate) struct BatchBuffers {
     staged_keys: Buffer,
     counts: Buffer,
     offsets: Buffer,
-    /// Photons stored of each group of lights, `u32`.
+    /// Photons stored of each named light, `u32`.
     pub light_photons: Buffer,
     pub staging_capacity: u64,
 }
@@ -93,7 +93,7 @@ impl PhotonKernels {
         let counts = result.counts.iter().skip(kind as usize).step_by(MAP_KINDS as usize);
         gpu.write(&buffers.offsets, 0, &map.assign_offsets(counts.copied(), first_path));
         let mut encoder = gpu.encoder();
-        for (window, first_photon, photons) in map.photons.parts(map.stored as u32) {
+        for (segment, first_photon, photons) in map.photons.filled(map.stored as u32) {
             let staged = result.counters.staged;
             let uniform = gpu.uniform("store", &Store { staged, first_photon, photons, kind: kind as u32 });
             let bindings = self.store.bind(
@@ -105,7 +105,7 @@ impl PhotonKernels {
                     ("offsets", &buffers.offsets),
                     ("paths", &buffers.wavefront.paths),
                     ("light_photons", &buffers.light_photons),
-                    ("photons", window),
+                    ("photons", segment),
                 ],
             );
             self.store.dispatch(&mut encoder, &bindings, u64::from(staged));
@@ -116,8 +116,8 @@ impl PhotonKernels {
 }
 
 impl BatchBuffers {
-    /// Buffers for batches of up to `paths` paths, from `groups` groups of lights.
-    pub fn new(gpu: &Gpu, paths: u64, groups: usize) -> Result<Self> {
+    /// Buffers for batches of up to `paths` paths, from `named` named lights.
+    pub fn new(gpu: &Gpu, paths: u64, named: usize) -> Result<Self> {
         let staging_capacity = (paths * STAGED_PER_PATH).max(2 * u64::from(MAX_BOUNCES));
         Ok(Self {
             wavefront: Wavefront::new(gpu, "photon", paths)?,
@@ -125,7 +125,7 @@ impl BatchBuffers {
             staged_keys: gpu.storage::<u32>("keys of staged photons", staging_capacity)?,
             counts: gpu.storage::<u32>("photon counts", paths * u64::from(MAP_KINDS))?,
             offsets: gpu.storage::<u32>("photon places", paths)?,
-            light_photons: gpu.storage::<u32>("photons of lights", groups as u64)?,
+            light_photons: gpu.storage::<u32>("photons of lights", named as u64)?,
             staging_capacity,
         })
     }

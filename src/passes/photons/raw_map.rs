@@ -8,7 +8,7 @@ use crate::{
     passes::maps::photon_store::{PhotonStore, check_capacity},
 };
 
-/// Minimum growth of a map over a window of paths, as a fraction of its capacity. A map that gains
+/// Minimum growth of a map over a number of paths, as a fraction of its capacity. A map that gains
 /// less is idle.
 const MIN_GROWTH: f64 = 1e-4;
 
@@ -69,9 +69,9 @@ impl RawMap {
     /// # Errors
     /// Faults of the driver.
     pub fn read(&self, gpu: &Gpu) -> Result<Vec<Photon>> {
-        let parts = self.photons.parts(self.stored as u32);
-        parts
-            .map(|(window, _, count)| gpu.read(window, 0, u64::from(count)))
+        let segments = self.photons.filled(self.stored as u32);
+        segments
+            .map(|(segment, _, count)| gpu.read(segment, 0, u64::from(count)))
             .collect::<Result<Vec<_>>>()
             .map(|p| p.concat())
     }
@@ -94,7 +94,7 @@ impl RawMap {
     }
 
     /// Closes the map if it hardly grew since the last call, and then returns a warning.
-    pub(crate) fn close_if_idle(&mut self, name: &str, window: u64) -> Option<String> {
+    pub(crate) fn close_if_idle(&mut self, name: &str, paths: u64) -> Option<String> {
         let gained = self.stored - self.stored_before;
         self.stored_before = self.stored;
         if !self.open || gained as f64 >= MIN_GROWTH * self.capacity as f64 {
@@ -103,7 +103,7 @@ impl RawMap {
         self.open = false;
         let photons = if gained == 1 { "photon" } else { "photons" };
         Some(format!(
-            "the {name} map hardly grows: {gained} {photons} from the last {window} paths; it stays at {} of {} photons",
+            "the {name} map hardly grows: {gained} {photons} from the last {paths} paths; it stays at {} of {} photons",
             self.stored, self.capacity
         ))
     }

@@ -13,7 +13,7 @@ use glam::Vec3;
 
 use crate::scene::{Bounds, Material, Surface, Triangle, vertex_bits};
 
-/// Part of the surface below which a hole of few edges counts as a missing triangle.
+/// Fraction of the surface below which a hole of few edges counts as a missing triangle.
 const SMALL_HOLE: f64 = 0.05;
 /// Edges of the largest hole that counts as missing triangles.
 const HOLE_EDGES: usize = 6;

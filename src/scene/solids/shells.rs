@@ -34,7 +34,7 @@ pub(super) struct Shells {
     triangles: usize,
 }
 
-/// Holes smaller than this part of the surface are cracks of rounding.
+/// Holes smaller than this fraction of the surface are cracks of rounding.
 const CLOSED: f64 = 1e-4;
 
 /// Points at which a shell is probed at most, triangles visited for them in all, and their depth
