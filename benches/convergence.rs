@@ -10,7 +10,7 @@ use std::{error::Error, path::Path};
 
 use caustica::{
     Gpu, Progressive, Scene, Session, Settings, Silent,
-    image::{PassBlock, ErrorEstimate, Film, PassSum, difference::rel_mse, read_exr},
+    image::{ErrorEstimate, Film, PassBlock, PassSum, difference::rel_mse, read_exr},
     settings::{PassSettings, Quality},
 };
 use plotters::prelude::*;

@@ -97,7 +97,7 @@ impl Density {
         }
     }
 
-    /// What an estimate of `k` photons sums: how many, and the softness of the kernel
+    /// Number of photons that an estimate of `k` photons sums, and the softness of the kernel
     /// ([`Self::softened`]).
     ///
     /// The ball up to the (k+1)-th photon holds k of them where photons lie at random, but k + ½ on

@@ -197,7 +197,7 @@ pub struct TextureRecord {
     pub transform: [[f32; 4]; 2],
 }
 
-/// What lies beyond the border of an image: the image again, mirrored, or the border's texels.
+/// Texels beyond the border of an image: the image again, mirrored, or the border's texels.
 pub const WRAP_REPEAT: u32 = 0;
 pub const WRAP_MIRROR: u32 = 1;
 pub const WRAP_CLAMP: u32 = 2;
@@ -452,7 +452,7 @@ pub struct VisiblePoint {
     pub media_high: u32,
     /// Unit, to the viewer.
     pub view: [f32; 3],
-    /// What lies above the diffuse lobe, eight bits each: roots of the reflectances of a coat along
+    /// Layers above the diffuse lobe, eight bits each: roots of the reflectances of a coat along
     /// the normal and at grazing angles, strongest colour of the sheen and its roughness. 0 for
     /// nothing.
     pub above: u32,
@@ -465,7 +465,7 @@ pub struct VisiblePoint {
 pub struct LobePoint {
     /// Metres.
     pub position: [f32; 3],
-    /// As in [`VisiblePoint`].
+    /// Same as in [`VisiblePoint`].
     pub offset: f32,
     /// Weight of the path before the lobe.
     pub beta: [f32; 3],
@@ -779,7 +779,7 @@ pub struct CellGrid {
     pub pad2: u32,
 }
 
-/// What the rays of final gathering of a point tell of the light's way there: sums over rays.
+/// Sums over the rays of final gathering of a point, by the directions from which light arrives.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ArrivingLight {
@@ -993,7 +993,7 @@ pub struct ShareRound {
     pub reach_squared: f32,
     /// Visible points of the tile, without its margin.
     pub points: u32,
-    /// As in [`GatherInfo`].
+    /// Same as in [`GatherInfo`].
     pub map_number: u32,
 }
 

@@ -11,7 +11,7 @@ use crate::{
     scene::Bounds,
 };
 
-/// What is added to cones against the rounding of their unions, radians.
+/// Angle added to cones against the rounding of their unions, radians.
 const ANGLE_SLACK: f32 = 1e-5;
 /// Steps of a 16-bit snorm number from 0 to 1, and those by which the falloff's cosine is lowered
 /// for the rounding of axes.
@@ -87,7 +87,8 @@ impl LightBounds {
         }
     }
 
-    /// What distinguishes the lights: their positions, or their directions if they are at infinity.
+    /// Point by which lights are split: their positions, or their directions if they are at
+    /// infinity.
     pub fn middle(&self) -> Vec3 {
         if self.is_far { self.axis } else { 0.5 * (self.bounds.min + self.bounds.max) }
     }

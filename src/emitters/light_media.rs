@@ -23,7 +23,7 @@ pub fn set_media(light: &mut Light, probe: &MediaProbe) {
             let outward = DVec3::ONE.normalize();
             (position + e1.x * outward, outward, position.abs().max_element() + e1.x)
         }
-        // What comes from infinitely far away starts outside of all.
+        // Light from infinitely far away starts outside of all.
         _ => return,
     };
     let at = |side: f64| probe.at(point + side * reach * f64::from(OFFSET_SCALE) * normal);

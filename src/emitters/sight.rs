@@ -38,7 +38,7 @@ const MAX_SPHERES: usize = 12;
 /// Effectiveness of Quasirandom Sequences").
 const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
 
-/// What the scene's cameras see.
+/// Surfaces that the scene's cameras see, as spheres.
 #[derive(Clone, Debug)]
 pub struct Sight {
     /// Spheres around that and what lies around it, from the smallest to the largest; none if that
@@ -79,7 +79,7 @@ fn enclosure(seen: &[SeenPoint]) -> f64 {
     fractions.get((ENCLOSED * fractions.len() as f64) as usize).copied().unwrap_or(1.0)
 }
 
-/// What the camera sees, block by block of the picture.
+/// Points that the camera sees, block by block of the picture.
 fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<SeenPoint> {
     let aspect = camera.aspect.filter(|aspect| *aspect > 0.0).unwrap_or(1.0);
     let side = |fraction: f32| ((RAYS as f32 * fraction) as u32).max(1);
@@ -129,7 +129,7 @@ enum Way {
     Through,
 }
 
-/// How a ray goes on at a surface without a diffuse lobe.
+/// Way of a ray at a surface without a diffuse lobe.
 fn goes_on(material: &Material) -> Option<Way> {
     match material.surface {
         Surface::Mirror { .. } => Some(Way::Reflected),

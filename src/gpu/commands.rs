@@ -47,7 +47,7 @@ impl Submissions {
         self.dispatches.load(Ordering::Relaxed)
     }
 
-    /// Waits for all submitted work, at most [`HUNG_AFTER`] where it is cut; then tells
+    /// Waits for all submitted work, at most [`HUNG_AFTER`] where it is cut; then reports to
     /// the pace what the device's clock has measured.
     pub fn poll(&self) -> Result<(), wgpu::PollError> {
         let timeout = (self.pace.pacing == Pacing::Measured).then_some(HUNG_AFTER);

@@ -94,8 +94,8 @@ impl Gpu {
         .map_err(|e| Error::Device(format!("adapter {} cannot be opened: {e}", chosen.name)))?;
         let faults = Faults::of(&device);
         let submissions = Submissions::new(&device, &queue, pacing);
-        // Where a subgroup has several groups, the smaller are the faster: queries of few share
-        // less, and wait for fewer others.
+        // Smaller groups are faster where a subgroup has several: queries of few share less, and
+        // wait for fewer others.
         let (least, most) = chosen.subgroup;
         let lanes = if most > MAX_LANES { MIN_LANES } else { least.min(MAX_LANES) };
         let several_groups = most > lanes;

@@ -1,6 +1,6 @@
-//! How much work is handed to the device at once. Operating systems end work that keeps a GPU for
-//! too long, after about two seconds, and take the device away from the process; software has no
-//! such watchdog.
+//! Amount of work that is handed to the device at once. Operating systems end work that keeps a GPU
+//! for too long, after about two seconds, and take the device away from the process; software has
+//! no such watchdog.
 //!
 //! Each kernel's cost per invocation is measured on the device. A dispatch that would take longer
 //! than [`MAX_PER_DISPATCH`] is cut into chunks, and a submission is closed before it takes longer
@@ -14,7 +14,7 @@ use std::{
     time::Duration,
 };
 
-/// How dispatches are cut.
+/// Ways to cut dispatches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pacing {
     /// Not at all: for software.
@@ -34,13 +34,13 @@ const MAX_PER_SUBMISSION: Duration = Duration::from_millis(100);
 pub(super) const MIN_CHUNK: u64 = 4096;
 /// Invocations of a chunk of a kernel that was never measured.
 pub(super) const UNMEASURED: u64 = 1 << 14;
-/// Invocations of a chunk that tells of the cost, at least: fewer tell of latency.
+/// Minimum invocations of a chunk that measures the cost: fewer measure latency.
 pub(super) const MIN_TIMED: u64 = MIN_CHUNK / 2;
-/// What is left of a cost that later measures fall below. Slow, for a queue of paths that dries up
+/// Factor on a cost that later measures fall below. Slow, for a queue of paths that dries up
 /// measures less and less.
 const DECAY: f64 = 0.98;
 
-/// What to dispatch next.
+/// The next piece of a dispatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Chunk {
     pub invocations: u64,

@@ -54,7 +54,7 @@ impl ErrorEstimate {
 
 impl Film {
     /// Means as by [`Film::finish`], with the channels `standardError.C` and `bias.C` of radiance
-    /// if the passes tell them.
+    /// if the passes suffice for that.
     #[must_use]
     pub fn finish_with_errors(&self) -> super::Frame {
         let mut frame = self.finish();

@@ -10,7 +10,7 @@ pub(super) const RANKS: usize = 6;
 /// A hash, and the number of samples that show its name; 0 for none.
 pub(super) type Rank = [u32; 2];
 
-/// What the samples of each pixel show.
+/// Names that the samples of each pixel show.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Matte {
     pub of: ExtraLayers,

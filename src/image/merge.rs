@@ -18,10 +18,10 @@ use crate::{
     settings::{Crop, PassRange},
 };
 
-/// Differences that one message tells.
+/// Maximum number of differences in one message.
 const MOST_TOLD: usize = 3;
 
-/// What there is of a picture.
+/// Passes and pixels of a picture that there are.
 #[derive(Clone, Debug)]
 pub struct Survey {
     /// Width and height of the picture, pixels.
@@ -171,7 +171,7 @@ impl Survey {
         PassRange { first: 0, end: ends.max().unwrap_or(0) }
     }
 
-    /// What is missing, as options that render it: `--passes 3..8`, `--crop 0,0,64,64`. A single
+    /// Options that render what is missing: `--passes 3..8`, `--crop 0,0,64,64`. A single
     /// window is a crop that is wanted.
     #[must_use]
     pub fn missing(&self, wanted: PassRange) -> Vec<String> {

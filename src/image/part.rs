@@ -28,7 +28,7 @@ use crate::{
     stats::MapStats,
 };
 
-/// What a part says of itself, without its pixels.
+/// Header of a part: all but its pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartHeader {
     /// Attributes of the file.
@@ -133,7 +133,7 @@ fn before(range: PassRange) -> String {
     format!("passes{}-{}.", range.first, range.end)
 }
 
-/// Which layers a film has that were asked for.
+/// Layers of a film that were asked for.
 fn row_of_layers(film: &Film) -> (Vec<ExtraRow>, Vec<ExtraLayers>) {
     let row = |layer: &ExtraSums| ExtraRow { channels: layer.channels.clone(), rule: layer.rule };
     (film.extras.iter().map(row).collect(), film.mattes.iter().map(|matte| matte.of).collect())

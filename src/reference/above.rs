@@ -1,4 +1,4 @@
-//! What a coat or a sheen above a diffuse base leaves of the light, as the kernels have it: twins
+//! Light that a coat or a sheen leaves to a diffuse base below, as the kernels have it: twins
 //! of functions in `shaders/lib/transport/coat.wesl` and `sheen.wesl`.
 
 use glam::Vec3;

@@ -69,7 +69,8 @@ impl<'a> MapGatherer<'a> {
                 Searches::KdTree(trees)
             }
         };
-        // Kernels of few photons are stretched over more: that does not widen what they tell of.
+        // Kernels of few photons are stretched over more: that does not widen the area for which
+        // they stand.
         let stretched = GatherSettings::from(estimate).neighbors as f32 / estimate.neighbors as f32;
         let sharing = EstimateSharing::new(gpu, estimate.share_reach / stretched.sqrt());
         Ok(Self { maps, search, sharing, estimate, observer, cache: None, records: None })
@@ -209,7 +210,7 @@ impl Gatherer for MapGatherer<'_> {
         }
         let spacing = record_spacing(size, self.estimate.gather_spacing, coarse.tracer.branches());
         let per_pixel = |coarse: u32, fine: u32| coarse as f32 / fine as f32;
-        // Of the picture's pixels.
+        // Measured in the picture's pixels.
         let reach = self.estimate.gather_radius * coarse.tracer.pixel_height() * per_pixel(coarse.size.1, size.1);
         let grid = RecordGrid {
             first_column: window.column,
@@ -281,7 +282,7 @@ fn ends_of_rays(pass: &CameraPass, progress: &dyn Progress) -> Result<(Vec<Visib
 }
 
 impl Searches<'_> {
-    /// As [`Self::estimates_at`].
+    /// Same as [`Self::estimates_at`].
     fn estimates(
         &mut self,
         pass: &CameraPass,

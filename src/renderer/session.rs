@@ -59,8 +59,8 @@ impl<'a> Session<'a> {
         Ok(Self::open_lit(gpu, scene, lights, None, progress)?.remove(0))
     }
 
-    /// As [`Self::open`], once for each group of the scene's lights, of which there is one at
-    /// least.
+    /// Variant of [`Self::open`], once for each group of the scene's lights, of which there is one
+    /// at least.
     pub(super) fn open_groups(
         gpu: &'a Gpu,
         scene: &'a Scene,
@@ -141,7 +141,7 @@ impl<'a> Session<'a> {
         self.photon_maps_of(settings, &PathRanges::default(), progress)
     }
 
-    /// As [`Self::photon_maps`], with the photon paths of the given indices.
+    /// Variant of [`Self::photon_maps`] with the photon paths of the given indices.
     pub(super) fn photon_maps_of(
         &self,
         settings: &PhotonSettings,

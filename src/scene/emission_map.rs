@@ -1,4 +1,4 @@
-//! How much surfaces of varied emission emit: where a texture multiplies it, or not all of the
+//! Emission of surfaces on which it varies: where a texture multiplies it, or not all of the
 //! surface is there.
 //!
 //! A triangle is cut into congruent subtriangles along the lines of its barycentric coordinates,
@@ -50,7 +50,7 @@ impl Subtriangle {
     }
 }
 
-/// What a subtriangle emits.
+/// Emission of a subtriangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Emitted {
     /// Mean over the subtriangle of the factor on the emission of its material.
@@ -148,7 +148,7 @@ impl<'a> EmissionMap<'a> {
         wanted.clamp(1, MAX_SIDE).next_power_of_two()
     }
 
-    /// What each subtriangle of a primitive emits. A sphere is one subtriangle.
+    /// Emission of each subtriangle of a primitive. A sphere is one subtriangle.
     fn subtriangles(&self, primitive: usize, side: u32) -> Vec<Emitted> {
         let Some((triangle, own)) = self.triangle(primitive) else {
             let sphere = &self.scene.spheres[primitive - self.scene.triangles.len()];

@@ -97,7 +97,7 @@ impl PassRange {
         self.end - self.first
     }
 
-    /// As many passes as 32-bit indices of the numbers for sampling suffice for.
+    /// Maximum number of passes: as many as 32-bit indices of the numbers for sampling suffice for.
     #[must_use]
     pub fn longest(settings: &Settings) -> Self {
         let most = most_samples(&settings.photons, &settings.picture) / u64::from(settings.picture.spp.max(1));

@@ -43,7 +43,7 @@ pub struct SceneBuffers {
     /// diffuse base.
     pub splits: bool,
     pub lights: LightBuffers,
-    /// Which surfaces bound which solids.
+    /// Solids and the surfaces that bound them.
     pub solids: Solids,
 }
 
@@ -137,13 +137,13 @@ impl SceneBuffers {
         self.kernel_with(gpu, stem, &[])
     }
 
-    /// As [`Self::kernel`], with further `override` constants.
+    /// Variant of [`Self::kernel`] with further `override` constants.
     #[must_use]
     pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
         self.kernel_of(gpu, shader(stem), others)
     }
 
-    /// As [`Self::kernel_with`], for a shader of another table: the probes of the tests.
+    /// Variant of [`Self::kernel_with`] for a shader of another table: the probes of the tests.
     #[doc(hidden)]
     #[must_use]
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {

@@ -75,7 +75,7 @@ fn halved(finer: &[[u8; 4]], (width, height): (u32, u32), is_color: bool) -> Vec
         for y in covered(i / columns, rows, height) {
             for x in covered(i % columns, columns, width) {
                 let [r, g, b, a] = finer[(y * width + x) as usize];
-                // What is not there has no colour.
+                // A texel that is not there has no colour.
                 let own = if is_color { f32::from(a).max(1e-3) } else { 1.0 };
                 for (sum, value) in sum.iter_mut().zip([r, g, b]) {
                     *sum += own * linear[usize::from(value)];

@@ -1,4 +1,4 @@
-//! What a file says of what is seen: hidden nodes, clipping planes, mirrored cameras, dark lights.
+//! Views in files: hidden nodes, clipping planes, mirrored cameras, dark lights.
 
 use std::path::Path;
 

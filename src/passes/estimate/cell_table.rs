@@ -12,7 +12,7 @@ use crate::{
 
 /// Levels of cells. Each is half as wide as the one before.
 const LEVELS: u32 = 8;
-/// Surfaces in one cell that are told apart.
+/// Maximum number of surfaces in one cell with entries of their own.
 const MAX_SURFACES: usize = 8;
 /// Maximum number of entries, so that the table has at most 2^18 slots of 64 bytes.
 const MAX_ENTRIES: usize = 1 << 17;

@@ -134,8 +134,8 @@ impl<'s> Gather<'s> {
         self.run_waiting(gpu, map, points, (count, u32::MAX), settings, results, progress)
     }
 
-    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of the
-    /// map of that number; see [`crate::layout::VisiblePoint::next_map`].
+    /// Variant of [`Self::run`] for those of the first `count` points that wait for the estimate of
+    /// the map of that number; see [`crate::layout::VisiblePoint::next_map`].
     ///
     /// # Errors
     /// As [`Self::run`].

@@ -94,7 +94,7 @@ impl Records {
             let reach = NEAR_FRACTION * distance / radius(record.position.into());
             record.direction_and_reach |= snorm8(reach.clamp(1.0 / 127.0, 1.0)) << 24;
         }
-        // What lies beyond the grid has the slot behind all others.
+        // All that lies beyond the grid has the slot behind all others.
         self.records.push(NO_RECORD);
         self.records
     }

@@ -25,7 +25,7 @@ impl PhotonStore {
         Self::segmented(gpu, capacity, segment_elements::<Photon>(gpu))
     }
 
-    /// As [`Self::new`], in segments of `segment_photons`, a power of two ≥ 64.
+    /// Variant of [`Self::new`] with segments of `segment_photons`, a power of two ≥ 64.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -89,8 +89,8 @@ pub(super) fn segment_elements<T>(gpu: &Gpu) -> u32 {
     elements_within::<T>(gpu.max_binding())
 }
 
-/// As [`segment_elements`], for bindings of that many bytes. Photons are counted in 31 bits, so
-/// that a segment has at most 2^29.
+/// Variant of [`segment_elements`] for bindings of that many bytes. Photons are counted in 31 bits,
+/// so that a segment has at most 2^29.
 fn elements_within<T>(binding: u64) -> u32 {
     let most = (binding / size_of::<T>() as u64).clamp(64, 1 << 29);
     1 << most.ilog2()

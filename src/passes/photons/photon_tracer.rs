@@ -111,7 +111,7 @@ impl PhotonTracer {
         self.trace_range(gpu, scene, settings, (caustics, &PathRanges::default()), progress)
     }
 
-    /// As [`Self::trace`], with the paths of the given indices.
+    /// Variant of [`Self::trace`] with the paths of the given indices.
     ///
     /// # Errors
     /// As [`Self::trace`].
