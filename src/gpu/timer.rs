@@ -136,7 +136,7 @@ impl Timer {
 mod tests {
     use crate::gpu::{
         Gpu, Kernel, Pacing,
-        pace::{MIN_PART, MIN_TIMED},
+        pace::{MIN_CHUNK, MIN_TIMED},
     };
 
     #[test]
@@ -145,8 +145,8 @@ mod tests {
         assert!(gpu.submissions.timer.is_some(), "{} has no clock", gpu.name);
         let kernel = Kernel::new(&gpu, "sum_spans", &[]);
         let span = u64::from(crate::layout::SCAN_SPAN);
-        let values = gpu.storage::<u32>("values", MIN_PART * span).expect("fits");
-        let sums = gpu.storage::<u32>("sums", MIN_PART).expect("fits");
+        let values = gpu.storage::<u32>("values", MIN_CHUNK * span).expect("fits");
+        let sums = gpu.storage::<u32>("sums", MIN_CHUNK).expect("fits");
         let bindings = kernel.bind(&gpu, &[("values", &values), ("sums", &sums)]);
         let cost = |invocations| {
             let mut commands = gpu.encoder();
@@ -156,7 +156,7 @@ mod tests {
             gpu.submissions.pace.cost("sum_spans")
         };
         assert_eq!(cost(MIN_TIMED - 64), None, "control: too few to tell");
-        let seconds = cost(MIN_PART).expect("it was timed") * MIN_PART as f64;
+        let seconds = cost(MIN_CHUNK).expect("it was timed") * MIN_CHUNK as f64;
         assert!((1e-7..600.0).contains(&seconds), "{seconds} s");
     }
 }
