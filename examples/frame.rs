@@ -14,7 +14,7 @@ use caustica::{
     progress::Silent,
     renderer::{PhotonMaps, Render, Session},
     scene::{Camera, Scene},
-    settings::{Mode, Settings},
+    settings::{ExtraLayers, Mode, Quality, Settings},
 };
 use glam::Vec3;
 
@@ -63,13 +63,12 @@ fn main() -> Result<()> {
         save(&format!("{name}-radii"), view.radii(&gpu, map, &view.points(&scene), &indirect)?)?;
         let estimate = picture(&session, &one_map, &indirect)?.frame;
         save(&format!("{name}-estimate"), radiance(estimate.radiance()))?;
-        for (sum, pixel) in sum.iter_mut().zip(estimate.radiance()) {
-            *sum = (Vec3::from(*sum) + Vec3::from(*pixel)).to_array();
-        }
+        add(&mut sum, estimate.radiance());
     }
     save("sum", radiance(&sum))?;
+    compare_with_one_go(&session, &settings, &sum)?;
 
-    compare_with_one_go(&session, &settings, &sum)
+    final_gathering(&session, &save)
 }
 
 fn maps(session: &Session, settings: &Settings) -> caustica::Result<PhotonMaps> {
@@ -80,19 +79,72 @@ fn picture(session: &Session, maps: &PhotonMaps, settings: &Settings) -> caustic
     session.picture(maps, &settings.estimate, &settings.picture, &Silent)
 }
 
-/// Checks that the stages add up to the picture of one render, and prints that render's seconds.
+/// Adds light to that of each pixel.
+fn add(sum: &mut [[f32; 3]], light: &[[f32; 3]]) {
+    for (sum, pixel) in sum.iter_mut().zip(light) {
+        *sum = (Vec3::from(*sum) + Vec3::from(*pixel)).to_array();
+    }
+}
+
+/// Compares the sum of the stages with the picture of one render, and prints that render's seconds.
 fn compare_with_one_go(session: &Session, settings: &Settings, sum: &[[f32; 3]]) -> Result<()> {
-    let whole = picture(session, &maps(session, settings)?, settings)?;
+    let Render { frame, stats } = picture(session, &maps(session, settings)?, settings)?;
+    println!("photons stored: {} global, {} caustic", stats.photons.global.stored, stats.photons.caustic.stored);
+    println!("seconds: {:?}", stats.seconds);
+    check_sum(sum, frame.radiance())
+}
+
+/// Checks that the stages add up to the picture.
+fn check_sum(sum: &[[f32; 3]], whole: &[[f32; 3]]) -> Result<()> {
     let relative = |(a, b): (&[f32; 3], &[f32; 3])| {
         let (a, b) = (Vec3::from(*a), Vec3::from(*b));
         (a - b).abs().max_element() / b.max_element().max(1e-3)
     };
-    let difference = sum.iter().zip(whole.frame.radiance()).map(relative).fold(0.0, f32::max);
-    let stats = whole.stats;
-    println!("photons stored: {} global, {} caustic", stats.photons.global.stored, stats.photons.caustic.stored);
-    println!("seconds: {:?}", stats.seconds);
+    let difference = sum.iter().zip(whole).map(relative).fold(0.0, f32::max);
     println!("largest relative difference between the sum of the stages and one render: {difference:.1e}");
     if difference > TOLERANCE { Err("the stages do not add up".into()) } else { Ok(()) }
+}
+
+/// Draws the light that final gathering finds at points like those of the records, the same
+/// filtered for every sample, and the picture with it.
+fn final_gathering(session: &Session, save: &dyn Fn(&str, Canvas) -> Result<()>) -> Result<()> {
+    let settings = Quality::Normal.settings().with(|s| {
+        s.picture.size = Some((SIZE, SIZE));
+        s.picture.layers = vec![ExtraLayers::Components];
+    });
+    let maps = maps(session, &settings)?;
+    let spacing = settings.estimate.gather_spacing;
+    let side = SIZE.div_ceil(spacing);
+    // Without spacing, the light of each point is that of its own rays.
+    let coarse = settings.clone().with(|s| {
+        (s.picture.size, s.picture.spp) = (Some((side, side)), 1);
+        s.estimate.gather_spacing = 0;
+    });
+    let records = component(&picture(session, &maps, &coarse)?.frame, "global")?;
+    let record = |i: u32| records[(i / SIZE / spacing * side + i % SIZE / spacing) as usize];
+    let records: Vec<_> = (0..SIZE * SIZE).map(record).collect();
+    save("records", radiance(&records))?;
+
+    let Render { frame, stats } = picture(session, &maps, &settings)?;
+    save("filtered", radiance(&component(&frame, "global")?))?;
+    save("final-gather", radiance(frame.radiance()))?;
+    println!("seconds with final gathering: {:?}", stats.seconds);
+    let mut sum = component(&frame, "emission")?;
+    for name in ["direct", "global", "caustic"] {
+        add(&mut sum, &component(&frame, name)?);
+    }
+    check_sum(&sum, frame.radiance())
+}
+
+/// Radiance of a component of the light.
+fn component(frame: &Frame, name: &str) -> Result<Vec<[f32; 3]>> {
+    let channel = |color: char| {
+        let channel = format!("{name}.{color}");
+        let found = frame.extras().find(|(other, _)| **other == *channel).map(|(_, numbers)| numbers);
+        found.ok_or_else(|| format!("the picture has no {channel}"))
+    };
+    let (red, green, blue) = (channel('R')?, channel('G')?, channel('B')?);
+    Ok((0..frame.pixels()).map(|i| [red[i], green[i], blue[i]]).collect())
 }
 
 /// A picture of a colour for each pixel, by its index.

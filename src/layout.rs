@@ -58,10 +58,11 @@ pub const CONTACT_BIT: u32 = 0x2000_0000;
 pub const RANK_SHIFT: u32 = 28;
 pub const MAX_RANK: u32 = 15;
 pub const ID_MASK: u32 = (1 << RANK_SHIFT) - 1;
-/// Position in the material of the slot of the solid that the primitive bounds, and its mask;
-/// [`crate::scene::NO_SLOT`] if it bounds none.
+/// Position in the material of the slot of the solid that the primitive bounds, and its mask.
 pub const SLOT_SHIFT: u32 = 22;
 pub const SLOT_MASK: u32 = 127;
+/// Number of slots, and the slot of surfaces that bound no solid.
+pub const NO_SLOT: u32 = 127;
 /// Set there when parts of the surface are not there: rays ask for its opacity.
 pub const ALPHA_BIT: u32 = 1 << 21;
 /// Mask there of the index into the materials.
@@ -70,6 +71,10 @@ pub const MATERIAL_MASK: u32 = ALPHA_BIT - 1;
 pub const NOTHING_LEFT: u32 = (1 << BVH_INDEX_BITS) - 1;
 /// Surfaces that a path of light through mirrors and glass may meet beyond its diffuse bounces.
 pub const CHAIN_LIMIT: u32 = 512;
+/// Roughness below which a lobe is perfectly specular: narrower than a pixel.
+pub const SHARP_ROUGHNESS: f32 = 0.03;
+/// Fraction of metal from which on a surface casts caustics.
+pub const METAL: f32 = 0.5;
 /// Units of lost light in a camera path of weight 1, see [`Counters::lost`].
 pub const LOST_SCALE: u32 = 4096;
 

@@ -13,7 +13,8 @@ pub enum Stage {
     Photons,
     /// Sorting photons into the grid.
     Grid,
-    /// Final gathering at spaced points. Units are tiles of the coarser picture that they make.
+    /// Final gathering at spaced points, and the search for the ends of its rays before. Units are
+    /// tiles of the coarser picture that they make.
     Records,
     /// Camera rays, direct light and gather. Units are tiles of camera samples.
     Camera,

@@ -1,4 +1,4 @@
-//! Statistics of a render, for scripts: the `--stats` file.
+//! Statistics of a render, which scripts read as JSON.
 
 use std::{
     collections::BTreeMap,

@@ -13,8 +13,12 @@ mod args;
 mod environment;
 #[path = "../../src/cli/loading.rs"]
 mod loading;
+#[path = "../../src/cli/merge_args.rs"]
+mod merge_args;
 #[path = "../../src/cli/options.rs"]
 mod options;
+#[path = "../../src/cli/pass_args.rs"]
+mod pass_args;
 #[path = "../../src/cli/study_args.rs"]
 mod study_args;
 #[path = "../../src/cli/values.rs"]

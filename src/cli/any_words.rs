@@ -40,9 +40,41 @@ fn check_settings(settings: &Settings) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
-    use std::{fs, path::Path};
+    use std::{collections::BTreeSet, fs, path::Path};
 
-    use super::check;
+    use clap::CommandFactory as _;
+
+    use super::{Args, check};
+
+    const DICTIONARY: &str = include_str!("../../fuzz/options.dict");
+
+    /// Commands and flags that a dictionary of libFuzzer has.
+    fn words(dictionary: &str) -> BTreeSet<String> {
+        let words = dictionary.lines().flat_map(|line| line.trim_matches('"').split("\\x0a"));
+        let known = words.filter(|word| word.starts_with("--") || word.chars().all(char::is_alphabetic));
+        known.map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn the_dictionary_has_all_commands_and_flags() {
+        let mut command = Args::command();
+        command.build();
+        let subcommands = || command.get_subcommands().filter(|sub| sub.get_name() != "help");
+        let flags = subcommands().flat_map(clap::Command::get_arguments).filter_map(clap::Arg::get_long);
+        let flags: BTreeSet<String> = flags.map(|flag| format!("--{flag}")).collect();
+        let commands: BTreeSet<String> = subcommands().map(|sub| sub.get_name().to_owned()).collect();
+        let asked: Vec<_> = flags.union(&commands).cloned().collect();
+        let missing = |dictionary: &str| -> Vec<String> {
+            let words = words(dictionary);
+            asked.iter().filter(|word| !words.contains(*word)).cloned().collect()
+        };
+        assert!(flags.len() > 60 && commands.len() == 7, "{asked:?}");
+        assert_eq!(missing(DICTIONARY), [""; 0]);
+        assert_eq!(missing(&DICTIONARY.replace("--share", "--shore")), ["--share"], "control");
+        let unknown: Vec<String> =
+            words(DICTIONARY).into_iter().filter(|word| word.starts_with("--") && !flags.contains(word)).collect();
+        assert_eq!(unknown, [""; 0]);
+    }
 
     #[test]
     fn words_of_the_corpus_are_understood_or_refused() {

@@ -115,14 +115,14 @@ pub struct RenderArgs {
         "Points on one surface share an estimate within this fraction of its radius, {}; 0 makes one for every sample",
         EstimateSettings::SHARE_REACH
     ))]
-    #[arg(long, value_name = "F", default_value_t = 2.0, value_parser = share_reach, help_heading = "Estimate")]
+    #[arg(long, value_name = "F", default_value_t = EstimateSettings::default().share_reach, value_parser = share_reach, help_heading = "Estimate")]
     pub share: f32,
 
     #[arg(help = format!(
         "Ends of final-gather rays share irradiance in cells of this fraction of the estimate's radius, {}; 0 makes an estimate for each",
         EstimateSettings::IRRADIANCE_CELLS
     ))]
-    #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = irradiance_cells, help_heading = "Estimate")]
+    #[arg(long, value_name = "F", default_value_t = EstimateSettings::default().irradiance_cells, value_parser = irradiance_cells, help_heading = "Estimate")]
     pub irradiance_cells: f32,
 
     #[arg(help = format!(

@@ -52,11 +52,14 @@ const FLAGS: [Row; 42] = [
 /// The environment has no flag of its own name: each of these three sets it.
 const ENVIRONMENT: Row = ("scene.environment", "--env, --background or --default-light sky");
 
+/// The library's function that writes parts, and the flags by which the command does.
+const PARTS: Row = ("write_part", "render --part or --checkpoint");
+
 /// Replaces the settings in a line by flags: "`picture.crop`" becomes "--crop". The name that
 /// begins the message of a refused setting, as in "error: picture.spp 0: must be at least 1",
 /// becomes the flag without its dashes.
 pub fn with_flags(line: &str) -> String {
-    FLAGS.iter().chain([&ENVIRONMENT]).fold(line.to_owned(), |line, (setting, flag)| {
+    FLAGS.iter().chain([&ENVIRONMENT, &PARTS]).fold(line.to_owned(), |line, (setting, flag)| {
         let line = line.replace(&format!("`{setting}`"), flag);
         line.replace(&format!(": {setting} "), &format!(": {} ", flag.trim_start_matches('-')))
     })
@@ -118,7 +121,7 @@ mod tests {
     fn every_row_names_a_setting_and_a_flag_of_the_command() {
         let paths: Vec<String> = paths().into_iter().map(|(section, field)| format!("{section}.{field}")).collect();
         let is_input = |name: &str| {
-            let is_other = ["device", "scene.environment"].contains(&name)
+            let is_other = ["device", "scene.environment", "write_part"].contains(&name)
                 || ["load.", "passes."].iter().any(|section| name.starts_with(section));
             is_other || paths.iter().any(|path| path == name)
         };
@@ -129,7 +132,7 @@ mod tests {
             Some(long) => options.iter().any(|option| option.get_long() == Some(long)),
             None => options.iter().any(|option| option.get_short() == flag.chars().nth(1)),
         };
-        for (setting, flags) in FLAGS.iter().chain([&ENVIRONMENT]) {
+        for (setting, flags) in FLAGS.iter().chain([&ENVIRONMENT, &PARTS]) {
             assert!(is_input(setting), "{setting} is no setting");
             let flags: Vec<_> = flags.split([' ', ',']).filter(|word| word.starts_with('-')).collect();
             assert!(!flags.is_empty() && flags.iter().all(|flag| is_flag(flag)), "{setting}: {flags:?}");
@@ -147,6 +150,7 @@ mod tests {
                 "error: ask for fewer --photons or a smaller -k",
             ),
             ("error: give `scene.environment`", "error: give --env, --background or --default-light sky"),
+            ("a.exr: `write_part` did not write it", "a.exr: render --part or --checkpoint did not write it"),
         ] {
             assert_eq!(with_flags(line), expected);
         }

@@ -4,7 +4,8 @@ use std::{fmt::Write as _, time::Instant};
 
 use caustica::{
     Error, Result,
-    image::{Survey, WindowParts, merge, survey, write_exr_with, write_png},
+    image::{Missing, Survey, WindowParts, merge, survey, write_exr_with, write_png},
+    settings::{Crop, PassRange},
 };
 use serde_json::json;
 
@@ -32,7 +33,7 @@ pub fn run(args: &MergeArgs) -> Result<()> {
     if !found.overlaps.is_empty() {
         return Err(Error::Differs(format!("parts overlap: {}", listed(&found.overlaps))));
     }
-    let missing = found.missing(args.passes.unwrap_or(found.passes()));
+    let missing = missing(&found, args.passes);
     match (missing.is_empty(), args.allow_gaps) {
         (true, _) => {}
         (false, true) => display.note(&format!("missing: {}", listed(&missing))),
@@ -73,8 +74,7 @@ pub fn run(args: &MergeArgs) -> Result<()> {
 /// Says what there is.
 pub fn status(args: &StatusArgs) -> Result<()> {
     let found = survey(&args.parts)?;
-    let wanted = args.passes.unwrap_or(found.passes());
-    let missing = found.missing(wanted);
+    let missing = missing(&found, args.passes);
     if args.json {
         let mut text = serde_json::to_string_pretty(&report(&found, &missing)).expect("it is JSON");
         text.push('\n');
@@ -85,9 +85,8 @@ pub fn status(args: &StatusArgs) -> Result<()> {
     let mut text = format!("picture: {width}x{height}\n");
     let mut line = |label: &str, value: &str| writeln!(text, "{label}: {value}").expect("a String can be written");
     for parts in &found.windows {
-        let window = parts.window;
         let passes: Vec<_> = parts.passes().iter().map(ToString::to_string).collect();
-        let rectangle = format!("{},{},{},{}", window.column, window.row, window.width, window.height);
+        let rectangle = words(parts.window);
         line("pixels", &format!("{rectangle}: passes {} in {} parts", passes.join(", "), parts.parts.len()));
     }
     missing.iter().for_each(|missing| line("missing", missing));
@@ -113,6 +112,20 @@ fn report(found: &Survey, missing: &[String]) -> serde_json::Value {
         "overlaps": found.overlaps,
         "devices": devices,
     })
+}
+
+/// What is missing, as options that render it: `--passes 3..8`, `--crop 0,0,64,64 --passes 0..8`.
+fn missing(found: &Survey, wanted: Option<PassRange>) -> Vec<String> {
+    let options = |Missing { crop, passes }: Missing| {
+        let crop = crop.map_or(String::new(), |crop| format!("--crop {} ", words(crop)));
+        format!("{crop}--passes {passes}")
+    };
+    found.missing(wanted.unwrap_or(found.passes())).into_iter().map(options).collect()
+}
+
+/// A crop as `--crop` has it.
+fn words(Crop { column, row, width, height }: Crop) -> String {
+    format!("{column},{row},{width},{height}")
 }
 
 /// Lines in one.

@@ -98,7 +98,7 @@ pub struct SharedOptions {
          in mirrors and glass",
         PhotonSettings::MAX_BOUNCES.most()
     ))]
-    #[arg(long, value_name = "B", default_value_t = 20, help_heading = "Photons")]
+    #[arg(long, value_name = "B", default_value_t = PhotonSettings::default().max_bounces, help_heading = "Photons")]
     #[arg(value_parser = whole(PhotonSettings::MAX_BOUNCES))]
     pub max_bounces: u32,
 
@@ -107,7 +107,7 @@ pub struct SharedOptions {
     pub kernel: KernelArg,
 
     #[arg(help = format!("Constant of the cone kernel, {}", EstimateSettings::CONE_CONSTANT))]
-    #[arg(long, value_name = "C", default_value_t = 2.0, value_parser = cone_constant, help_heading = "Estimate")]
+    #[arg(long, value_name = "C", default_value_t = EstimateSettings::default().cone_constant, value_parser = cone_constant, help_heading = "Estimate")]
     pub cone_constant: f32,
 
     /// Count photons of neighbouring surfaces and take the disc for whole: bright corners, dark

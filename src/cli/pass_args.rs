@@ -20,7 +20,7 @@ pub struct PassOptions {
     pub passes: Option<PassRange>,
 
     #[arg(help = format!("How slowly radii shrink from pass to pass, {}; 1 leaves them", PassSettings::ALPHA))]
-    #[arg(long, value_name = "A", default_value_t = 2.0 / 3.0, value_parser = alpha, help_heading = "Passes")]
+    #[arg(long, value_name = "A", default_value_t = PassSettings::default().alpha, value_parser = alpha, help_heading = "Passes")]
     #[arg(requires = "progressive")]
     pub alpha: f64,
 

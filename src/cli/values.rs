@@ -3,7 +3,7 @@
 use std::{path::PathBuf, time::Duration};
 
 use caustica::image::{Frame, auto_exposure};
-use caustica::scene::LoadOptions;
+use caustica::scene::{Environment, LoadOptions};
 use caustica::settings::{Crop, EstimateSettings, LightSettings, PassRange, PhotonSettings, PictureSettings, Range};
 
 /// A whole number of at least 1 with an optional suffix: `250`, `200k`, `1.5M`.
@@ -116,9 +116,12 @@ pub fn gather_radius(text: &str) -> Result<f32, String> {
 
 /// A relative difference.
 pub fn tolerance(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|t| *t >= 0.0 && t.is_finite());
-    number.ok_or_else(|| "a relative difference of at least 0, as 1e-4".to_string())
+    let number = text.parse::<f64>().ok().filter(|tolerance| TOLERANCES.contains(*tolerance));
+    number.ok_or_else(|| format!("a relative difference of {TOLERANCES}, as 1e-4"))
 }
+
+/// Range of the relative difference that a comparison allows.
+const TOLERANCES: Range<f64> = Range::at_least(0.0);
 
 /// A factor above 0.
 pub fn scale(text: &str) -> Result<f64, String> {
@@ -127,7 +130,7 @@ pub fn scale(text: &str) -> Result<f64, String> {
 
 /// A factor of at least 0.
 pub fn strength(text: &str) -> Result<f32, String> {
-    number(text).filter(|s| *s >= 0.0).ok_or_else(|| "a number of at least 0".to_string())
+    in_range(text, Environment::STRENGTH, "a number of ")
 }
 
 /// A roughness.
@@ -142,9 +145,10 @@ pub fn rotation(text: &str) -> Result<f32, String> {
 
 /// `R,G,B`, each at least 0.
 pub fn color(text: &str) -> Result<[f32; 3], String> {
-    let channels: Option<Vec<f32>> = text.split(',').map(|s| number(s.trim()).filter(|x| *x >= 0.0)).collect();
+    let channels: Option<Vec<f32>> =
+        text.split(',').map(|s| number(s.trim()).filter(|x| Environment::STRENGTH.contains(*x))).collect();
     let color = channels.and_then(|channels| channels.try_into().ok());
-    color.ok_or_else(|| "three numbers of at least 0, as 0.5,0.7,1".to_string())
+    color.ok_or_else(|| format!("three numbers of {}, as 0.5,0.7,1", Environment::STRENGTH))
 }
 
 /// `NAME=WEIGHT`; the name may hold a `=` itself.
@@ -181,13 +185,15 @@ impl Exposure {
     }
 }
 
+/// Range of [`Exposure::Stops`].
+const STOPS: Range<f32> = Range::closed(-100.0, 100.0);
+
 /// `auto`, or stops of exposure.
 pub fn exposure(text: &str) -> Result<Exposure, String> {
     if text == "auto" {
         return Ok(Exposure::Auto);
     }
-    let stops = number(text).filter(|e| e.abs() <= 100.0).map(Exposure::Stops);
-    stops.ok_or_else(|| "auto, or a number of stops, -100 to 100".to_string())
+    in_range(text, STOPS, "auto, or a number of stops ").map(Exposure::Stops)
 }
 
 /// A number in the range. The message begins with `what`, followed by the range.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::targets::{Target, scene_target};
 use crate::{
     bvh::Bvh,
+    layout::METAL,
     scene::{Camera, Material, Projection, Scene, Surface},
 };
 
@@ -134,7 +135,7 @@ fn goes_on(material: &Material) -> Option<Way> {
     match material.surface {
         Surface::Mirror { .. } => Some(Way::Reflected),
         Surface::Glass { .. } | Surface::Pane { .. } => Some(Way::Through),
-        Surface::Layered { metallic, .. } => (metallic > 0.5).then_some(Way::Reflected),
+        Surface::Layered { metallic, .. } => (metallic >= METAL).then_some(Way::Reflected),
         Surface::Diffuse { .. } => None,
     }
 }

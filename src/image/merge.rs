@@ -45,6 +45,15 @@ pub struct WindowParts {
     pub parts: Vec<(PassRange, PathBuf)>,
 }
 
+/// Passes of some pixels that no part holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Missing {
+    /// The pixels; `None` if the parts are of the same ones.
+    pub crop: Option<Crop>,
+    /// The passes.
+    pub passes: PassRange,
+}
+
 /// Reads what parts say of themselves, without their pixels.
 ///
 /// # Errors
@@ -122,7 +131,7 @@ fn overlaps(windows: &[WindowParts]) -> Vec<String> {
     found
 }
 
-/// A crop as the command line has it.
+/// Column, row, width and height.
 fn words(Crop { column, row, width, height }: Crop) -> String {
     format!("{column},{row},{width},{height}")
 }
@@ -171,18 +180,17 @@ impl Survey {
         PassRange { first: 0, end: ends.max().unwrap_or(0) }
     }
 
-    /// Options that render what is missing: `--passes 3..8`, `--crop 0,0,64,64`. A single
-    /// window is a crop that is wanted.
+    /// Passes and pixels missing of the passes `wanted`. A single window is a crop that is wanted.
     #[must_use]
-    pub fn missing(&self, wanted: PassRange) -> Vec<String> {
+    pub fn missing(&self, wanted: PassRange) -> Vec<Missing> {
         let many = self.windows.len() > 1;
         let of_window = |parts: &WindowParts| {
-            let crop = if many { format!("--crop {} ", words(parts.window)) } else { String::new() };
-            parts.missing(wanted).into_iter().map(move |passes| format!("{crop}--passes {passes}"))
+            let crop = many.then_some(parts.window);
+            parts.missing(wanted).into_iter().map(move |passes| Missing { crop, passes })
         };
         let passes = self.windows.iter().flat_map(of_window);
         let crops = if many { self.missing_pixels() } else { Vec::new() };
-        let crops = crops.into_iter().map(|crop| format!("--crop {} --passes {wanted}", words(crop)));
+        let crops = crops.into_iter().map(|crop| Missing { crop: Some(crop), passes: wanted });
         passes.chain(crops).collect()
     }
 
@@ -355,21 +363,23 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_told_as_options() {
+    fn passes_and_pixels_that_are_missing_are_found() {
         let folder = tempfile::tempdir().unwrap();
         let file = |name: &str| folder.path().join(name);
+        let missing = |crop: Option<Crop>, first: u32, end: u32| Missing { crop, passes: PassRange { first, end } };
         let a = write(&file("a"), ALL, 2..3, "1");
         let b = write(&file("b"), ALL, 5..9, "1");
         let found = survey(&[b.clone(), a.clone()]).unwrap();
-        assert_eq!(found.missing(found.passes()), ["--passes 0..2", "--passes 3..5"]);
-        assert_eq!(found.missing(PassRange { first: 2, end: 12 }), ["--passes 3..5", "--passes 9..12"]);
-        assert_eq!(found.missing(PassRange { first: 5, end: 9 }), [""; 0]);
+        assert_eq!(found.missing(found.passes()), [missing(None, 0, 2), missing(None, 3, 5)]);
+        assert_eq!(found.missing(PassRange { first: 2, end: 12 }), [missing(None, 3, 5), missing(None, 9, 12)]);
+        assert!(found.missing(PassRange { first: 5, end: 9 }).is_empty());
         assert_eq!(found.overlaps, [""; 0]);
         let crop = Crop { column: 1, row: 1, width: 2, height: 1 };
         let c = write(&file("c"), crop, 0..2, "1");
         let d = write(&file("d"), Crop { row: 2, ..crop }, 0..2, "1");
         let found = survey(&[c, d]).unwrap();
-        let expected = ["0,0,4,1", "0,1,1,2", "3,1,1,2"].map(|crop| format!("--crop {crop} --passes 0..2"));
+        let expected = [[0, 0, 4, 1], [0, 1, 1, 2], [3, 1, 1, 2]]
+            .map(|[column, row, width, height]| missing(Some(Crop { column, row, width, height }), 0, 2));
         assert_eq!(found.missing(found.passes()), expected);
     }
 

@@ -31,7 +31,7 @@ pub use exr_read::{read_exr, read_exr_attributes};
 pub use file::{check_output, close_files, write_file};
 pub use film::Film;
 pub use frame::{DataWindow, Frame};
-pub use merge::{Survey, WindowParts, merge, survey};
+pub use merge::{Missing, Survey, WindowParts, merge, survey};
 pub use part::{PartHeader, read_part, read_part_header, write_part};
 pub use part_identity::differences;
 pub use pass_sum::{Fold, PassBlock, PassSum};

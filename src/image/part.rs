@@ -269,7 +269,7 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
 }
 
 fn no_part(path: &Path) -> Error {
-    failure(path, "is no part of a picture: `render --part` or `--checkpoint` did not write it, or it is damaged")
+    failure(path, "is no part of a picture: `write_part` did not write it, or it is damaged")
 }
 
 #[cfg(test)]

@@ -153,8 +153,7 @@ impl<'a> MapGatherer<'a> {
 impl Gatherer for MapGatherer<'_> {
     /// Fills the cache of irradiance about the ends of the scout's final-gather rays.
     fn prepare(&mut self, scout: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
-        let (marks, count) = timed(&mut stats.seconds.camera, || ends_of_rays(scout, progress))?;
-        tally::add_step(stats, count);
+        let marks = ends_of_rays(scout, stats, progress)?;
         let Self { maps, search, estimate, .. } = self;
         let mut irradiances = |points: &[VisiblePoint]| {
             let points: Vec<_> = points.iter().map(bare).collect();
@@ -179,13 +178,8 @@ impl Gatherer for MapGatherer<'_> {
     ) -> Result<()> {
         let window = coarse.window;
         let mut taken = Records::new((window.width, window.height), coarse.tracer.branches());
-        let tiles = coarse.tracer.tiles();
-        for (done, tile) in tiles.iter().enumerate() {
-            progress.check()?;
-            progress.report(Stage::Records, done as u64, tiles.len() as u64);
-            let mut step = timed(&mut stats.seconds.camera, || coarse.tracer.trace(coarse.gpu, coarse.scene, tile))?;
-            let mut seconds = 0.0;
-            let found = timed(&mut seconds, || {
+        coarse.for_each_tile(Stage::Records, stats, progress, &mut |tile, stats| {
+            let (found, count) = timed(&mut stats.seconds.gather, || {
                 self.light_blurred(coarse, tile);
                 // Irradiance itself, by the geometric normal.
                 let flat = |point: &VisiblePoint| VisiblePoint { ns: point.ng, ..bare(point) };
@@ -193,12 +187,12 @@ impl Gatherer for MapGatherer<'_> {
                 coarse.clear_arriving();
                 coarse.set_points(&points);
                 coarse.set_radiance(&vec![[0.0; 4]; points.len()]);
-                step += self.gather_finally(coarse, tile, progress)?;
+                let count = self.gather_finally(coarse, tile, progress)?;
                 let light = coarse.radiance(tile)?.into_iter().zip(coarse.arriving(tile)?);
-                Ok(points.into_iter().zip(light).collect::<Vec<_>>())
+                Ok((points.into_iter().zip(light).collect::<Vec<_>>(), count))
             })?;
-            stats.seconds.gather += seconds;
-            tally::add_step(stats, step);
+            stats.non_finite.gather += count.non_finite;
+            tally::add_step(stats, count);
             for (pixel, slots) in (0..).zip(found.chunks(coarse.tracer.branches() as usize)) {
                 let Some(pixel) = coarse.tracer.pixel(tile, pixel) else { continue };
                 for (branch, (point, (light, arriving))) in
@@ -207,7 +201,8 @@ impl Gatherer for MapGatherer<'_> {
                     taken.put(pixel, branch, point, *light, arriving, coarse.final_rays());
                 }
             }
-        }
+            Ok(())
+        })?;
         let spacing = record_spacing(size, self.estimate.gather_spacing, coarse.tracer.branches());
         let per_pixel = |coarse: u32, fine: u32| coarse as f32 / fine as f32;
         // Measured in the picture's pixels.
@@ -268,17 +263,22 @@ fn bare(point: &VisiblePoint) -> VisiblePoint {
 }
 
 /// The ends of all final-gather rays of a pass.
-fn ends_of_rays(pass: &CameraPass, progress: &dyn Progress) -> Result<(Vec<VisiblePoint>, StepCount)> {
-    let (mut ends, mut done) = (Vec::new(), StepCount::default());
-    for tile in &pass.tracer.tiles() {
-        done += pass.tracer.trace(pass.gpu, pass.scene, tile)?;
-        done += pass.gather_finally(tile, progress, &mut |gather, rays, _| {
-            let found: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
-            ends.extend(found.into_iter().filter(|point| point.next_map != 0));
-            Ok(StepCount::default())
-        })?;
-    }
-    Ok((ends, done))
+fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<Vec<VisiblePoint>> {
+    let mut ends = Vec::new();
+    pass.for_each_tile(Stage::Records, stats, progress, &mut |tile, stats| {
+        let gather = || {
+            pass.gather_finally(tile, progress, &mut |gather, rays, _| {
+                let found: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
+                ends.extend(found.into_iter().filter(|point| point.next_map != 0));
+                Ok(StepCount::default())
+            })
+        };
+        let count = timed(&mut stats.seconds.gather, gather)?;
+        stats.non_finite.gather += count.non_finite;
+        tally::add_step(stats, count);
+        Ok(())
+    })?;
+    Ok(ends)
 }
 
 impl Searches<'_> {

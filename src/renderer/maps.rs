@@ -23,6 +23,8 @@ pub struct PhotonMaps {
     /// Index of the first camera sample of pictures, if the photons are those of one of several
     /// passes.
     pub(super) first_sample: Option<u32>,
+    /// Number of the session that traced them.
+    pub(super) session: u64,
     pub(super) stats: Stats,
 }
 
@@ -65,7 +67,7 @@ impl PhotonMaps {
 /// surface. `paths`: indices of the photons' paths.
 pub(super) fn trace_maps(
     gpu: &Gpu,
-    scene: &SceneBuffers,
+    (scene, session): (&SceneBuffers, u64),
     settings: &PhotonSettings,
     (caustics, paths): (bool, &PathRanges),
     mut stats: Stats,
@@ -73,7 +75,7 @@ pub(super) fn trace_maps(
 ) -> Result<PhotonMaps> {
     let settings = settings.clone();
     if !settings.mode.traces_photons() {
-        return Ok(PhotonMaps { maps: Vec::new(), kinds: Vec::new(), settings, first_sample: None, stats });
+        return Ok(PhotonMaps { maps: Vec::new(), kinds: Vec::new(), settings, first_sample: None, session, stats });
     }
     let traced = timed(&mut stats.seconds.photons, || {
         PhotonTracer::new(gpu, scene, settings.sampler).trace_range(gpu, scene, &settings, (caustics, paths), progress)
@@ -96,5 +98,5 @@ pub(super) fn trace_maps(
         }
         Result::Ok(())
     })?;
-    Ok(PhotonMaps { maps, kinds, settings, first_sample: None, stats })
+    Ok(PhotonMaps { maps, kinds, settings, first_sample: None, session, stats })
 }

@@ -1,5 +1,7 @@
 //! A scene on the device, and the single stages of a render.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use super::{
     gatherer::{MapGatherer, Observer, gather_for},
     maps::{PhotonMaps, trace_maps},
@@ -8,7 +10,7 @@ use super::{
 };
 use crate::{
     bvh::{Bvh, Media, MediaProbe},
-    error::Result,
+    error::{Error, Result},
     gpu::Gpu,
     image::{Film, Frame},
     passes::{
@@ -47,7 +49,12 @@ pub struct Session<'a> {
     /// Media that contain each of the scene's cameras.
     camera_media: Vec<Media>,
     stats: Stats,
+    /// Number among the sessions of the process.
+    id: u64,
 }
+
+/// Sessions that were opened so far.
+static SESSIONS: AtomicU64 = AtomicU64::new(0);
 
 impl<'a> Session<'a> {
     /// Builds the hierarchy and copies the scene to the device, with lights as the settings say.
@@ -106,7 +113,8 @@ impl<'a> Session<'a> {
         let session = |buffers: SceneBuffers| {
             let mut stats = stats.clone();
             stats.warnings.extend(buffers.lights.warnings.iter().cloned());
-            Self { gpu, scene, buffers, camera_media: camera_media.clone(), stats }
+            let id = SESSIONS.fetch_add(1, Ordering::Relaxed);
+            Self { gpu, scene, buffers, camera_media: camera_media.clone(), stats, id }
         };
         Ok(buffers.into_iter().map(session).collect())
     }
@@ -150,7 +158,7 @@ impl<'a> Session<'a> {
     ) -> Result<PhotonMaps> {
         settings.check()?;
         let photons = (self.scene.has_specular(), paths);
-        trace_maps(self.gpu, &self.buffers, settings, photons, self.stats.clone(), progress)
+        trace_maps(self.gpu, (&self.buffers, self.id), settings, photons, self.stats.clone(), progress)
     }
 
     /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode,
@@ -158,7 +166,7 @@ impl<'a> Session<'a> {
     /// cover the maps and this picture; `total` is the sum of both.
     ///
     /// # Errors
-    /// As [`super::render`].
+    /// As [`super::render`]; [`Error::Setting`] for maps of another session.
     pub fn picture(
         &self,
         maps: &PhotonMaps,
@@ -215,6 +223,11 @@ impl<'a> Session<'a> {
         estimate.check()?;
         picture.check()?;
         check_samples(maps.settings(), picture)?;
+        if maps.session != self.id {
+            let (name, value) = ("maps", format!("of session {}", maps.session));
+            let problem = format!("this is session {}; its pictures take maps of its own photons", self.id);
+            return Err(Error::Setting { name, value, problem });
+        }
         let number = self.scene.camera_number(picture.camera.as_deref())?;
         let camera = (&self.scene.cameras[number], self.camera_media[number]);
         let scene = (self.scene, &self.buffers);

@@ -166,40 +166,55 @@ impl<'a> CameraPass<'a> {
     ) -> Result<Vec<Film>> {
         let film = Film::new(self.size, self.window, self.spp).with_layers(&self.layers);
         let mut films = vec![film; gatherer.pictures()];
-        let tiles = self.tracer.tiles();
-        for (done, tile) in tiles.iter().enumerate() {
-            progress.check()?;
-            progress.report(stage, done as u64, tiles.len() as u64);
-            self.trace(tile, &mut films[0], stats)?;
+        self.for_each_tile(stage, stats, progress, &mut |tile, stats| {
+            self.finished.borrow_mut().clear();
+            self.finished_component(tile, LightComponent::Emission, &mut films[0])?;
+            if self.direct {
+                self.light_directly(tile, &mut films[0], stats)?;
+            }
             gatherer.gather(self, tile, &mut films[0], stats, progress)?;
             for (picture, film) in films.iter_mut().enumerate() {
                 gatherer.show(picture, self);
                 self.resolve(tile, film)?;
             }
-        }
-        progress.report(stage, tiles.len() as u64, tiles.len() as u64);
+            Ok(())
+        })?;
         stats.non_finite.film += films.iter().map(Film::non_finite).sum::<u64>();
         let paths = f64::from(self.window.width) * f64::from(self.window.height) * f64::from(self.spp);
         stats.warnings.extend(tally::lost_in_chains(stats.lost_camera_paths / paths));
         Ok(films)
     }
 
-    /// Traces camera rays to the tile's visible points, and adds direct light there if the mode
-    /// takes it from shadow rays.
-    fn trace(&self, tile: &Tile, film: &mut Film, stats: &mut Stats) -> Result<()> {
-        let (gpu, scene) = (self.gpu, self.scene);
-        let count = timed(&mut stats.seconds.camera, || self.tracer.trace(gpu, scene, tile))?;
-        stats.non_finite.camera += count.non_finite;
-        tally::add_step(stats, count);
-        self.finished.borrow_mut().clear();
-        self.finished_component(tile, LightComponent::Emission, film)?;
-        if self.direct {
-            let count = timed(&mut stats.seconds.direct, || self.tracer.light_directly(gpu, scene, tile))?;
-            stats.non_finite.direct += count.non_finite;
+    /// Calls `work` for each tile of the data window, with its camera paths traced to their visible
+    /// points.
+    pub fn for_each_tile(
+        &self,
+        stage: Stage,
+        stats: &mut Stats,
+        progress: &dyn Progress,
+        work: &mut dyn FnMut(&Tile, &mut Stats) -> Result<()>,
+    ) -> Result<()> {
+        let tiles = self.tracer.tiles();
+        for (done, tile) in tiles.iter().enumerate() {
+            progress.check()?;
+            progress.report(stage, done as u64, tiles.len() as u64);
+            let trace = || self.tracer.trace(self.gpu, self.scene, tile);
+            let count = timed(&mut stats.seconds.camera, trace)?;
+            stats.non_finite.camera += count.non_finite;
             tally::add_step(stats, count);
-            self.finished_component(tile, LightComponent::Direct, film)?;
+            work(tile, stats)?;
         }
+        progress.report(stage, tiles.len() as u64, tiles.len() as u64);
         Ok(())
+    }
+
+    /// Adds direct light at the tile's visible points by shadow rays.
+    fn light_directly(&self, tile: &Tile, film: &mut Film, stats: &mut Stats) -> Result<()> {
+        let light = || self.tracer.light_directly(self.gpu, self.scene, tile);
+        let count = timed(&mut stats.seconds.direct, light)?;
+        stats.non_finite.direct += count.non_finite;
+        tally::add_step(stats, count);
+        self.finished_component(tile, LightComponent::Direct, film)
     }
 
     /// Adds what the tile's radiance has more than before to the layer of a component of the light.

@@ -8,12 +8,10 @@ use super::{Attributes, Bounds, Camera, Environment, Image, Light, LoadOptions, 
 use crate::{
     Error, Result,
     image::{EnvironmentProvenance, Provenance},
+    layout::METAL,
     settings::Settings,
     stats::Stats,
 };
-
-/// Fraction of metal from which on a surface casts caustics.
-const METAL: f32 = 0.5;
 
 /// A scene, ready to be traced.
 #[derive(Clone, Debug, Default)]

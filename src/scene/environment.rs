@@ -8,6 +8,7 @@ use sha2::{Digest as _, Sha256};
 use crate::{
     Error, Result,
     image::{decode_radiance, read_radiance_bytes},
+    settings::Range,
 };
 
 /// Equirectangular map of incident radiance. Row 0 is the top (+Y). Before the rotation, a
@@ -76,7 +77,10 @@ impl Environment {
         })
     }
 
-    /// Uniform radiance from all directions.
+    /// Range of its strength, and of the channels of its radiance.
+    pub const STRENGTH: Range<f32> = Range::at_least(0.0);
+
+    /// Uniform radiance from all directions, each channel in [`Self::STRENGTH`].
     #[must_use]
     pub fn uniform(radiance: Vec3) -> Self {
         Self {
@@ -134,9 +138,7 @@ fn wrong(name: &'static str, value: f32, problem: &str) -> Error {
 }
 
 fn check_parameters(strength: f32, rotation: f32) -> Result<()> {
-    if !(strength.is_finite() && strength >= 0.0) {
-        return Err(wrong("environment strength", strength, "is not a number from 0"));
-    }
+    Environment::STRENGTH.check("environment strength", strength)?;
     if !rotation.is_finite() {
         return Err(wrong("environment rotation", rotation, "is not a number of degrees"));
     }
@@ -252,9 +254,9 @@ mod tests {
             error.replace(&path.display().to_string(), "sky.hdr")
         };
         for (strength, rotation, expected) in [
-            (-1.0, 0.0, "environment strength -1: is not a number from 0"),
-            (f32::NAN, 0.0, "environment strength NaN: is not a number from 0"),
-            (f32::INFINITY, 0.0, "environment strength inf: is not a number from 0"),
+            (-1.0, 0.0, "environment strength -1: must be at least 0"),
+            (f32::NAN, 0.0, "environment strength NaN: must be at least 0"),
+            (f32::INFINITY, 0.0, "environment strength inf: must be at least 0"),
             (1.0, f32::INFINITY, "environment rotation inf: is not a number of degrees"),
             (
                 8.0,

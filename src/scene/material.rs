@@ -271,8 +271,7 @@ pub struct Material {
     pub textures: Textures,
 }
 
-/// Roughness below which a lobe is perfectly specular: narrower than a pixel.
-pub const SHARP_ROUGHNESS: f32 = 0.03;
+pub use crate::layout::SHARP_ROUGHNESS;
 
 impl Material {
     /// A material of that name and surface: smooth where it is specular, without emission or

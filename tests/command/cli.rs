@@ -136,6 +136,8 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_right() {
         ("render scene.gltf -o a.exr --max-radius -1", "above 0"),
         ("render scene.gltf -o a.exr --max-radius 1e19", "at most 1e18"),
         ("render scene.gltf -o a.exr --max-bounces -1", "a whole number from 0 to 4095"),
+        ("render scene.gltf -o a.exr --max-bounces 4096", "a whole number from 0 to 4095"),
+        ("render scene.gltf -o a.exr --max-bounces 65535", "a whole number from 0 to 4095"),
         ("render scene.gltf -o a.exr --photons -5k", "a number of at least 1"),
         ("render scene.gltf -o a.exr --global-photons -5", "a number of at least 1"),
         ("render scene.gltf -o a.exr --caustic-photons -1.5M", "a number of at least 1"),

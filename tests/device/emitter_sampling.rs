@@ -164,10 +164,24 @@ fn check_density(lamps: &Lamps) {
     assert!(!other.fits(), "control: lamps chosen for another normal: {other:?}");
 }
 
-/// Weight of the power heuristic for a direction drawn with density `p` by one technique and `q` by
-/// the other (Veach 1997, 9.2.2).
-fn weight(p: f64, q: f64) -> f64 {
-    1.0 / (1.0 + (q / p).powi(2))
+/// Weights of directions drawn with the first density, where another technique draws them with the
+/// second.
+fn weights(densities: &[[f32; 2]]) -> Vec<f64> {
+    let rows: Vec<Row> = densities.iter().map(|[p, q]| [[*p, *q, 0.0, 0.0], [0.0; 4]]).collect();
+    let found = Probe::new("probe_power_weight").run(&rows);
+    found.iter().zip(densities).map(|(found, [p, _])| f64::from(found[0]) * f64::from(*p)).collect()
+}
+
+#[test]
+fn the_power_heuristic_follows_its_formula() {
+    let densities = [[1.0, 0.0], [1.0, 1.0], [0.5, 2.0], [3.0, 0.7], [1e-20, 1e18], [1e18, 1e-20], [1e-30, 0.0]];
+    for ([p, q], found) in densities.iter().zip(weights(&densities)) {
+        let (p, q) = (f64::from(*p), f64::from(*q));
+        let right = 1.0 / (1.0 + (q / p).powi(2));
+        assert!((found - right).abs() < 1e-5, "{p} and {q}: {found} instead of {right}");
+        let balance = p / (p + q);
+        assert!(p == q || q == 0.0 || right.min(balance) < 1e-9 || (found - balance).abs() > 1e-3, "control: balance");
+    }
 }
 
 #[test]
@@ -182,12 +196,12 @@ fn check_weights(lamps: &Lamps) {
     // Densities of the same direction: of light sampling as drawn, of light sampling as evaluated
     // for a cosine sample, and of cosine sampling.
     let sums = |met: &dyn Fn(usize) -> Option<f32>| {
-        let one = |(i, (drawn, _)): (usize, &([f32; 4], f32))| {
-            let cosine = f64::from(drawn[1]) / PI;
-            let (p, met) = (f64::from(drawn[3]), f64::from(met(i)?));
-            (p > 0.0 && cosine > 0.0).then(|| weight(p, cosine) + weight(cosine, met))
+        let densities = |(i, (drawn, _)): (usize, &([f32; 4], f32))| {
+            let (cosine, p, met) = (drawn[1] / PI as f32, drawn[3], met(i)?);
+            (p > 0.0 && cosine > 0.0).then_some([[p, cosine], [cosine, met]])
         };
-        pairs.iter().enumerate().filter_map(one).collect::<Vec<f64>>()
+        let both: Vec<[[f32; 2]; 2]> = pairs.iter().enumerate().filter_map(densities).collect();
+        weights(&both.concat()).chunks(2).map(|pair| pair[0] + pair[1]).collect::<Vec<f64>>()
     };
     let wrong = |sums: &[f64]| sums.iter().filter(|sum| (*sum - 1.0).abs() > 2e-3).count();
     let right = sums(&|i| Some(pairs[i].1));

@@ -1,4 +1,5 @@
-//! Links and paths of the documents lead to files of the repository.
+//! Links and paths of the documents lead to files of the repository. Tables name all kernels and
+//! pages.
 
 use std::{
     fs,
@@ -61,4 +62,31 @@ fn dead_links_and_paths_are_found() {
     let text = "[a](search.md#states) [b](nothing.md) [c](https://example.org/x) `src/lib.rs` `src/nothing.rs::f` `src/*.rs`\n\
                 ```\n`src/in/a/block.rs`\n```\n";
     assert_eq!(dead(root, &root.join("docs/a.md"), text), ["nothing.md", "src/nothing.rs"]);
+}
+
+/// Names of the files of a folder with that extension, without it.
+fn stems(folder: &Path, extension: &str) -> Vec<String> {
+    let paths = fs::read_dir(folder).expect("the folder can be listed").map(|entry| entry.expect("an entry").path());
+    let found = paths.filter(|path| path.extension().is_some_and(|e| e == extension));
+    found.map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned()).collect()
+}
+
+/// Kernels that no table of the text names, and pages that it has no link to.
+fn unlisted(kernels: &[String], pages: &[String], text: &str) -> Vec<String> {
+    let rows: String = text.lines().filter(|line| line.starts_with("| `")).collect();
+    let kernels = kernels.iter().filter(|kernel| !rows.contains(&format!("`{kernel}`")));
+    let pages = pages.iter().filter(|page| !text.contains(&format!("]({page}.md)")));
+    kernels.chain(pages).cloned().collect()
+}
+
+#[test]
+fn internals_has_all_kernels_and_pages() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(root.join("docs/internals.md")).expect("the document can be read");
+    let (kernels, mut pages) = (stems(&root.join("shaders"), "wesl"), stems(&root.join("docs"), "md"));
+    pages.retain(|page| page != "internals");
+    assert!(kernels.len() > 30 && pages.len() > 10, "{kernels:?} {pages:?}");
+    assert_eq!(unlisted(&kernels, &pages, &text), [""; 0]);
+    let without = text.replace("`light_lobes`, ", "").replace("](glass.md)", "](gloss.md)");
+    assert_eq!(unlisted(&kernels, &pages, &without), ["light_lobes", "glass"], "control");
 }

@@ -6,7 +6,7 @@ use std::{fs, path::Path};
 fn layer_of(module: &str) -> Option<u32> {
     Some(match module {
         "density" | "pixel_filter" | "error" | "html" | "settings" | "image" | "layout" | "map_kind" | "memory"
-        | "rng" | "stats" | "progress" => 0,
+        | "stats" | "progress" => 0,
         // Names of `error` that lib.rs re-exports.
         "Error" | "Result" => 0,
         "scene" | "bvh" => 1,

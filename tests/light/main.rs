@@ -12,6 +12,7 @@ mod pixels;
 mod references;
 mod refraction;
 mod seen;
+mod sessions;
 mod solids;
 mod spaced_gathering;
 mod transport;

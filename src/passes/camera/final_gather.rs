@@ -1,6 +1,6 @@
 //! Final gathering: light at visible points from the surfaces that rays from them hit (Jensen 2001,
 //! "Realistic Image Synthesis Using Photon Mapping", section 8.2). Kernels: `start_final_gather`,
-//! `trace_camera`.
+//! `trace_camera`, `light_lobes`, `sum_final_gather`.
 
 use super::{
     camera_tracer::CameraTracer,

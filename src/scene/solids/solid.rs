@@ -2,8 +2,7 @@
 
 use crate::scene::{Bounds, Material, Surface};
 
-/// Number of slots, and the slot of surfaces that bound no solid.
-pub const NO_SLOT: u32 = 127;
+pub use crate::layout::NO_SLOT;
 
 /// A closed surface of glass, or several with their cavities.
 #[derive(Clone, Copy, Debug, PartialEq)]
