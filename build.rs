@@ -88,8 +88,8 @@ fn shader_entry(stem: &str, wgsl: &str) -> String {
 
 /// Stops the build with the message of naga and the source file and line of its location.
 fn fail_at(stem: &str, wgsl: &str, location: Option<naga::SourceLocation>, message: &str) -> ! {
-    let place = location.and_then(|l| source_line(wgsl, l.offset as usize)).unwrap_or_default();
-    fail(&format!("{place}in kernel shaders/{stem}.wesl: {message}"))
+    let line = location.and_then(|l| source_line(wgsl, l.offset as usize)).unwrap_or_default();
+    fail(&format!("{line}in kernel shaders/{stem}.wesl: {message}"))
 }
 
 /// Finds `file:line` in the sources of a location in the composed WGSL. WESL reformats declarations

@@ -10,7 +10,7 @@ use std::{error::Error, path::Path};
 
 use caustica::{
     Gpu, Progressive, Scene, Session, Settings, Silent,
-    image::{Block, ErrorEstimate, Film, PassSum, difference::rel_mse, read_exr},
+    image::{ErrorEstimate, Film, PassBlock, PassSum, difference::rel_mse, read_exr},
     settings::{PassSettings, Quality},
 };
 use plotters::prelude::*;
@@ -76,7 +76,7 @@ fn measure(settings: Settings, passes: u32) -> Result<(Vec<Row>, f64), Box<dyn E
             Some(sum) => sum.merge(&film)?,
             None => *quarter = Some(film.clone()),
         }
-        all.push(Block::of_pass(index, film, &stats))?;
+        all.push(PassBlock::of_pass(index, film, &stats))?;
         if !(index + 1).is_power_of_two() {
             continue;
         }

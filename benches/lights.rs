@@ -89,8 +89,8 @@ fn under_points(count: usize) -> Scene {
     let (mut scene, mut random) = (yard(), Random(5));
     let across = |random: &mut Random| HALF * (2.0 * random.unit() - 1.0);
     for _ in 0..count {
-        let place = vec3(across(&mut random), 1.0 + random.unit(), across(&mut random));
-        scene.lights.push(point_light(place, 100.0 / count as f32));
+        let position = vec3(across(&mut random), 1.0 + random.unit(), across(&mut random));
+        scene.lights.push(point_light(position, 100.0 / count as f32));
     }
     scene.cameras = vec![camera(vec3(0.0, 60.0, 0.0), Vec3::ZERO, 30.0)];
     scene

@@ -28,7 +28,7 @@ const QUERIES: usize = 262_144;
 const ROUNDS: usize = 5;
 /// Fraction of the photons in the caustic, and its width for a thousand times the density of the
 /// six walls.
-const SHARE: f32 = 0.3;
+const IN_CAUSTIC: f32 = 0.3;
 const WIDTH: f32 = 0.0507;
 
 fn main() {
@@ -41,7 +41,7 @@ fn main() {
     let device_points = gpu.storage_with("points", &points).expect("points fit");
     let asked: Vec<usize> = std::env::args().filter_map(|word| word.parse().ok()).collect();
     for count in if asked.is_empty() { vec![100_000, 1_000_000] } else { asked } {
-        let photons = caustic_box(&mut Random(1), count, SHARE, WIDTH);
+        let photons = caustic_box(&mut Random(1), count, IN_CAUSTIC, WIDTH);
         let positions: Vec<[f32; 3]> = photons.iter().map(|p| p.position).collect();
         let tree: ImmutableKdTree<f32, 3> = ImmutableKdTree::new_from_slice(&positions).expect("a tree");
         let build = || {

@@ -213,16 +213,16 @@ impl View<'_> {
 
     /// Photons as dots, coloured by their flux.
     fn photons(&self, gpu: &Gpu, map: &PhotonMap) -> Result<Canvas> {
-        let (places, fluxes) = map.read(gpu)?;
+        let (photons, fluxes) = map.read(gpu)?;
         let mut dots = vec![None; (SIZE * SIZE) as usize];
-        let step = places.len().div_ceil(DOTS);
-        for (place, flux) in places.iter().zip(&fluxes).step_by(step) {
+        let step = photons.len().div_ceil(DOTS);
+        for (photon, flux) in photons.iter().zip(&fluxes).step_by(step) {
             let flux = Vec3::from(flux.flux);
-            if let Some(i) = self.pixel(Vec3::from(place.position)) {
+            if let Some(i) = self.pixel(Vec3::from(photon.position)) {
                 dots[i] = Some(flux / flux.max_element().max(f32::MIN_POSITIVE));
             }
         }
-        println!("photons in a map: {}, of which one in {step} is drawn", places.len());
+        println!("photons in a map: {}, of which one in {step} is drawn", photons.len());
         Ok(painted(|i| dots[i].map_or([0; 3], |c: Vec3| c.to_array().map(|c| byte(srgb_encode(c))))))
     }
 

@@ -8,7 +8,7 @@ use std::{env, path::Path};
 
 use caustica::{
     Gpu, Progressive, Result, Scene, Session, Settings, Silent,
-    image::{Block, ErrorEstimate, PassSum, Tonemap, write_png},
+    image::{ErrorEstimate, PassBlock, PassSum, Tonemap, write_png},
     settings::PassSettings,
 };
 
@@ -29,7 +29,7 @@ fn main() -> Result<()> {
     let mut sum = PassSum::default();
     for index in 0..PASSES {
         let (film, stats) = progressive.render(index, &Silent)?;
-        sum.push(Block::of_pass(index, film, &stats))?;
+        sum.push(PassBlock::of_pass(index, film, &stats))?;
     }
     let total = sum.total()?.expect("there are passes");
     let error = ErrorEstimate::of(total.film(), None).expect("there are several passes");

@@ -97,7 +97,7 @@ impl Density {
         }
     }
 
-    /// What an estimate of `k` photons sums: how many, and the softness of the kernel
+    /// Number of photons that an estimate of `k` photons sums, and the softness of the kernel
     /// ([`Self::softened`]).
     ///
     /// The ball up to the (k+1)-th photon holds k of them where photons lie at random, but k + ½ on
@@ -178,7 +178,7 @@ impl Polynomial {
         (0..).zip(self.coefficients).map(|(m, c)| 2.0 * c / f64::from(self.power * m + 2)).sum()
     }
 
-    /// (∫ K)²/∫ K² over the disc, relative to its area: the part of the photons that counts, if
+    /// (∫ K)²/∫ K² over the disc, relative to its area: the fraction of the photons that counts, if
     /// equal weights of fewer photons would give the same variance.
     fn spread(&self) -> f64 {
         let pairs = (0..MAX_MOMENTS).flat_map(|m| (0..MAX_MOMENTS).map(move |n| (m, n)));

@@ -22,7 +22,7 @@ pub enum Error {
         path: PathBuf,
         /// JSON path of the element.
         place: String,
-        /// What is wrong with it.
+        /// The problem with it.
         problem: String,
     },
     /// No usable adapter, or none of the requested name.
@@ -31,7 +31,7 @@ pub enum Error {
     /// A size exceeds a limit of the adapter.
     #[error("{what} needs {needed} {unit}, but {limit} of {adapter} allows {allowed}; {advice}")]
     Limit {
-        /// What does not fit.
+        /// Name of what does not fit.
         what: String,
         /// Its size, in `unit`.
         needed: u64,
@@ -54,7 +54,7 @@ pub enum Error {
         used >> 20
     )]
     Memory {
-        /// What does not fit.
+        /// Name of what does not fit.
         what: String,
         /// Bytes; `None` where only the driver knows.
         needed: Option<u64>,

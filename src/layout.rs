@@ -202,7 +202,7 @@ pub struct TextureRecord {
     pub transform: [[f32; 4]; 2],
 }
 
-/// What lies beyond the border of an image: the image again, mirrored, or the border's texels.
+/// Texels beyond the border of an image: the image again, mirrored, or the border's texels.
 pub const WRAP_REPEAT: u32 = 0;
 pub const WRAP_MIRROR: u32 = 1;
 pub const WRAP_CLAMP: u32 = 2;
@@ -253,9 +253,9 @@ pub const SPHERE_LIGHT: u32 = 4;
 /// The environment.
 pub const ENVIRONMENT_LIGHT: u32 = 5;
 
-/// A punctual light, an emissive triangle or a part of one, an emissive sphere, or the environment.
-/// Its power is `emission · area · solid_angle`, times the mean of what varies over a surface,
-/// except for directional lights and the environment.
+/// A punctual light, an emissive triangle or a subtriangle of one, an emissive sphere, or the
+/// environment. Its power is `emission · area · solid_angle`, times the mean of what varies over a
+/// surface, except for directional lights and the environment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Light {
@@ -266,9 +266,9 @@ pub struct Light {
     /// Spot, directional: unit direction of emission. Triangle: edge to the second corner. Sphere:
     /// (radius, 0, 0).
     pub e1: [f32; 3],
-    /// Index of the group, what a user calls one light: all surfaces of one emissive material are a
-    /// group.
-    pub group: u32,
+    /// Index of the named light, what a user calls one light: all surfaces of one emissive material
+    /// are one.
+    pub named: u32,
     /// Spot: 1 − cos of the outer angle, and width in cosines of the falloff. Triangle: edge to the
     /// third corner.
     pub e2: [f32; 3],
@@ -290,10 +290,11 @@ pub struct Light {
     pub material: u32,
     /// Index of the triangle's [`Attributes`] plus one; 0 for none.
     pub attributes: u32,
-    /// Triangle: place of this light among the parts of its triangle, [`part_word`].
-    pub part: u32,
-    /// Triangle: number of parts along an edge of its triangle; 0 or 1 if the light is all of it.
-    /// The parts are consecutive lights, row by row.
+    /// Triangle: position of this light among the subtriangles of its triangle,
+    /// [`subtriangle_word`].
+    pub subtriangle: u32,
+    /// Triangle: number of subtriangles along an edge of its triangle; 0 or 1 if the light is all
+    /// of it. The subtriangles are consecutive lights, row by row.
     pub side: u32,
     /// Index of its leaf among the [`LightNode`]s, or [`NO_LEAF`], and of the root of its tree.
     pub leaf: u32,
@@ -302,13 +303,13 @@ pub struct Light {
     pub pad1: u32,
 }
 
-/// Set in [`Light::part`] for a part that is turned by half a turn against its triangle.
+/// Set in [`Light::subtriangle`] for one that is turned by half a turn against its triangle.
 pub const TURNED_BIT: u32 = 1 << 16;
 
-/// [`Light::part`]: column and row of the corner nearest to the triangle's first corner, along its
-/// edges, in units of parts.
+/// Word for [`Light::subtriangle`]: column and row of the corner nearest to the triangle's first
+/// corner, along its edges, in units of subtriangles.
 #[must_use]
-pub fn part_word(column: u32, row: u32, is_turned: bool) -> u32 {
+pub fn subtriangle_word(column: u32, row: u32, is_turned: bool) -> u32 {
     column | (row << 8) | if is_turned { TURNED_BIT } else { 0 }
 }
 
@@ -456,7 +457,7 @@ pub struct VisiblePoint {
     pub media_high: u32,
     /// Unit, to the viewer.
     pub view: [f32; 3],
-    /// What lies above the diffuse lobe, eight bits each: roots of the reflectances of a coat along
+    /// Layers above the diffuse lobe, eight bits each: roots of the reflectances of a coat along
     /// the normal and at grazing angles, strongest colour of the sheen and its roughness. 0 for
     /// nothing.
     pub above: u32,
@@ -469,7 +470,7 @@ pub struct VisiblePoint {
 pub struct LobePoint {
     /// Metres.
     pub position: [f32; 3],
-    /// As in [`VisiblePoint`].
+    /// Same as in [`VisiblePoint`].
     pub offset: f32,
     /// Weight of the path before the lobe.
     pub beta: [f32; 3],
@@ -624,11 +625,11 @@ pub const CAUSTIC_MAP: u32 = 1;
 pub const MAP_KINDS: u32 = 2;
 
 /// Key of a staged photon. The lowest bits ([`PATH_MASK`]) are the index of the path in its batch.
-/// From bit [`PLACE_SHIFT`] on, the bits of [`PLACE_MASK`] are the photon's number on its path.
-/// From bit [`KIND_SHIFT`] on comes the kind of the map.
+/// From bit [`PHOTON_INDEX_SHIFT`] on, the bits of [`PHOTON_INDEX_MASK`] are the photon's index
+/// among those of its path in that map. From bit [`KIND_SHIFT`] on comes the kind of the map.
 pub const PATH_MASK: u32 = 0x3_ffff;
-pub const PLACE_SHIFT: u32 = 18;
-pub const PLACE_MASK: u32 = 0xfff;
+pub const PHOTON_INDEX_SHIFT: u32 = 18;
+pub const PHOTON_INDEX_MASK: u32 = 0xfff;
 pub const KIND_SHIFT: u32 = 30;
 
 /// Arguments of `store_photons`; see there.
@@ -777,13 +778,13 @@ pub struct CellGrid {
     pub mask: u32,
     pub points: u32,
     /// Points with this [`VisiblePoint::next_map`] are lit.
-    pub asked: u32,
+    pub next_map: u32,
     pub pad0: u32,
     pub pad1: u32,
     pub pad2: u32,
 }
 
-/// What the rays of final gathering of a point tell of the light's way there: sums over rays.
+/// Sums over the rays of final gathering of a point, by the directions from which light arrives.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ArrivingLight {
@@ -808,7 +809,7 @@ pub struct IrradianceRecord {
     /// By that normal, W/m²; negative: no point.
     pub irradiance: [f32; 3],
     /// Eight bits each, signed and normalised: the vector ∫ L ω dω along the surface, over twice
-    /// the irradiance; and the part of the filter's radius up to which the record is taken.
+    /// the irradiance; and the fraction of the filter's radius up to which the record is taken.
     pub direction_and_reach: u32,
 }
 
@@ -828,7 +829,7 @@ pub struct RecordGrid {
     /// Radius of the filter per metre between camera and point; metres if rays are parallel.
     pub reach: f32,
     /// Pixels of the grid on each side of a point among which the filter looks for records.
-    pub window: u32,
+    pub footprint: u32,
 }
 
 /// Irradiance kept for the points of a cell that lie on one surface.
@@ -836,12 +837,12 @@ pub struct RecordGrid {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct IrradianceCell {
     /// Coordinates of the cell, in cells of its level.
-    pub place: [i32; 3],
+    pub coordinates: [i32; 3],
     /// Level + 1; 0: no entry.
     pub level: u32,
     /// The point that speaks for the cell, metres, and its geometric normal.
     pub position: [f32; 3],
-    /// Whether the cells of the next level are asked first: [`WHOLE_CELL`], [`SPLIT_CELL`] or
+    /// Whether the cells of the next level are looked up first: [`WHOLE_CELL`], [`SPLIT_CELL`] or
     /// [`WIDE_CELL`].
     pub split: u32,
     pub normal: [f32; 3],
@@ -851,8 +852,8 @@ pub struct IrradianceCell {
     pub pad1: u32,
 }
 
-/// The cell has no parts; it has, and speaks for those without an entry; it has, and is too wide to
-/// speak for them.
+/// The cell is not split; it is, and speaks for cells in it without an entry; it is, and is too
+/// wide to speak for them.
 pub const WHOLE_CELL: u32 = 0;
 pub const SPLIT_CELL: u32 = 1;
 pub const WIDE_CELL: u32 = 2;
@@ -896,7 +897,7 @@ pub struct Cell {
 /// Position and incident direction of a sorted photon: all that a search reads.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct PhotonPlace {
+pub struct PhotonPosition {
     /// Metres.
     pub position: [f32; 3],
     /// Direction to where the photon came from, octahedral.
@@ -921,7 +922,7 @@ pub struct MapInfo {
     pub count: u32,
     /// Levels of cells.
     pub levels: u32,
-    /// Index of the first photon of the second window.
+    /// Index of the first photon of the second segment.
     pub split: u32,
     pub pad: u32,
 }
@@ -997,7 +998,7 @@ pub struct ShareRound {
     pub reach_squared: f32,
     /// Visible points of the tile, without its margin.
     pub points: u32,
-    /// As in [`GatherInfo`].
+    /// Same as in [`GatherInfo`].
     pub map_number: u32,
 }
 
@@ -1021,14 +1022,14 @@ pub struct SortStep {
     pub pad: u32,
 }
 
-/// Boxes per window of the first reduction of the photons' bounds.
+/// Boxes per segment of the first reduction of the photons' bounds.
 pub const BOUND_LANES: u32 = 1024;
 
-/// Arguments of `bound_photons` for one window.
+/// Arguments of `bound_photons` for one segment.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BoundStep {
-    /// Photons of the window.
+    /// Photons of the segment.
     pub count: u32,
     /// Index of its first box.
     pub first_box: u32,
@@ -1040,9 +1041,9 @@ pub struct BoundStep {
 pub struct KeyStep {
     /// Invocations.
     pub count: u32,
-    /// Photons of the window that is bound: the first, and how many.
-    pub window_first: u32,
-    pub window_count: u32,
+    /// Photons of the segment that is bound: the first, and how many.
+    pub segment_first: u32,
+    pub segment_count: u32,
     /// 1 for the fine half of the Hilbert key, 0 for the coarse one.
     pub fine: u32,
 }
@@ -1051,12 +1052,12 @@ pub struct KeyStep {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct MoveStep {
-    /// Sorted photons of the window that is written: the first, and how many.
+    /// Sorted photons of the segment that is written: the first, and how many.
     pub sorted_first: u32,
     pub sorted_count: u32,
-    /// Unsorted photons of the window that is read: the first, and how many.
-    pub window_first: u32,
-    pub window_count: u32,
+    /// Unsorted photons of the segment that is read: the first, and how many.
+    pub segment_first: u32,
+    pub segment_count: u32,
 }
 
 /// Arguments of `build_grid`: the cells to make.

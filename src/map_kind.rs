@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::layout::{CAUSTIC_MAP, GLOBAL_MAP};
 
-/// Which photons a map holds. The number of a kind is that in the photons' keys on the device.
+/// Kind of the photons that a map holds. The number of a kind is that in the photons' keys on the
+/// device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MapKind {
@@ -30,9 +31,9 @@ impl MapKind {
 /// A value for each kind of map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ByKind<T> {
-    /// Of the global map.
+    /// Value of the global map.
     pub global: T,
-    /// Of the caustic map.
+    /// Value of the caustic map.
     pub caustic: T,
 }
 

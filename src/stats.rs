@@ -167,7 +167,7 @@ pub struct Stats {
 }
 
 impl Stats {
-    /// Adds the work of a further pass. A warning that differs in numbers only is told once.
+    /// Adds the work of a further pass. A warning that differs in numbers only is kept once.
     pub fn add(&mut self, pass: &Self) {
         let (s, t) = (&mut self.seconds, &pass.seconds);
         for (sum, seconds) in [

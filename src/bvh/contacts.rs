@@ -20,7 +20,7 @@ use crate::{
 const TOLERANCE: f64 = 1.0 / (1 << 21) as f64;
 /// Largest sine of the angle between the planes of two surfaces that are one.
 const MAX_SINE: f64 = 1e-3;
-/// Part of the size of the smaller triangle by which two must overlap.
+/// Fraction of the size of the smaller triangle by which two must overlap.
 const MIN_OVERLAP: f64 = 1e-4;
 
 /// The triangles of one material in one object, or its spheres.
@@ -101,7 +101,7 @@ impl Patches {
 pub fn contacts(scene: &Scene, bvh: &Bvh) -> Vec<Option<u32>> {
     let patches = Patches::new(scene);
     let search = Search { bvh, patches: &patches, of_nodes: patches.of_nodes(bvh) };
-    // Of a patch that neither shines nor lets light through, it is all the same which part is met.
+    // A patch that neither shines nor lets light through may be met in any of its parts.
     let is_plain = |patch: u32| {
         let material = &scene.materials[patches.all[patch as usize].material as usize];
         material.emission == Vec3::ZERO && !material.surface.transmits()

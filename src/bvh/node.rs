@@ -55,13 +55,13 @@ impl BvhNode {
             let highest = boxes.iter().map(|b| b.max[axis]).fold(corner[axis], f32::max);
             let exponent = exponent(corner[axis], highest);
             let at = |units: u32| plane(corner[axis], exponent, units);
-            let guess = |place: f32| ((place - corner[axis]) / unit(exponent)) as u32;
+            let guess = |position: f32| ((position - corner[axis]) / unit(exponent)) as u32;
             node.grid[3] |= exponent << (8 * axis);
-            for (slot, b) in boxes.iter().enumerate() {
+            for (child, b) in boxes.iter().enumerate() {
                 let below = (0..=guess(b.min[axis]).min(MAX_UNITS)).rev().find(|q| at(*q) <= b.min[axis]);
                 let above = (guess(b.max[axis]).min(MAX_UNITS)..=MAX_UNITS).find(|q| at(*q) >= b.max[axis]);
-                node.low[axis] |= below.unwrap_or(0) << (8 * slot);
-                node.high[axis] |= above.unwrap_or(MAX_UNITS) << (8 * slot);
+                node.low[axis] |= below.unwrap_or(0) << (8 * child);
+                node.high[axis] |= above.unwrap_or(MAX_UNITS) << (8 * child);
             }
         }
         for (leaf, count) in leaves.iter().enumerate() {
@@ -74,18 +74,18 @@ impl BvhNode {
     pub fn children(&self) -> impl Iterator<Item = BvhChild> + use<> {
         let Self { grid: [x, y, z, shape], low, high } = *self;
         let corner = [x, y, z].map(f32::from_bits);
-        let place = move |axis: usize, words: [u32; 4], slot: u32| {
-            plane(corner[axis], (shape >> (8 * axis)) & 0xff, (words[axis] >> (8 * slot)) & 0xff)
+        let side = move |axis: usize, words: [u32; 4], child: u32| {
+            plane(corner[axis], (shape >> (8 * axis)) & 0xff, (words[axis] >> (8 * child)) & 0xff)
         };
         let index = move |word: u32| word & ((1 << BVH_INDEX_BITS) - 1);
         let mut first_primitive = index(high[3]);
-        (0..high[3] >> BVH_INDEX_BITS).map(move |slot| {
-            let at = |words| Vec3::from_array(std::array::from_fn(|axis| place(axis, words, slot)));
+        (0..high[3] >> BVH_INDEX_BITS).map(move |child| {
+            let at = |words| Vec3::from_array(std::array::from_fn(|axis| side(axis, words, child)));
             let bounds = Bounds { min: at(low), max: at(high) };
-            if slot < low[3] >> BVH_INDEX_BITS {
-                return BvhChild { bounds, first: index(low[3]) + slot, count: 0 };
+            if child < low[3] >> BVH_INDEX_BITS {
+                return BvhChild { bounds, first: index(low[3]) + child, count: 0 };
             }
-            let count = 1 + ((shape >> (24 + 2 * slot)) & 3);
+            let count = 1 + ((shape >> (24 + 2 * child)) & 3);
             first_primitive += count;
             BvhChild { bounds, first: first_primitive - count, count }
         })

@@ -207,7 +207,7 @@ impl RenderArgs {
         })
     }
 
-    /// What the quality stands for, in the words of the other options.
+    /// Values that the quality stands for, in the words of the other options.
     pub fn quality_line(&self) -> String {
         let Settings { photons, estimate, picture, .. } = self.settings();
         format!(

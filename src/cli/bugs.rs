@@ -24,10 +24,8 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
 
 fn line(info: &PanicHookInfo) -> String {
     let message = info.payload_as_str().unwrap_or("panic").split_whitespace().collect::<Vec<_>>().join(" ");
-    let place = info.location().map_or(String::new(), |place| format!(" at {}:{}", place.file(), place.line()));
-    format!(
-        "internal error: {message}{place}; this is a bug of caustica, please report it with the command and the scene"
-    )
+    let at = info.location().map_or(String::new(), |location| format!(" at {}:{}", location.file(), location.line()));
+    format!("internal error: {message}{at}; this is a bug of caustica, please report it with the command and the scene")
 }
 
 #[cfg(test)]

@@ -86,8 +86,8 @@ pub fn status(args: &StatusArgs) -> Result<()> {
     let mut line = |label: &str, value: &str| writeln!(text, "{label}: {value}").expect("a String can be written");
     for parts in &found.windows {
         let passes: Vec<_> = parts.passes().iter().map(ToString::to_string).collect();
-        let place = words(parts.window);
-        line("pixels", &format!("{place}: passes {} in {} parts", passes.join(", "), parts.parts.len()));
+        let rectangle = words(parts.window);
+        line("pixels", &format!("{rectangle}: passes {} in {} parts", passes.join(", "), parts.parts.len()));
     }
     missing.iter().for_each(|missing| line("missing", missing));
     found.overlaps.iter().for_each(|overlap| line("twice", overlap));

@@ -10,7 +10,7 @@ use std::{
 use caustica::{
     Error, Result,
     gpu::Gpu,
-    image::{Attributes, Block, ErrorEstimate, Frame, PassSum, differences, read_part, write_part},
+    image::{Attributes, ErrorEstimate, Frame, PassBlock, PassSum, differences, read_part, write_part},
     progress::{Progress, Stage},
     renderer::{LightGroups, Progressive, size_of},
     scene::Scene,
@@ -41,7 +41,7 @@ pub struct Inputs<'a> {
     pub write: &'a dyn Fn(&Frame, &Attributes) -> Result<()>,
 }
 
-/// What is done of a run.
+/// Finished work of a run.
 struct Done {
     sum: PassSum,
     stats: Stats,
@@ -49,8 +49,8 @@ struct Done {
     passes: u32,
 }
 
-/// Renders the passes that are left. `None` if the run was told to end after it wrote a checkpoint,
-/// with its outputs as far as they were.
+/// Renders the passes that are left. `None` if the run was asked to end after it wrote a
+/// checkpoint, with its outputs as far as they were.
 pub fn render(inputs: &Inputs) -> Result<Option<Picture>> {
     let started = Instant::now();
     let Inputs { args, settings, display, .. } = *inputs;
@@ -106,7 +106,7 @@ fn run(inputs: &Inputs, range: PassRange, started: Instant, done: &mut Done) -> 
     loop {
         let (film, stats) = groups.film(|group, _| progressive[group].render(next, &stages))?;
         stages.shown.store(false, Ordering::Relaxed);
-        done.sum.push(Block::of_pass(next, film, &stats))?;
+        done.sum.push(PassBlock::of_pass(next, film, &stats))?;
         match done.passes {
             0 => done.stats = stats,
             _ => done.stats.add(&stats),
@@ -153,7 +153,7 @@ fn estimate(inputs: &Inputs, done: &Done) -> Result<Option<ErrorEstimate>> {
     Ok(total.and_then(|total| ErrorEstimate::of(total.film(), options.region)))
 }
 
-/// Part of the run that is done, and seconds left.
+/// Fraction of the run that is done, and seconds left.
 fn outlook(time: Option<Duration>, range: PassRange, next: u32, elapsed: Duration, each: Duration) -> (f64, f64) {
     let of_passes = f64::from(next - range.first) / f64::from(range.count());
     let passes_left = each.as_secs_f64() * f64::from(range.end - next);
@@ -163,7 +163,7 @@ fn outlook(time: Option<Duration>, range: PassRange, next: u32, elapsed: Duratio
     (of_passes.max(of_time).min(1.0), passes_left.min(time_left))
 }
 
-/// State of a run in one line. The passes of a run without an end are told without it.
+/// State of a run in one line. The passes of a run without an end are counted without it.
 fn line(next: u32, range: PassRange, has_no_time: bool, error: Option<&ErrorEstimate>, left: f64) -> String {
     let percent = |x: f64| format!("{:.2} %", 100.0 * x);
     let error = error.map_or(String::new(), |error| {
@@ -255,7 +255,7 @@ fn picture(inputs: &Inputs, done: &Done) -> Result<Picture> {
     Ok(Picture { frame: total.film().finish_with_errors(), attributes, stats })
 }
 
-/// Shows the stages of the first pass; further ones are told as wholes.
+/// Shows the stages of the first pass; further ones are reported as wholes.
 struct Stages<'a> {
     display: &'a Display,
     shown: AtomicBool,

@@ -36,7 +36,7 @@ struct Job {
     pictures: Vec<PathBuf>,
 }
 
-/// What is rendered, scene by scene.
+/// Jobs of the command, scene by scene.
 fn jobs(args: &RenderArgs) -> Vec<Job> {
     let pictures = |scene: &PathBuf| match &args.output_dir {
         None => args.outputs.clone(),

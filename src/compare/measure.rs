@@ -155,7 +155,7 @@ fn some_add_up(numbers: &[u32], count: u32, sum: u32) -> bool {
 mod tests {
     use super::*;
     use crate::{
-        layout::{PhotonFlux, PhotonPlace, octahedral},
+        layout::{PhotonFlux, PhotonPosition, octahedral},
         reference::fingerprint,
     };
 
@@ -164,11 +164,11 @@ mod tests {
     /// Photons at these distances along x, all incident from above, with the query point at the
     /// origin.
     fn line(distances: &[f32]) -> (KdMap, VisiblePoint) {
-        let place = |&x: &f32| PhotonPlace { position: [x, 0.0, 0.0], wi: octahedral(glam::Vec3::Y) };
+        let photon = |&x: &f32| PhotonPosition { position: [x, 0.0, 0.0], wi: octahedral(glam::Vec3::Y) };
         let flux = PhotonFlux { flux: [1.0; 3], normal: 0 };
         let up = [0.0, 1.0, 0.0];
         let point = VisiblePoint { next_map: 1, ng: up, ns: up, weight: [1.0; 3], ..VisiblePoint::default() };
-        (KdMap::new(distances.iter().map(place).collect(), vec![flux; distances.len()], 1), point)
+        (KdMap::new(distances.iter().map(photon).collect(), vec![flux; distances.len()], 1), point)
     }
 
     /// Counts of a query in which the grid has summed these photons of the line, with the

@@ -108,16 +108,16 @@ fn histogram(histogram: &Histogram, tolerance: f64) -> String {
     }
     let _ =
         writeln!(svg, "<line class=\"axis\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{BOTTOM}\" y2=\"{BOTTOM}\"/>", width - LEFT);
-    let place = |exponent: f64| LEFT + BAR * 2.0 * (exponent - f64::from(Histogram::FIRST));
+    let along = |exponent: f64| LEFT + BAR * 2.0 * (exponent - f64::from(Histogram::FIRST));
     for exponent in Histogram::FIRST..=0 {
-        let x = place(exponent.into());
+        let x = along(exponent.into());
         let number = if exponent == 0 { "1".to_string() } else { format!("1e{exponent}") };
         let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"208\" text-anchor=\"middle\">{number}</text>");
     }
     let middle = width / 2.0;
     let _ =
         writeln!(svg, "<text x=\"{middle}\" y=\"225\" text-anchor=\"middle\">relative difference of radiance</text>");
-    let limit = place(tolerance.log10());
+    let limit = along(tolerance.log10());
     if (LEFT..=width - LEFT).contains(&limit) {
         let _ = writeln!(svg, "<line class=\"limit\" x1=\"{limit:.1}\" x2=\"{limit:.1}\" y1=\"14\" y2=\"{BOTTOM}\"/>");
     }

@@ -47,9 +47,9 @@ pub(super) fn false_colors(grid: &Frame, kdtree: &Frame) -> Result<Vec<u8>> {
 /// 10^[`Histogram::FIRST`] and 1.
 pub(super) fn color(difference: f64) -> Rgb8 {
     let first = f64::from(Histogram::FIRST);
-    let place = if difference > 0.0 { (1.0 - difference.log10() / first).clamp(0.0, 1.0) } else { return [0; 3] };
+    let fraction = if difference > 0.0 { (1.0 - difference.log10() / first).clamp(0.0, 1.0) } else { return [0; 3] };
     // Black is reserved for equal pixels, so the scale begins above it.
-    colorous::INFERNO.eval_continuous(0.15 + 0.85 * place).as_array()
+    colorous::INFERNO.eval_continuous(0.15 + 0.85 * fraction).as_array()
 }
 
 fn draw_scale(canvas: &mut Canvas, top: u32) {

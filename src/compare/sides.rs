@@ -76,7 +76,7 @@ impl<'a> GridGather<'a> {
     pub fn bytes(&self) -> u64 {
         let of_map = |map: &PhotonMap| {
             let mut buffers = map.bindings().map(|(_, buffer)| buffer).to_vec();
-            // A map with a single window binds the same buffer twice.
+            // A map with a single segment binds the same buffer twice.
             buffers.dedup_by(|a, b| std::ptr::eq(*a, *b));
             buffers.iter().map(|buffer| buffer.size()).sum::<u64>()
         };
@@ -90,12 +90,12 @@ fn build_seconds(gpu: &Gpu, maps: &[PhotonMap]) -> Result<f64> {
     let kernels = MapKernels::new(gpu);
     let mut seconds = 0.0;
     for map in maps {
-        let (places, fluxes) = map.read(gpu)?;
+        let (photons, fluxes) = map.read(gpu)?;
         let photon = |i: u32| {
-            let (place, flux) = (&places[i as usize], &fluxes[i as usize]);
-            Photon { position: place.position, wi: place.wi, flux: flux.flux, normal: flux.normal }
+            let (photon, flux) = (&photons[i as usize], &fluxes[i as usize]);
+            Photon { position: photon.position, wi: photon.wi, flux: flux.flux, normal: flux.normal }
         };
-        let mut order: Vec<u32> = (0..places.len() as u32).collect();
+        let mut order: Vec<u32> = (0..photons.len() as u32).collect();
         order.sort_unstable_by_key(|&i| mix(i));
         let photons: Vec<Photon> = order.into_iter().map(photon).collect();
         let few = &photons[..photons.len().min(WARM_UP as usize)];
@@ -121,8 +121,8 @@ impl<'a> KdTreeGather<'a> {
     pub fn new(gpu: &Gpu, maps: &[PhotonMap], settings: &'a Settings) -> Result<Self> {
         let mut build_seconds = 0.0;
         let mut build = |map: &PhotonMap| {
-            let (places, fluxes) = map.read(gpu)?;
-            Ok(timed(&mut build_seconds, || KdMap::new(places, fluxes, map.emitted())))
+            let (photons, fluxes) = map.read(gpu)?;
+            Ok(timed(&mut build_seconds, || KdMap::new(photons, fluxes, map.emitted())))
         };
         let maps = maps.iter().map(&mut build).collect::<Result<_>>()?;
         Ok(Self { maps, settings, build_seconds, seconds: 0.0 })
@@ -134,9 +134,9 @@ impl<'a> KdTreeGather<'a> {
         let Some(map) = self.maps.first_mut() else { return 0 };
         let limit = self.settings.estimate.max_radius.map_or(f32::INFINITY, |r| r * r);
         let valid: Vec<&VisiblePoint> = points.iter().filter(|p| p.next_map != 0).collect();
-        let places = (count as usize).min(valid.len());
+        let some = (count as usize).min(valid.len());
         let mut lost = 0;
-        for point in (0..places).map(|i| valid[i * valid.len() / places]) {
+        for point in (0..some).map(|i| valid[i * valid.len() / some]) {
             // With k = 1 and no maximum radius, no photon is summed: the only one defines the
             // radius.
             if let [(_, nearest), rest @ ..] = &map.search(point, 2, limit)[..]

@@ -28,18 +28,18 @@ impl Comparison {
     /// # Errors
     /// [`crate::Error::Io`].
     pub fn write(&self, folder: &Path, origin: &Provenance, exposure: f32, tonemap: Tonemap) -> Result<()> {
-        let place = |name: &str| folder.join(name);
-        write_exr(&place("grid.exr"), &self.grid, origin)?;
-        write_exr(&place("kdtree.exr"), &self.kdtree, origin)?;
-        write_exr(&place("difference.exr"), &pictures::difference(&self.grid, &self.kdtree), origin)?;
-        write_png(&place("grid.png"), &self.grid, exposure, tonemap)?;
-        write_png(&place("kdtree.png"), &self.kdtree, exposure, tonemap)?;
+        let path = |name: &str| folder.join(name);
+        write_exr(&path("grid.exr"), &self.grid, origin)?;
+        write_exr(&path("kdtree.exr"), &self.kdtree, origin)?;
+        write_exr(&path("difference.exr"), &pictures::difference(&self.grid, &self.kdtree), origin)?;
+        write_png(&path("grid.png"), &self.grid, exposure, tonemap)?;
+        write_png(&path("kdtree.png"), &self.kdtree, exposure, tonemap)?;
         let difference = pictures::false_colors(&self.grid, &self.kdtree)?;
-        write_file(&place("difference.png"), &difference)?;
+        write_file(&path("difference.png"), &difference)?;
         let mut json = serde_json::to_string_pretty(&self.report).expect("a report holds nothing that JSON cannot");
         json.push('\n');
-        write_file(&place("report.json"), json.as_bytes())?;
+        write_file(&path("report.json"), json.as_bytes())?;
         let page = page::page(self, origin, exposure, tonemap, &difference)?;
-        write_file(&place("report.html"), page.as_bytes())
+        write_file(&path("report.html"), page.as_bytes())
     }
 }

@@ -25,8 +25,8 @@ pub fn cumulative(weights: &[f64]) -> Vec<f32> {
         .map(|weight| {
             sum += weight;
             own_steps += u64::from(*weight > 0.0);
-            let share = if total > 0.0 { (sum / total).min(1.0) } else { 0.0 };
-            ((shared * share).round() as u64 + own_steps) as f32 / STEPS as f32
+            let fraction = if total > 0.0 { (sum / total).min(1.0) } else { 0.0 };
+            ((shared * fraction).round() as u64 + own_steps) as f32 / STEPS as f32
         })
         .collect();
     // Both sums add the same f64 values in the same order, but nothing guarantees that they end in

@@ -11,17 +11,18 @@ use crate::{
     scene::Bounds,
 };
 
-/// What is added to cones against the rounding of their unions, radians.
+/// Angle added to cones against the rounding of their unions, radians.
 const ANGLE_SLACK: f32 = 1e-5;
 /// Steps of a 16-bit snorm number from 0 to 1, and those by which the falloff's cosine is lowered
 /// for the rounding of axes.
 const COSINE_STEPS: i16 = i16::MAX;
 const FALLOFF_SLACK: i16 = 4;
 
-/// Bounds of one light or several. Lights at infinity (`is_far`) have no place.
+/// Bounds of one light or several. Lights at infinity (`is_far`) have no
+/// position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LightBounds {
-    pub place: Bounds,
+    pub bounds: Bounds,
     /// Cone that holds the normals of surfaces and the inner cones of spots: its axis, a unit
     /// vector, and its half angle, radians.
     pub axis: Vec3,
@@ -37,11 +38,12 @@ pub(super) struct LightBounds {
 }
 
 impl LightBounds {
-    /// Bounds of one light of that intensity. `None` if it gives none, or is no place.
+    /// Bounds of one light of that intensity. `None` if it gives none, or
+    /// its bounds are not finite.
     pub fn new(light: &layout::Light, intensity: f64) -> Option<Self> {
         let [position, e1, e2] = [light.position, light.e1, light.e2].map(Vec3::from_array);
         let point = |p: Vec3| Bounds { min: p, max: p };
-        let (place, axis, spread, falloff) = match light.kind {
+        let (bounds, axis, spread, falloff) = match light.kind {
             layout::SPOT_LIGHT => {
                 let [inner, outer] = [e2.x - e2.y, e2.x].map(angle_of_height);
                 (point(position), e1, inner, outer - inner)
@@ -56,11 +58,12 @@ impl LightBounds {
             layout::ENVIRONMENT_LIGHT => (point(Vec3::ZERO), Vec3::Y, PI, 0.0),
             _ => (point(position), Vec3::Y, PI, FRAC_PI_2),
         };
-        // A light whose share of the sum is too small for a float is chosen nevertheless.
+        // A light whose fraction of the sum is too small for a float is chosen nevertheless.
         let weak = intensity.max(f32::MIN_POSITIVE.into()) as f32;
-        let is_a_place = (place.max - place.min).length_squared().is_finite() && axis.is_finite() && axis != Vec3::ZERO;
-        (intensity > 0.0 && weak.is_finite() && is_a_place).then_some(Self {
-            place,
+        let is_finite =
+            (bounds.max - bounds.min).length_squared().is_finite() && axis.is_finite() && axis != Vec3::ZERO;
+        (intensity > 0.0 && weak.is_finite() && is_finite).then_some(Self {
+            bounds,
             axis,
             spread,
             falloff,
@@ -74,7 +77,7 @@ impl LightBounds {
     pub fn union(self, other: Self) -> Self {
         let (axis, spread) = union_of_cones((self.axis, self.spread), (other.axis, other.spread));
         Self {
-            place: self.place.union(other.place),
+            bounds: self.bounds.union(other.bounds),
             axis,
             spread,
             falloff: self.falloff.max(other.falloff),
@@ -84,15 +87,16 @@ impl LightBounds {
         }
     }
 
-    /// What distinguishes the lights: their places, or their directions if they are at infinity.
+    /// Point by which lights are split: their positions, or their directions if they are at
+    /// infinity.
     pub fn middle(&self) -> Vec3 {
-        if self.is_far { self.axis } else { 0.5 * (self.place.min + self.place.max) }
+        if self.is_far { self.axis } else { 0.5 * (self.bounds.min + self.bounds.max) }
     }
 
     /// Cost of choosing among these lights (12.6.3, `EvaluateCost`), with the square of the box's
-    /// diagonal in place of its area, which is 0 for lamps along a line.
+    /// diagonal instead of its area, which is 0 for lamps along a line.
     pub fn cost(&self) -> f32 {
-        let size = if self.is_far { 1.0 } else { (self.place.max - self.place.min).length_squared() };
+        let size = if self.is_far { 1.0 } else { (self.bounds.max - self.bounds.min).length_squared() };
         self.intensity * solid_angle_measure(self.spread, self.falloff) * size
     }
 
@@ -104,8 +108,8 @@ impl LightBounds {
         let cones = spread as u16 as u32 | ((lowered(self.falloff.cos(), FALLOFF_SLACK) as u16 as u32) << 16);
         let next = next | bit(self.both_ways, BOTH_WAYS_BIT) | bit(self.is_far, FAR_BIT);
         LightNode {
-            center: (0.5 * (self.place.min + self.place.max)).to_array(),
-            half: packed_half(0.5 * (self.place.max - self.place.min)),
+            center: (0.5 * (self.bounds.min + self.bounds.max)).to_array(),
+            half: packed_half(0.5 * (self.bounds.max - self.bounds.min)),
             shine: [octahedral(self.axis), cones, self.intensity.to_bits(), next],
         }
     }

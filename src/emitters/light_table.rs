@@ -2,7 +2,7 @@
 //! choose from it.
 //!
 //! Punctual lights come first, then emissive triangles and spheres, material by material, then the
-//! environment. A group is what a user calls one light: a punctual light, all surfaces of one
+//! environment. A named light is what a user calls one light: a punctual light, all surfaces of one
 //! emissive material, or the environment.
 
 use std::{
@@ -28,16 +28,16 @@ use crate::{
     settings::{LightSampling, LightSettings, LightUnit},
 };
 
-/// Least share that paths take of what a part of a surface would emit if nothing darkened it: its
+/// Least fraction that paths take of what a subtriangle would emit if nothing darkened it: its
 /// mean may miss what is bright between the points by which it is taken.
-const MIN_SHARE: f64 = 1.0 / 64.0;
+const MIN_FRACTION: f64 = 1.0 / 64.0;
 /// Maximum number of points and spots, and of directional lights, whose direct light at a visible
 /// point is the sum over all of them. Of more, light samples choose.
 pub const MAX_SUMMED: usize = 16;
 
-/// A group of lights: what a user calls one light.
+/// Lights of one name: what a user calls one light.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LightGroup {
+pub struct NamedLight {
     pub name: String,
     /// `point`, `spot`, `directional`, `surface` or `environment`.
     pub kind: &'static str,
@@ -49,9 +49,9 @@ pub struct LightGroup {
 /// The lights of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct LightTable {
-    /// Sorted by group.
+    /// Sorted by named light.
     pub lights: Vec<layout::Light>,
-    pub groups: Vec<LightGroup>,
+    pub named: Vec<NamedLight>,
     /// The trees by which direct light chooses.
     pub trees: LightTrees,
     /// Indices of the punctual lights that visible points sum over.
@@ -93,7 +93,7 @@ impl LightTable {
         table.add_surfaces(scene, settings.unit);
         if let (Some(environment), Some(map)) = (&scene.environment, environment) {
             let power = DVec3::from(map.integral) * PI * f64::from(around.radius).powi(2);
-            table.start_group(&environment.name, "environment");
+            table.start_named(&environment.name, "environment");
             let light = layout::Light { kind: layout::ENVIRONMENT_LIGHT, area: 1.0, ..Default::default() };
             table.add(layout::Light { emission: [1.0; 3], ..light }, power);
         }
@@ -110,10 +110,10 @@ impl LightTable {
     /// builds the trees.
     fn plant_trees(&mut self, environment: Option<&EnvironmentMap>) {
         let count = |kinds: &[u32]| self.lights.iter().filter(|light| kinds.contains(&light.kind)).count();
-        let sums_places = count(&[layout::POINT_LIGHT, layout::SPOT_LIGHT]) <= MAX_SUMMED;
+        let sums_punctual = count(&[layout::POINT_LIGHT, layout::SPOT_LIGHT]) <= MAX_SUMMED;
         let sums_directions = count(&[layout::DIRECTIONAL_LIGHT]) <= MAX_SUMMED;
         let root = |light: &layout::Light| match light.kind {
-            layout::POINT_LIGHT | layout::SPOT_LIGHT if sums_places => PUNCTUAL_ROOT,
+            layout::POINT_LIGHT | layout::SPOT_LIGHT if sums_punctual => PUNCTUAL_ROOT,
             layout::DIRECTIONAL_LIGHT => DIRECTIONAL_ROOT,
             layout::ENVIRONMENT_LIGHT => layout::ENVIRONMENT_ROOT,
             _ => EMITTER_ROOT,
@@ -169,8 +169,8 @@ impl LightTable {
         self.powers.iter().sum()
     }
 
-    /// Table for photon paths: in proportion to power, or with equal probability for every group,
-    /// times the factors of the settings.
+    /// Table for photon paths: in proportion to power, or with equal probability for every named
+    /// light, times the factors of the settings.
     #[must_use]
     pub fn for_photons(&self, settings: &LightSettings) -> Choices {
         self.choices(self.powers.clone(), settings)
@@ -185,35 +185,35 @@ impl LightTable {
     }
 
     fn choices(&self, powers: Vec<f64>, settings: &LightSettings) -> Choices {
-        let mut of_groups = vec![0.0; self.groups.len()];
+        let mut of_named = vec![0.0; self.named.len()];
         for (light, power) in self.lights.iter().zip(&powers) {
-            of_groups[light.group as usize] += power;
+            of_named[light.named as usize] += power;
         }
-        let shining = of_groups.iter().filter(|power| **power > 0.0).count() as u32;
-        let factor = |group: usize| -> f64 {
-            let asked = settings.photon_weights.iter().filter(|(name, _)| *name == self.groups[group].name);
-            let alike = if settings.sampling == LightSampling::Uniform { 1.0 / of_groups[group] } else { 1.0 };
+        let shining = of_named.iter().filter(|power| **power > 0.0).count() as u32;
+        let factor = |named: usize| -> f64 {
+            let asked = settings.photon_weights.iter().filter(|(name, _)| *name == self.named[named].name);
+            let alike = if settings.sampling == LightSampling::Uniform { 1.0 / of_named[named] } else { 1.0 };
             asked.map(|(_, weight)| weight).product::<f64>() * alike
         };
-        let factors: Vec<f64> = (0..self.groups.len()).map(factor).collect();
+        let factors: Vec<f64> = (0..self.named.len()).map(factor).collect();
         let weigh = |(light, power): (&layout::Light, f64)| {
-            if power > 0.0 { power * factors[light.group as usize] } else { 0.0 }
+            if power > 0.0 { power * factors[light.named as usize] } else { 0.0 }
         };
         let weights: Vec<f64> = self.lights.iter().zip(powers).map(weigh).collect();
         let strata = if settings.sampling == LightSampling::Uniform { shining } else { shining.min(1) };
         Choices { entries: entries(&weights), strata }
     }
 
-    fn start_group(&mut self, name: &str, kind: &'static str) {
-        self.groups.push(LightGroup { name: name.to_owned(), kind, power: DVec3::ZERO });
+    fn start_named(&mut self, name: &str, kind: &'static str) {
+        self.named.push(NamedLight { name: name.to_owned(), kind, power: DVec3::ZERO });
     }
 
-    /// Adds a light to the last group.
+    /// Adds a light to the last named light.
     fn add(&mut self, light: layout::Light, power: DVec3) {
-        let group = self.groups.len() - 1;
-        self.lights.push(layout::Light { group: group as u32, ..light });
+        let named = self.named.len() - 1;
+        self.lights.push(layout::Light { named: named as u32, ..light });
         self.powers.push(power.element_sum() / 3.0);
-        self.groups[group].power += power;
+        self.named[named].power += power;
     }
 
     fn add_punctual(&mut self, light: &crate::scene::Light, radius: f32, unit: LightUnit) {
@@ -227,7 +227,7 @@ impl LightTable {
             }
             LightKind::Directional => (layout::DIRECTIONAL_LIGHT, "directional", Vec3::ZERO),
         };
-        self.start_group(&light.name, name);
+        self.start_named(&light.name, name);
         let power = crate::scene::Light { intensity: light.intensity_in(unit), ..light.clone() }.power(radius);
         let (position, e1) = (light.position.to_array(), light.direction.to_array());
         let solid_angle = light.solid_angle();
@@ -248,7 +248,7 @@ impl LightTable {
         for (material, primitives) in of_materials {
             let is_varied = surfaces.is_varied(material);
             let material = &scene.materials[material as usize];
-            self.start_group(&material.name, "surface");
+            self.start_named(&material.name, "surface");
             let emission = emission_in(material.emission, unit);
             let solid_angle = if material.double_sided { TAU } else { PI };
             let first = self.lights.len();
@@ -259,7 +259,7 @@ impl LightTable {
                     let light = layout::Light { emission: emission.to_array(), ..light };
                     self.add(layout::Light { solid_angle: solid_angle as f32, ..light }, power * emitted.mean);
                     if emitted.is_lit {
-                        let least = MIN_SHARE * power.element_sum() / 3.0;
+                        let least = MIN_FRACTION * power.element_sum() / 3.0;
                         self.powers.last_mut().into_iter().for_each(|power| *power = power.max(least));
                     }
                     self.emitters.insert(primitive as u32, own);
@@ -274,11 +274,11 @@ impl LightTable {
     }
 
     fn check_names(&self, settings: &LightSettings) -> Result<()> {
-        let is_known = |name: &String| self.groups.iter().any(|group| group.name == *name);
+        let is_known = |name: &String| self.named.iter().any(|light| light.name == *name);
         let Some((name, weight)) = settings.photon_weights.iter().find(|(name, _)| !is_known(name)) else {
             return Ok(());
         };
-        let names: Vec<String> = self.groups.iter().map(|group| format!("{:?}", group.name)).collect();
+        let names: Vec<String> = self.named.iter().map(|light| format!("{:?}", light.name)).collect();
         let problem = format!("no light is called {name:?}; the scene has {}", names.join(", "));
         Err(Error::Setting { name: "lights.photon_weights", value: format!("{name}={weight}"), problem })
     }

@@ -23,7 +23,7 @@ const BUCKETS: usize = 12;
 /// Depth from which on lights are divided in halves, so that no descent is longer than this and the
 /// binary logarithm of their number.
 const MAX_UNEVEN_DEPTH: u32 = 32;
-/// Number of lights from which on both parts are built at once.
+/// Number of lights from which on both halves are built at once.
 const PARALLEL: usize = 1 << 12;
 
 /// The trees of a scene. Their roots are the first [`LIGHT_ROOTS`] nodes; a root of intensity 0 has
@@ -44,9 +44,9 @@ struct Item {
     light: u32,
 }
 
-/// A part of a tree.
+/// A subtree.
 struct Subtree {
-    /// Its uppermost node, which the caller puts in its place.
+    /// Its uppermost node, which the caller stores.
     node: LightNode,
     bounds: LightBounds,
 }
@@ -104,7 +104,7 @@ fn subtree(items: &mut [Item], slots: &mut [LightNode], first: u32, depth: u32) 
     Subtree { node: bounds.node(first), bounds }
 }
 
-/// Reorders the items into two parts and returns the size of the first, at least 1 and less than
+/// Reorders the items into two groups and returns the size of the first, at least 1 and less than
 /// all: the division between buckets along an axis that costs least.
 fn divide(items: &mut [Item], depth: u32) -> usize {
     let half = items.len() / 2;
@@ -116,7 +116,7 @@ fn divide(items: &mut [Item], depth: u32) -> usize {
     let extent = middles.max - middles.min;
     let mut best: Option<(f32, usize, usize)> = None;
     for axis in (0..3).filter(|axis| extent[*axis] > 0.0) {
-        // Thin parts are costly (12.6.3, `Kr`).
+        // Thin groups are costly (12.6.3, `Kr`).
         let thinness = extent.max_element() / extent[axis];
         for (cost, bucket) in division_costs(items, axis, &middles) {
             if best.is_none_or(|(least, ..)| thinness * cost < least) {
@@ -150,8 +150,8 @@ fn division_costs(items: &[Item], axis: usize, middles: &Bounds) -> Vec<(f32, us
 }
 
 fn bucket_of(item: &Item, axis: usize, middles: &Bounds) -> usize {
-    let part = (item.bounds.middle()[axis] - middles.min[axis]) / (middles.max[axis] - middles.min[axis]);
-    ((part * BUCKETS as f32) as usize).min(BUCKETS - 1)
+    let fraction = (item.bounds.middle()[axis] - middles.min[axis]) / (middles.max[axis] - middles.min[axis]);
+    ((fraction * BUCKETS as f32) as usize).min(BUCKETS - 1)
 }
 
 /// Moves items that are `first` to the front, and returns their number.
@@ -204,7 +204,7 @@ mod tests {
             let center = Vec3::from_array(node.center);
             for child in &trees.nodes[first..first + 2] {
                 let apart = (Vec3::from_array(child.center) - center).abs();
-                // Extents are rounded up to 1 of 128 parts of the largest.
+                // Extents are rounded up to 1/128 of the largest.
                 let (inner, outer) = (half_of(child), half_of(&node));
                 let slack = outer.max_element() / 60.0 + 1e-5;
                 assert!((apart + inner).cmple(outer + slack).all(), "{child:?} in {node:?}");
@@ -219,9 +219,9 @@ mod tests {
 
     #[test]
     fn every_light_that_shines_has_one_leaf() {
-        let place = |i: usize| vec3((i as f32 * 0.7).sin(), (i as f32 * 1.3).cos(), i as f32 * 0.01);
+        let position = |i: usize| vec3((i as f32 * 0.7).sin(), (i as f32 * 1.3).cos(), i as f32 * 0.01);
         let kind = |i: usize| if i.is_multiple_of(2) { TRIANGLE_LIGHT } else { POINT_LIGHT };
-        let lights: Vec<Light> = (0..20_000).map(|i| light(place(i), kind(i))).collect();
+        let lights: Vec<Light> = (0..20_000).map(|i| light(position(i), kind(i))).collect();
         let all = trees(&lights, |i| if i % 5 == 0 { 0.0 } else { 1.0 + i as f64 });
         assert!(depth_of(&all) < MAX_UNEVEN_DEPTH);
         for (i, leaf) in all.leaves.iter().enumerate() {

@@ -12,4 +12,4 @@ mod surface_lights;
 pub mod targets;
 
 pub(crate) use light_media::set_media;
-pub use light_table::LightGroup;
+pub use light_table::NamedLight;

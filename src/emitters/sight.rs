@@ -17,16 +17,16 @@ const MAX_CAMERAS: usize = 16;
 /// that they see.
 const RAYS: u32 = 64;
 const BOUNCES: u32 = 2;
-/// Side of the blocks of rays; and points next to each other whose rays tell of one place.
+/// Side of the blocks of rays; and points next to each other whose rays are counted together.
 const BLOCK: usize = 8;
 const POINTS_TOGETHER: usize = 64;
-/// Part of the places that are less enclosed than the one that tells.
+/// Fraction of those groups of points that are less enclosed than the one that decides.
 const ENCLOSED: f64 = 0.9;
 /// Maximum number of mirrors and panes that a ray passes.
 const MAX_CHAIN: u32 = 12;
 /// Minimum number of points that spheres are made of.
 const MIN_POINTS: usize = 64;
-/// Part of the points within the smallest sphere. The spheres have one centre.
+/// Fraction of the points within the smallest sphere. The spheres have one centre.
 const QUANTILE: f64 = 0.5;
 /// Factor on its radius, for what lies at the border.
 const MARGIN: f32 = 1.2;
@@ -39,14 +39,14 @@ const MAX_SPHERES: usize = 12;
 /// Effectiveness of Quasirandom Sequences").
 const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
 
-/// What the scene's cameras see.
+/// Surfaces that the scene's cameras see, as spheres.
 #[derive(Clone, Debug)]
 pub struct Sight {
     /// Spheres around that and what lies around it, from the smallest to the largest; none if that
     /// is most of the scene.
     pub targets: Vec<Target>,
-    /// Part of the light that leaves a surface, 0 to 1, which meets another one: exceeded by that
-    /// of a tenth of what the cameras see. 1 if they see nothing diffuse.
+    /// Fraction of the light that leaves a surface, 0 to 1, which meets another one: exceeded by
+    /// that of a tenth of what the cameras see. 1 if they see nothing diffuse.
     pub enclosure: f64,
 }
 
@@ -68,21 +68,22 @@ struct SeenPoint {
     around: Vec<Vec3>,
 }
 
-/// Points that lie near each other follow each other in the list: their rays together tell a part.
+/// Points that lie near each other follow each other in the list: their rays together give one
+/// fraction.
 fn enclosure(seen: &[SeenPoint]) -> f64 {
-    let part = |points: &[SeenPoint]| {
+    let fraction = |points: &[SeenPoint]| {
         let met: usize = points.iter().map(|point| point.around.len()).sum();
         met as f64 / (points.len() * BOUNCES as usize) as f64
     };
-    let mut parts: Vec<f64> = seen.chunks(POINTS_TOGETHER).map(part).collect();
-    parts.sort_by(f64::total_cmp);
-    parts.get((ENCLOSED * parts.len() as f64) as usize).copied().unwrap_or(1.0)
+    let mut fractions: Vec<f64> = seen.chunks(POINTS_TOGETHER).map(fraction).collect();
+    fractions.sort_by(f64::total_cmp);
+    fractions.get((ENCLOSED * fractions.len() as f64) as usize).copied().unwrap_or(1.0)
 }
 
-/// What the camera sees, block by block of the picture.
+/// Points that the camera sees, block by block of the picture.
 fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<SeenPoint> {
     let aspect = camera.aspect.filter(|aspect| *aspect > 0.0).unwrap_or(1.0);
-    let side = |part: f32| ((RAYS as f32 * part) as u32).max(1);
+    let side = |fraction: f32| ((RAYS as f32 * fraction) as u32).max(1);
     let size = (side(aspect.min(1.0)), side((1.0 / aspect).min(1.0)));
     let half_height = camera.half_height_at(1.0, size);
     let half = (half_height * size.0 as f32 / size.1 as f32, half_height);
@@ -129,7 +130,7 @@ enum Way {
     Through,
 }
 
-/// How a ray goes on at a surface without a diffuse lobe.
+/// Way of a ray at a surface without a diffuse lobe.
 fn goes_on(material: &Material) -> Option<Way> {
     match material.surface {
         Surface::Mirror { .. } => Some(Way::Reflected),

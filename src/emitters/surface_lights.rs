@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use crate::{
     layout,
-    scene::{Cut, EmissionMap, Emitted, Part, Scene},
+    scene::{Cut, EmissionMap, Emitted, Scene, Subtriangle},
 };
 
 /// A light of a surface, without its emission.
@@ -43,10 +43,10 @@ impl<'a> SurfaceLights<'a> {
         if whole.area <= 0.0 {
             return Vec::new();
         }
-        let Some(Cut { side, parts }) = self.cut.get(&primitive) else {
+        let Some(Cut { side, subtriangles }) = self.cut.get(&primitive) else {
             return vec![SurfaceLight { light: whole, emitted: Emitted { mean: DVec3::ONE, is_lit: true } }];
         };
-        if parts.iter().all(|part| !part.is_lit) {
+        if subtriangles.iter().all(|subtriangle| !subtriangle.is_lit) {
             return Vec::new();
         }
         let triangle = self.scene.triangles.get(primitive);
@@ -56,8 +56,11 @@ impl<'a> SurfaceLights<'a> {
         };
         let attributes = triangle.map_or(0, |triangle| triangle.attributes);
         let whole = layout::Light { material: material + 1, attributes, side: *side, ..whole };
-        let part = |(part, emitted): (Part, &Emitted)| SurfaceLight { light: cut_out(&whole, part), emitted: *emitted };
-        Part::all(*side).zip(parts).map(part).collect()
+        let subtriangle = |(subtriangle, emitted): (Subtriangle, &Emitted)| SurfaceLight {
+            light: cut_out(&whole, subtriangle),
+            emitted: *emitted,
+        };
+        Subtriangle::all(*side).zip(subtriangles).map(subtriangle).collect()
     }
 }
 
@@ -76,21 +79,21 @@ fn surface_light(scene: &Scene, primitive: usize) -> layout::Light {
     layout::Light { position, kind: layout::SPHERE_LIGHT, e1, area: area as f32, ..Default::default() }
 }
 
-/// A part of a light that is a whole triangle.
-fn cut_out(whole: &layout::Light, part: Part) -> layout::Light {
+/// A subtriangle of a light that is a whole triangle.
+fn cut_out(whole: &layout::Light, subtriangle: Subtriangle) -> layout::Light {
     if whole.side <= 1 {
         return *whole;
     }
     let [position, e1, e2] = [whole.position, whole.e1, whole.e2].map(|v| Vec3::from_array(v).as_dvec3());
-    let corner = part.weights(whole.side, Vec2::ZERO).as_dvec2();
-    let (side, turn) = (f64::from(whole.side), if part.is_turned { -1.0 } else { 1.0 });
-    let edge = |e: DVec3| (turn / side * e).as_vec3().to_array();
+    let corner = subtriangle.weights(whole.side, Vec2::ZERO).as_dvec2();
+    let (side, sign) = (f64::from(whole.side), if subtriangle.is_turned { -1.0 } else { 1.0 });
+    let edge = |e: DVec3| (sign / side * e).as_vec3().to_array();
     layout::Light {
         position: (position + corner.x * e1 + corner.y * e2).as_vec3().to_array(),
         e1: edge(e1),
         e2: edge(e2),
         area: whole.area / (whole.side * whole.side) as f32,
-        part: layout::part_word(part.column, part.row, part.is_turned),
+        subtriangle: layout::subtriangle_word(subtriangle.column, subtriangle.row, subtriangle.is_turned),
         ..*whole
     }
 }

@@ -66,7 +66,7 @@ pub fn choose(wanted: Option<&str>) -> Result<AdapterReport> {
     }
 }
 
-/// What to do where [`adapters`] finds none.
+/// Advice where [`adapters`] finds none.
 pub const NO_ADAPTER: &str = "no Vulkan, Metal or Direct3D 12 adapter was found; install a driver, or software Vulkan: \
     Debian and Ubuntu `apt install libvulkan1 mesa-vulkan-drivers`, Fedora `dnf install vulkan-loader \
     mesa-vulkan-drivers`, Windows: the graphics driver of the GPU's maker, macOS: 10.15 or later (Metal is built in)";
@@ -103,7 +103,7 @@ fn report(adapter: wgpu::Adapter) -> AdapterReport {
     AdapterReport { name: info.name, driver, backend, kind, limits, subgroup, unusable, adapter }
 }
 
-/// Which of the limits that some kernel reaches is too low, if one is.
+/// The limit that some kernel reaches and that is too low, if one is.
 fn missing(has: &wgpu::Limits, needs: &wgpu::Limits) -> Option<String> {
     let each = |l: &wgpu::Limits| {
         [

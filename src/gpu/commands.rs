@@ -1,4 +1,4 @@
-//! Recording and submission: dispatches are cut into parts, and a submission is closed before it
+//! Recording and submission: dispatches are cut into chunks, and a submission is closed before it
 //! takes too long.
 
 use std::{
@@ -9,8 +9,8 @@ use std::{
 };
 
 use super::{
-    pace::{Pace, Pacing, Part},
-    parts::Parts,
+    chunks::Chunks,
+    pace::{Chunk, Pace, Pacing},
     timer::{Timed, Timer, Timings},
 };
 
@@ -26,7 +26,7 @@ pub(super) struct Submissions {
     queue: wgpu::Queue,
     pub pace: Pace,
     pub timer: Option<Timer>,
-    pub parts: Parts,
+    pub chunks: Chunks,
     dispatches: AtomicU64,
 }
 
@@ -37,7 +37,7 @@ impl Submissions {
             queue: queue.clone(),
             pace: Pace::new(pacing),
             timer: Timer::new(device, queue),
-            parts: Parts::new(device),
+            chunks: Chunks::new(device),
             dispatches: AtomicU64::new(0),
         }
     }
@@ -47,7 +47,7 @@ impl Submissions {
         self.dispatches.load(Ordering::Relaxed)
     }
 
-    /// Waits for all submitted work, at most [`HUNG_AFTER`] where it is cut; then tells
+    /// Waits for all submitted work, at most [`HUNG_AFTER`] where it is cut; then reports to
     /// the pace what the device's clock has measured.
     pub fn poll(&self) -> Result<(), wgpu::PollError> {
         let timeout = (self.pace.pacing == Pacing::Measured).then_some(HUNG_AFTER);
@@ -92,8 +92,8 @@ impl<'g> Commands<'g> {
         }
     }
 
-    /// Records `invocations` invocations of a kernel, part by part. `record` puts one part into a
-    /// pass, given its first invocation and their number.
+    /// Records `invocations` invocations of a kernel, chunk by chunk. `record` puts one chunk into
+    /// a pass, given its first invocation and their number.
     pub(super) fn dispatch(
         &mut self,
         stem: &'static str,
@@ -102,15 +102,15 @@ impl<'g> Commands<'g> {
     ) {
         let mut first = 0;
         while first < invocations {
-            let part = self.submissions.pace.part(stem, invocations - first);
-            if !self.submissions.pace.fits(self.seconds, &part) || self.timings.is_full() {
+            let chunk = self.submissions.pace.chunk(stem, invocations - first);
+            if !self.submissions.pace.fits(self.seconds, &chunk) || self.timings.is_full() {
                 self.flush();
             }
-            let is_last = first + part.invocations == invocations;
-            self.record(stem, &part, |pass| record(pass, first, part.invocations));
-            first += part.invocations;
-            if !is_last && part.seconds.is_none() {
-                // The first part measures how large the others may be. A fault shows in the next
+            let is_last = first + chunk.invocations == invocations;
+            self.record(stem, &chunk, |pass| record(pass, first, chunk.invocations));
+            first += chunk.invocations;
+            if !is_last && chunk.seconds.is_none() {
+                // The first chunk measures how large the others may be. A fault shows in the next
                 // wait.
                 self.flush();
                 let _ = self.submissions.poll();
@@ -118,14 +118,14 @@ impl<'g> Commands<'g> {
         }
     }
 
-    fn record(&mut self, stem: &'static str, part: &Part, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
+    fn record(&mut self, stem: &'static str, chunk: &Chunk, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
         self.submissions.dispatches.fetch_add(1, Ordering::Relaxed);
-        self.seconds += part.seconds.unwrap_or(f64::INFINITY);
+        self.seconds += chunk.seconds.unwrap_or(f64::INFINITY);
         let timed = self
             .submissions
             .timer
             .as_ref()
-            .map(|timer| timer.time(&mut self.timings, Timed { stem, invocations: part.invocations }));
+            .map(|timer| timer.time(&mut self.timings, Timed { stem, invocations: chunk.invocations }));
         let mut pass = self
             .encoder
             .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(stem), timestamp_writes: timed });

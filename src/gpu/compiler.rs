@@ -47,14 +47,14 @@ impl Compiler {
     pub fn program(
         &self,
         device: &wgpu::Device,
-        part_layout: &wgpu::BindGroupLayout,
+        chunk_layout: &wgpu::BindGroupLayout,
         shader: &'static Shader,
         constants: Vec<(&'static str, f64)>,
     ) -> Arc<Program> {
         let key = (shader.stem, constants.iter().map(|(name, value)| (*name, value.to_bits())).collect());
         let mut programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
         let program = programs.entry(key).or_insert_with(|| {
-            let program = Arc::new(Program::new(device, part_layout, shader, constants));
+            let program = Arc::new(Program::new(device, chunk_layout, shader, constants));
             if let Some(requests) = &self.requests {
                 // The receiver is a field beside this one, so sending cannot fail.
                 let _ = requests.send(Arc::clone(&program));

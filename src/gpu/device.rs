@@ -47,8 +47,8 @@ pub struct Gpu {
     faults: Faults,
 }
 
-/// Maximum number of lanes of a group that share the parts of a cell, one each: as many as a cell
-/// has parts.
+/// Maximum number of lanes of a group that share the children of a cell, one each: as many as a
+/// cell has children.
 const MAX_LANES: u32 = crate::layout::CELL_FAN;
 /// Minimum number of lanes of a group.
 const MIN_LANES: u32 = super::adapter::NEEDED_SUBGROUP;
@@ -83,7 +83,7 @@ impl Gpu {
         let pacing = pacing.unwrap_or(usual);
         let clock = match pacing {
             Pacing::Measured => chosen.adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
-            Pacing::Whole | Pacing::Parts(_) => wgpu::Features::empty(),
+            Pacing::Whole | Pacing::Chunks(_) => wgpu::Features::empty(),
         };
         let (device, queue) = pollster::block_on(chosen.adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("caustica"),
@@ -94,8 +94,8 @@ impl Gpu {
         .map_err(|e| Error::Device(format!("adapter {} cannot be opened: {e}", chosen.name)))?;
         let faults = Faults::of(&device);
         let submissions = Submissions::new(&device, &queue, pacing);
-        // Where a subgroup has several groups, the smaller are the faster: queries of few share
-        // less, and wait for fewer others.
+        // Smaller groups are faster where a subgroup has several: queries of few share less, and
+        // wait for fewer others.
         let (least, most) = chosen.subgroup;
         let lanes = if most > MAX_LANES { MIN_LANES } else { least.min(MAX_LANES) };
         let several_groups = most > lanes;
@@ -125,7 +125,7 @@ impl Gpu {
         })
     }
 
-    /// Number of dispatches recorded so far; each part of a cut one counts.
+    /// Number of dispatches recorded so far; each chunk of a cut one counts.
     #[must_use]
     pub fn dispatches(&self) -> u64 {
         self.submissions.dispatches()

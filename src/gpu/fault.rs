@@ -1,11 +1,11 @@
-//! What a driver reports outside of any call, kept until someone asks, and said in words with what
-//! to do next.
+//! Faults that a driver reports outside of any call, kept until they are asked for, and put into
+//! words with what to do next.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::error::Error;
 
-/// What went wrong.
+/// Kinds of faults.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Fault {
     /// No memory was left for something; what it was only the caller knows.
@@ -70,7 +70,7 @@ impl Faults {
 }
 
 impl Fault {
-    /// As an error of that adapter, of whose memory `used` bytes were taken by buffers.
+    /// Error of that adapter, of whose memory `used` bytes were taken by buffers.
     pub fn into_error(self, adapter: &str, driver: &str, used: u64) -> Error {
         let of = format!("{adapter} ({driver})");
         match self {

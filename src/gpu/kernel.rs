@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     Buffer, Commands, Gpu, Table,
-    parts::PART_GROUP,
+    chunks::CHUNK_GROUP,
     program::Program,
     shaders::{SHADERS, Shader, shader},
 };
@@ -49,7 +49,7 @@ impl Kernel {
         ];
         let value = |name: &str| overrides.iter().chain(&of_device).find(|(n, _)| *n == name).map(|(_, value)| *value);
         let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();
-        let program = gpu.compiler.program(&gpu.device, &gpu.submissions.parts.layout, shader, constants);
+        let program = gpu.compiler.program(&gpu.device, &gpu.submissions.chunks.layout, shader, constants);
         Self { program, tables: Vec::new() }
     }
 
@@ -122,7 +122,7 @@ impl Kernel {
     }
 
     fn record(&self, commands: &mut Commands, bindings: &Bindings, max_invocations: u64, arguments: Option<&Buffer>) {
-        let parts = &commands.submissions.parts;
+        let chunks = &commands.submissions.chunks;
         let stem = self.program.shader.stem;
         let record = |pass: &mut wgpu::ComputePass<'_>, first: u64, invocations: u64| {
             pass.set_pipeline(&self.program.compiled().pipeline);
@@ -130,7 +130,7 @@ impl Kernel {
                 pass.set_bind_group(*group, bind_group, &[]);
             }
             if self.program.can_be_cut() {
-                pass.set_bind_group(PART_GROUP, &parts.starting_at(first), &[]);
+                pass.set_bind_group(CHUNK_GROUP, &chunks.starting_at(first), &[]);
             }
             match arguments {
                 Some(arguments) if invocations == max_invocations => pass.dispatch_workgroups_indirect(arguments, 0),
@@ -178,8 +178,8 @@ mod tests {
         let same = |a: &[(&str, f64)], b: &[(&str, f64)]| {
             Arc::ptr_eq(&Kernel::new(&gpu, "gather", a).program, &Kernel::new(&gpu, "gather", b).program)
         };
-        assert!(same(&[("WINDOWS", 1.0)], &[("STACK_WORDS", 3.0), ("WINDOWS", 1.0)]));
-        assert!(!same(&[("WINDOWS", 1.0)], &[("WINDOWS", 2.0)]), "control: constants matter");
+        assert!(same(&[("SEGMENTS", 1.0)], &[("STACK_WORDS", 3.0), ("SEGMENTS", 1.0)]));
+        assert!(!same(&[("SEGMENTS", 1.0)], &[("SEGMENTS", 2.0)]), "control: constants matter");
         // Those that were asked for and never used hold up nobody.
         let all: Vec<_> = SHADERS.iter().map(|shader| Kernel::new(&gpu, shader.stem, &[])).collect();
         drop((gpu, all));
@@ -193,9 +193,9 @@ mod tests {
             let panic = catch_unwind(AssertUnwindSafe(what)).expect_err("it panics");
             panic.downcast::<String>().map_or_else(|_| String::new(), |text| *text)
         };
-        let kernel = Kernel::new(&gpu, "merge_bounds", &[("WINDOWS", 1.0)]);
-        let wrong_override = message(&|| drop(Kernel::new(&gpu, "merge_bounds", &[("WINDOW", 1.0)])));
-        assert_eq!(wrong_override, "merge_bounds: no kernel has an override WINDOW");
+        let kernel = Kernel::new(&gpu, "merge_bounds", &[("SEGMENTS", 1.0)]);
+        let wrong_override = message(&|| drop(Kernel::new(&gpu, "merge_bounds", &[("SEGMENT", 1.0)])));
+        assert_eq!(wrong_override, "merge_bounds: no kernel has an override SEGMENT");
         let name = kernel.program.shader.bindings[0].name;
         let wrong_binding = message(&|| drop(kernel.bind(&gpu, &[(name, &buffer), ("photon", &buffer)])));
         assert_eq!(wrong_binding, "merge_bounds: no kernel binds photon");

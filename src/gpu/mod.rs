@@ -2,13 +2,13 @@
 
 mod adapter;
 mod buffer;
+mod chunks;
 mod commands;
 mod compiler;
 mod device;
 mod fault;
 mod kernel;
 mod pace;
-mod parts;
 mod program;
 pub mod shaders;
 mod table;

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use super::{
-    parts::PART_GROUP,
+    chunks::CHUNK_GROUP,
     shaders::{BindingKind, Shader},
 };
 
@@ -14,7 +14,7 @@ pub(super) struct Program {
     pub shader: &'static Shader,
     constants: Vec<(&'static str, f64)>,
     device: wgpu::Device,
-    part_layout: wgpu::BindGroupLayout,
+    chunk_layout: wgpu::BindGroupLayout,
     compiled: OnceLock<Compiled>,
 }
 
@@ -28,12 +28,12 @@ pub(super) struct Compiled {
 impl Program {
     pub fn new(
         device: &wgpu::Device,
-        part_layout: &wgpu::BindGroupLayout,
+        chunk_layout: &wgpu::BindGroupLayout,
         shader: &'static Shader,
         constants: Vec<(&'static str, f64)>,
     ) -> Self {
-        let (device, part_layout) = (device.clone(), part_layout.clone());
-        Self { shader, constants, device, part_layout, compiled: OnceLock::new() }
+        let (device, chunk_layout) = (device.clone(), chunk_layout.clone());
+        Self { shader, constants, device, chunk_layout, compiled: OnceLock::new() }
     }
 
     /// Compiles the kernel, or waits for the thread that does.
@@ -44,11 +44,11 @@ impl Program {
                 label: Some(shader.stem),
                 source: wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
             });
-            let layouts: Vec<_> = (0..PART_GROUP).map(|g| group_layout(device, shader, g)).collect();
-            let part = self.can_be_cut().then_some(&self.part_layout);
+            let layouts: Vec<_> = (0..CHUNK_GROUP).map(|g| group_layout(device, shader, g)).collect();
+            let chunk = self.can_be_cut().then_some(&self.chunk_layout);
             let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(shader.stem),
-                bind_group_layouts: &layouts.iter().map(Option::as_ref).chain([part]).collect::<Vec<_>>(),
+                bind_group_layouts: &layouts.iter().map(Option::as_ref).chain([chunk]).collect::<Vec<_>>(),
                 immediate_size: 0,
             });
             let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -67,9 +67,9 @@ impl Program {
     }
 
     /// Whether the kernel finds its index with `invocation_index`, so that its dispatches can be
-    /// cut into parts.
+    /// cut into chunks.
     pub fn can_be_cut(&self) -> bool {
-        self.shader.bindings.iter().any(|b| b.group == PART_GROUP)
+        self.shader.bindings.iter().any(|b| b.group == CHUNK_GROUP)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The table of kernels that `build.rs` composed from `shaders/`.
 
-/// What a kernel may do with a binding.
+/// Access of a kernel to a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BindingKind {
     /// A uniform buffer.
@@ -24,7 +24,7 @@ pub struct Binding {
     pub index: u32,
     /// Name of the variable in the shader.
     pub name: &'static str,
-    /// What the kernel may do with it.
+    /// Access of the kernel to it.
     pub kind: BindingKind,
 }
 
@@ -37,7 +37,7 @@ pub struct Shader {
     pub wgsl: &'static str,
     /// Names of its `override` constants.
     pub overrides: &'static [&'static str],
-    /// What it binds.
+    /// Its bindings.
     pub bindings: &'static [Binding],
     /// Invocations of a workgroup.
     pub workgroup_size: u32,
@@ -54,7 +54,7 @@ impl Shader {
     }
 }
 
-/// What the kernels ask of a device beyond the usual limits: of each kind the most that one of them
+/// Needs of the kernels beyond the usual limits of devices: of each kind the most that one of them
 /// uses.
 #[must_use]
 pub fn needs() -> wgpu::Limits {
@@ -83,7 +83,7 @@ pub fn shader(stem: &str) -> &'static Shader {
 mod tests {
     use super::*;
 
-    /// What of the kernels exceeds what nearly every device has, a line each.
+    /// Needs of kernels that exceed what nearly every device has, a line each.
     fn not_portable(shaders: &[Shader]) -> Vec<String> {
         let line = |s: &Shader| {
             let counts = [

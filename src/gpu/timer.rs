@@ -1,4 +1,4 @@
-//! The device's own clock: the duration of each part of a dispatch, known once the device has
+//! The device's own clock: the duration of each chunk of a dispatch, known once the device has
 //! finished it.
 
 use std::{
@@ -11,19 +11,19 @@ use std::{
 
 use super::pace::Pace;
 
-/// Maximum number of parts of a submission that are timed.
+/// Maximum number of chunks of a submission that are timed.
 const ROOM: usize = 128;
 /// Size of a time, bytes.
 const TIME: u64 = size_of::<u64>() as u64;
 
-/// A part that is timed.
+/// A chunk that is timed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timed {
     pub stem: &'static str,
     pub invocations: u64,
 }
 
-/// The timed parts of a submission, in order.
+/// The timed chunks of a submission, in order.
 #[derive(Debug, Default)]
 pub(super) struct Timings(Vec<Timed>);
 
@@ -33,7 +33,7 @@ impl Timings {
     }
 }
 
-/// Times when parts of submissions began and ended.
+/// Times when chunks of submissions began and ended.
 #[derive(Debug)]
 pub(super) struct Timer {
     set: wgpu::QuerySet,
@@ -72,9 +72,9 @@ impl Timer {
     }
 
     /// The queries that a pass writes when it begins and ends.
-    pub fn time<'t>(&'t self, timings: &mut Timings, part: Timed) -> wgpu::ComputePassTimestampWrites<'t> {
+    pub fn time<'t>(&'t self, timings: &mut Timings, chunk: Timed) -> wgpu::ComputePassTimestampWrites<'t> {
         let query = 2 * timings.0.len() as u32;
-        timings.0.push(part);
+        timings.0.push(chunk);
         wgpu::ComputePassTimestampWrites {
             query_set: &self.set,
             beginning_of_pass_write_index: Some(query),
@@ -82,7 +82,7 @@ impl Timer {
         }
     }
 
-    /// Submits the commands and has the times of their parts read back.
+    /// Submits the commands and has the times of their chunks read back.
     pub fn submit(
         &self,
         device: &wgpu::Device,
@@ -136,7 +136,7 @@ impl Timer {
 mod tests {
     use crate::gpu::{
         Gpu, Kernel, Pacing,
-        pace::{MIN_PART, MIN_TIMED},
+        pace::{MIN_CHUNK, MIN_TIMED},
     };
 
     #[test]
@@ -145,8 +145,8 @@ mod tests {
         assert!(gpu.submissions.timer.is_some(), "{} has no clock", gpu.name);
         let kernel = Kernel::new(&gpu, "sum_spans", &[]);
         let span = u64::from(crate::layout::SCAN_SPAN);
-        let values = gpu.storage::<u32>("values", MIN_PART * span).expect("fits");
-        let sums = gpu.storage::<u32>("sums", MIN_PART).expect("fits");
+        let values = gpu.storage::<u32>("values", MIN_CHUNK * span).expect("fits");
+        let sums = gpu.storage::<u32>("sums", MIN_CHUNK).expect("fits");
         let bindings = kernel.bind(&gpu, &[("values", &values), ("sums", &sums)]);
         let cost = |invocations| {
             let mut commands = gpu.encoder();
@@ -156,7 +156,7 @@ mod tests {
             gpu.submissions.pace.cost("sum_spans")
         };
         assert_eq!(cost(MIN_TIMED - 64), None, "control: too few to tell");
-        let seconds = cost(MIN_PART).expect("it was timed") * MIN_PART as f64;
+        let seconds = cost(MIN_CHUNK).expect("it was timed") * MIN_CHUNK as f64;
         assert!((1e-7..600.0).contains(&seconds), "{seconds} s");
     }
 }

@@ -72,8 +72,8 @@ impl Canvas {
     /// `alignment` says.
     pub fn write(&mut self, text: &str, (x, y): (i32, i32), font: &MonoFont, color: Rgb8, alignment: Alignment) {
         let style = MonoTextStyle::new(font, Rgb888::new(color[0], color[1], color[2]));
-        let place = TextStyleBuilder::new().alignment(alignment).baseline(Baseline::Top).build();
-        let Ok(_) = Text::with_text_style(text, Point::new(x, y), style, place).draw(self);
+        let layout = TextStyleBuilder::new().alignment(alignment).baseline(Baseline::Top).build();
+        let Ok(_) = Text::with_text_style(text, Point::new(x, y), style, layout).draw(self);
     }
 
     /// Encodes the canvas as a PNG file.

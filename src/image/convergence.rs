@@ -3,8 +3,8 @@
 use super::{film::Film, layers::layer_index};
 use crate::settings::Crop;
 
-/// Part of the mean radiance of all pixels that is added to each pixel's own, so that dark pixels
-/// do not decide. Where the mean is 1, the square of the error estimates relMSE.
+/// Fraction of the mean radiance of all pixels that is added to each pixel's own, so that dark
+/// pixels do not decide. Where the mean is 1, the square of the error estimates relMSE.
 const FLOOR: f64 = 0.1;
 
 /// Relative errors of a picture, root mean squares over pixels and channels.
@@ -54,7 +54,7 @@ impl ErrorEstimate {
 
 impl Film {
     /// Means as by [`Film::finish`], with the channels `standardError.C` and `bias.C` of radiance
-    /// if the passes tell them.
+    /// if the passes suffice for that.
     #[must_use]
     pub fn finish_with_errors(&self) -> super::Frame {
         let mut frame = self.finish();

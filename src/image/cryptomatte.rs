@@ -10,7 +10,7 @@ pub(super) const RANKS: usize = 6;
 /// A hash, and the number of samples that show its name; 0 for none.
 pub(super) type Rank = [u32; 2];
 
-/// What the samples of each pixel show.
+/// Names that the samples of each pixel show.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Matte {
     pub of: ExtraLayers,
@@ -26,8 +26,8 @@ impl Matte {
 
     /// Adds samples of a pixel that show the name of that hash.
     pub fn add(&mut self, pixel: usize, hash: u32, samples: u32) {
-        let place = self.ranks[pixel].iter_mut().find(|[other, count]| *count == 0 || *other == hash);
-        if let Some(rank) = place {
+        let free = self.ranks[pixel].iter_mut().find(|[other, count]| *count == 0 || *other == hash);
+        if let Some(rank) = free {
             *rank = [hash, rank[1] + samples];
         }
     }

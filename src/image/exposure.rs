@@ -48,7 +48,7 @@ mod tests {
             let stops = auto_exposure(&frame(&[0.09 * scale, 0.36 * scale], &[1.0; 2]));
             assert!((stops + scale.log2()).abs() < 1e-3, "{scale}: {stops}");
         }
-        // What is seen counts, not the void around it, and not its black pixels.
+        // Pixels that show something count, not the void around them, and not their black pixels.
         let of = |radiance: &[f32], alpha: &[f32]| auto_exposure(&frame(radiance, alpha));
         assert!((of(&[0.18, 0.0, 900.0], &[1.0, 0.0, 0.0])).abs() < 1e-5);
         assert!(of(&[0.18, 0.18, 0.18, 0.0], &[1.0; 4]) < 2.7, "a quarter of black is no night");

@@ -86,7 +86,7 @@ pub fn write_exr(path: &Path, frame: &Frame, provenance: &Provenance) -> Result<
     write_exr_with(path, frame, &provenance.attributes())
 }
 
-/// As [`write_exr`], with any attributes.
+/// Variant of [`write_exr`] with any attributes.
 ///
 /// # Errors
 /// As [`write_exr`].

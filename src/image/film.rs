@@ -48,7 +48,7 @@ pub struct Film {
 pub(super) struct ExtraSums {
     pub channels: Vec<String>,
     pub rule: Rule,
-    /// Where the table takes its numbers from.
+    /// Source of the numbers in the table.
     pub source: Option<Source>,
     /// Sums pixel by pixel; with [`Rule::PerCount`], of one number more than there are channels.
     pub sums: Vec<f32>,
@@ -475,7 +475,7 @@ mod tests {
         assert!((biased.finish().radiance()[0][0] - bias - 3.0).abs() < 1e-6, "without it, the truth is left");
         assert_eq!(merged(&|_| 3.0).bias().expect("radii differ")[0], 0.0, "control: no bias");
         assert!(film(&[1.0; 6], 4).bias().is_none(), "one pass tells nothing");
-        // Of two passes, the slope is the difference: mean/(f₀ − f₁) times √(v/f₀ + v/f₁), and the
+        // The slope of two passes is the difference: mean/(f₀ − f₁) times √(v/f₀ + v/f₁), and the
         // standard error half of that root.
         let mut two = film(&[1.0; 6], 4);
         two.merge(&film(&[2.0; 6], 4).with_bandwidth(0.5)).expect("they are of one picture");

@@ -34,7 +34,7 @@ pub enum LightComponent {
     Map(MapKind),
 }
 
-/// Where the numbers of an extra layer come from.
+/// Sources of the numbers of an extra layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The samples' rows, as [`Layer::source`].
@@ -54,7 +54,7 @@ pub struct ExtraLayer {
     pub of: ExtraLayers,
     /// Names of its channels.
     pub channels: &'static [&'static str],
-    /// Where its numbers come from.
+    /// Source of its numbers.
     pub source: Source,
     /// Rule by which sums become a mean.
     pub rule: Rule,

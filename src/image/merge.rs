@@ -18,10 +18,10 @@ use crate::{
     settings::{Crop, PassRange},
 };
 
-/// Differences that one message tells.
+/// Maximum number of differences in one message.
 const MOST_TOLD: usize = 3;
 
-/// What there is of a picture.
+/// Passes and pixels of a picture that there are.
 #[derive(Clone, Debug)]
 pub struct Survey {
     /// Width and height of the picture, pixels.
@@ -180,7 +180,7 @@ impl Survey {
         PassRange { first: 0, end: ends.max().unwrap_or(0) }
     }
 
-    /// What is missing of the passes `wanted`. A single window is a crop that is wanted.
+    /// Passes and pixels missing of the passes `wanted`. A single window is a crop that is wanted.
     #[must_use]
     pub fn missing(&self, wanted: PassRange) -> Vec<Missing> {
         let many = self.windows.len() > 1;
@@ -312,7 +312,7 @@ fn joined_frames((width, height): (u32, u32), frames: &[(Crop, Frame)]) -> Frame
 mod tests {
     use super::*;
     use crate::{
-        image::{Block, Film, PassSum, write_part},
+        image::{Film, PassBlock, PassSum, write_part},
         stats::Stats,
     };
 
@@ -329,7 +329,7 @@ mod tests {
                 film.add((column, row), &[[value, value, value, 0.0], [value; 4], [2.0; 4], [0.0; 4], [0.0; 4]], 2);
             }
             let film = film.with_bandwidth(1.0 / f64::from(index + 1));
-            sum.push(Block::of_pass(index, film, &Stats::default())).unwrap();
+            sum.push(PassBlock::of_pass(index, film, &Stats::default())).unwrap();
         }
         let attributes = [("version", version)].map(|(a, b)| (a.to_owned(), b.to_owned())).into();
         write_part(path, &sum, &attributes).unwrap();

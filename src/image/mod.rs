@@ -34,7 +34,7 @@ pub use frame::{DataWindow, Frame};
 pub use merge::{Missing, Survey, WindowParts, merge, survey};
 pub use part::{PartHeader, read_part, read_part_header, write_part};
 pub use part_identity::differences;
-pub use pass_sum::{Block, Fold, PassSum};
+pub use pass_sum::{Fold, PassBlock, PassSum};
 pub use png::{encode_png, write_png};
 pub(crate) use radiance::{decode_radiance, read_radiance_bytes};
 pub use tonemap::{Tonemap, srgb_decode, srgb_encode};

@@ -19,7 +19,7 @@ use super::{
     film::{Bandwidth, ExtraSums, Film, Moments},
     frame::DataWindow,
     layers::{EXTRA_LAYERS, LAYERS, Rule, layer_index},
-    pass_sum::{Block, PassSum, is_block},
+    pass_sum::{PassBlock, PassSum, is_block},
 };
 use crate::{
     error::{Error, Result},
@@ -28,7 +28,7 @@ use crate::{
     stats::MapStats,
 };
 
-/// What a part says of itself, without its pixels.
+/// Header of a part: all but its pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartHeader {
     /// Attributes of the file.
@@ -98,7 +98,7 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
     let shown = ["radiance", "alpha"].map(|name| LAYERS[layer_index(name)]);
     let mut channels: Vec<_> =
         shown.iter().flat_map(|layer| channels_of(frame.layer(layer.name), layer.channels, "")).collect();
-    for Block { range, film, .. } in &sum.blocks {
+    for PassBlock { range, film, .. } in &sum.blocks {
         let before = before(*range);
         for (i, layer) in LAYERS.iter().enumerate() {
             channels.extend(channels_of(&film.sums[i], layer.channels, &format!("{before}sum.")));
@@ -133,13 +133,13 @@ fn before(range: PassRange) -> String {
     format!("passes{}-{}.", range.first, range.end)
 }
 
-/// Which layers a film has that were asked for.
+/// Layers of a film that were asked for.
 fn row_of_layers(film: &Film) -> (Vec<ExtraRow>, Vec<ExtraLayers>) {
     let row = |layer: &ExtraSums| ExtraRow { channels: layer.channels.clone(), rule: layer.rule };
     (film.extras.iter().map(row).collect(), film.mattes.iter().map(|matte| matte.of).collect())
 }
 
-fn row(block: &Block) -> BlockRow {
+fn row(block: &PassBlock) -> BlockRow {
     let (extras, mattes) = row_of_layers(&block.film);
     let Bandwidth { mean, deviations, inverse } = block.film.bandwidth;
     BlockRow {
@@ -247,7 +247,7 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             non_finite: row.non_finite,
         };
         let photons = ByKind { global: row.global, caustic: row.caustic };
-        blocks.push(Block { range: row.passes, film, photons });
+        blocks.push(PassBlock { range: row.passes, film, photons });
     }
     Ok((PartHeader { passes: range(&rows), attributes, whole, window }, PassSum { blocks }))
 }
@@ -290,14 +290,14 @@ mod tests {
             let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL);
             for pixel in 0..6 {
                 let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
-                let place = (pixel % 3, pixel / 3);
+                let position = (pixel % 3, pixel / 3);
                 let rows = [[value, value * 1e-9, 1e9, 0.0], [value; 4], [2.0; 4], [value * 7.0; 4], [value * 8.0; 4]];
-                film.add(place, &rows, 4);
-                film.add_to(Source::Estimate(MapKind::Caustic), place, &[value, 3.0, 1.0]);
-                film.add_to_matte(ExtraLayers::Objects, place, [hash("a"), hash("b"), hash("a")].into_iter());
+                film.add(position, &rows, 4);
+                film.add_to(Source::Estimate(MapKind::Caustic), position, &[value, 3.0, 1.0]);
+                film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
             }
             let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3));
-            sum.push(Block::of_pass(index, film, &Stats::default())).expect("of one picture");
+            sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");
         }
         sum
     }

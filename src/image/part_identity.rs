@@ -1,4 +1,4 @@
-//! Which parts belong to one picture: those of equal scene, settings and version.
+//! Parts that belong to one picture: those of equal scene, settings and version.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,7 +24,7 @@ const OF_PART: [&str; 10] = [
 /// Attributes that hold settings as JSON.
 const OF_SETTINGS: [&str; 2] = ["settings", "loading"];
 
-/// What differs between the pictures of two parts: scene, settings or version, one by one. Names of
+/// Differences between the pictures of two parts: scene, settings or version, one by one. Names of
 /// settings stand in backquotes.
 #[must_use]
 pub fn differences(one: &Attributes, other: &Attributes) -> Vec<String> {

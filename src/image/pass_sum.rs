@@ -17,7 +17,7 @@ use crate::{
 
 /// Sum of consecutive passes, or of those of a range that are there.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Block {
+pub struct PassBlock {
     /// The range that it stands for: 2^n passes from a multiple of 2^n on.
     pub(super) range: PassRange,
     /// Sums of the passes.
@@ -26,7 +26,7 @@ pub struct Block {
     pub(super) photons: ByKind<MapStats>,
 }
 
-impl Block {
+impl PassBlock {
     /// The block of one pass.
     #[must_use]
     pub fn of_pass(index: u32, film: Film, stats: &Stats) -> Self {
@@ -79,13 +79,13 @@ pub(super) fn is_block(range: PassRange) -> bool {
 /// logarithm of their number in blocks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PassSum {
-    pub(super) blocks: Vec<Block>,
+    pub(super) blocks: Vec<PassBlock>,
 }
 
 impl PassSum {
     /// The blocks.
     #[must_use]
-    pub fn blocks(&self) -> &[Block] {
+    pub fn blocks(&self) -> &[PassBlock] {
         &self.blocks
     }
 
@@ -100,7 +100,7 @@ impl PassSum {
     ///
     /// # Errors
     /// [`crate::Error::Differs`] if it is of another picture.
-    pub fn push(&mut self, block: Block) -> Result<()> {
+    pub fn push(&mut self, block: PassBlock) -> Result<()> {
         self.blocks.push(block);
         while let [.., a, b] = self.blocks.as_slice() {
             let whole = PassRange { first: a.range.first, end: b.range.end };
@@ -117,7 +117,7 @@ impl PassSum {
     ///
     /// # Errors
     /// [`crate::Error::Differs`] if the blocks are of several pictures.
-    pub fn total(&self) -> Result<Option<Block>> {
+    pub fn total(&self) -> Result<Option<PassBlock>> {
         let mut fold = Fold::default();
         self.blocks.iter().try_for_each(|block| fold.push(block.clone()))?;
         fold.finish()
@@ -130,7 +130,7 @@ impl PassSum {
 #[derive(Debug, Default)]
 pub struct Fold {
     /// Sums of what is there of blocks, ascending.
-    open: Vec<Block>,
+    open: Vec<PassBlock>,
 }
 
 impl Fold {
@@ -138,7 +138,7 @@ impl Fold {
     ///
     /// # Errors
     /// [`crate::Error::Differs`] if it is of another picture.
-    pub fn push(&mut self, block: Block) -> Result<()> {
+    pub fn push(&mut self, block: PassBlock) -> Result<()> {
         while let [.., a, b] = self.open.as_slice() {
             // Nothing more comes for a block that ends before this one.
             if around(a.range, b.range).end > block.range.first {
@@ -154,7 +154,7 @@ impl Fold {
     ///
     /// # Errors
     /// As [`Self::push`].
-    pub fn finish(mut self) -> Result<Option<Block>> {
+    pub fn finish(mut self) -> Result<Option<PassBlock>> {
         while self.open.len() > 1 {
             self.add_last()?;
         }
@@ -173,17 +173,17 @@ mod tests {
     use crate::settings::Crop;
 
     /// A pass of one pixel, with sums that do not add up exactly.
-    fn pass(index: u32) -> Block {
+    fn pass(index: u32) -> PassBlock {
         let mut film = Film::new((1, 1), Crop { column: 0, row: 0, width: 1, height: 1 }, 1);
         let value = 0.1 + 1.0 / (index as f32 + 3.0);
         film.add((0, 0), &[[value, value * 1e-5, value * 1e5, 0.0], [value; 4], [value; 4], [0.0; 4], [0.0; 4]], 1);
         let map = MapStats { emitted: 10, stored: u64::from(index) };
         let stats = Stats::default();
-        Block { photons: ByKind { global: map, caustic: map }, ..Block::of_pass(index, film, &stats) }
+        PassBlock { photons: ByKind { global: map, caustic: map }, ..PassBlock::of_pass(index, film, &stats) }
             .with_bandwidth(1.0 / f64::from(index + 1))
     }
 
-    impl Block {
+    impl PassBlock {
         fn with_bandwidth(self, factor: f64) -> Self {
             Self { film: self.film.with_bandwidth(factor), ..self }
         }
@@ -196,7 +196,7 @@ mod tests {
     }
 
     /// Sum of parts that were pushed one after the other.
-    fn merged(parts: &[PassSum]) -> Block {
+    fn merged(parts: &[PassSum]) -> PassBlock {
         let mut fold = Fold::default();
         parts.iter().flat_map(|part| part.blocks.clone()).for_each(|block| fold.push(block).expect("of one picture"));
         assert!(fold.open.len() <= 12);

@@ -106,8 +106,8 @@ fn all_eight_orientations_are_the_same_picture() {
     // Three columns and two rows: red is the column plus one, green the row plus one.
     let pixel = |x: u8, y: u8| [64 * (x + 1), 64 * (y + 1), 0, 130];
     let expected: Vec<[f32; 3]> = (0..6).map(|i| [f32::from(i % 3 + 1_u8), f32::from(i / 3 + 1), 0.0]).collect();
-    let file = |sizes: &str, places: [(u8, u8); 6]| {
-        let pixels = places.map(|(x, y)| pixel(x, y));
+    let file = |sizes: &str, order: [(u8, u8); 6]| {
+        let pixels = order.map(|(x, y)| pixel(x, y));
         [format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{sizes}\n").as_bytes(), pixels.as_flattened()].concat()
     };
     let cases = [
@@ -120,11 +120,11 @@ fn all_eight_orientations_are_the_same_picture() {
         ("-X 3 -Y 2", [(2, 0), (2, 1), (1, 0), (1, 1), (0, 0), (0, 1)]),
         ("-X 3 +Y 2", [(2, 1), (2, 0), (1, 1), (1, 0), (0, 1), (0, 0)]),
     ];
-    for (sizes, places) in cases {
-        let picture = decoded(&file(sizes, places));
+    for (sizes, order) in cases {
+        let picture = decoded(&file(sizes, order));
         assert_eq!((picture.width, picture.height), (3, 2), "{sizes}");
         assert_eq!(picture.pixels, expected, "{sizes}");
-        let unturned = decoded(&file("-Y 2 +X 3", places)).pixels == expected;
+        let unturned = decoded(&file("-Y 2 +X 3", order)).pixels == expected;
         assert_eq!(unturned, sizes == "-Y 2 +X 3", "control: {sizes}");
     }
     // Scanlines of the transposed ones are compressed along their own axis.

@@ -9,7 +9,7 @@ pub mod wavefront;
 pub use camera::{CameraKernels, CameraTracer, FinalGather, FinalRays, StepCount, Tile};
 pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
-    Records, SharedPoints, filter_window, record_spacing,
+    Records, SharedPoints, filter_footprint, record_spacing,
 };
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
 pub use photons::{PathRange, PathRanges, PhotonTracer, RawMap, TracedPhotons};

@@ -1,29 +1,30 @@
-//! What a coat or a sheen above a diffuse base leaves of the light, as the kernels have it: twins
+//! Light that a coat or a sheen leaves to a diffuse base below, as the kernels have it: twins
 //! of functions in `shaders/lib/transport/coat.wesl` and `sheen.wesl`.
 
 use glam::Vec3;
 
 use crate::layout::VisiblePoint;
 
-/// Mean part of the light from all directions, by the cosine, that what lies above leaves to the
-/// diffuse lobe of `point`: twin of `mean_part` in `shaders/lib/camera/visible_point.wesl`.
+/// Mean fraction of the light from all directions, by the cosine, that what lies above leaves to
+/// the diffuse lobe of `point`: twin of `mean_transmittance` in
+/// `shaders/lib/camera/visible_point.wesl`.
 #[must_use]
-pub fn mean_part(point: &VisiblePoint) -> f32 {
+pub fn mean_transmittance(point: &VisiblePoint) -> f32 {
     if point.above == 0 {
         return 1.0;
     }
     let [normal, grazing, sheen, roughness] = point.above.to_le_bytes().map(|byte| f32::from(byte) / 255.0);
     let mu = Vec3::from(point.ns).dot(point.view.into()).max(0.0);
-    let part = mean_coat_transmittance(normal * normal, grazing * grazing, mu);
+    let transmittance = mean_coat_transmittance(normal * normal, grazing * grazing, mu);
     if sheen == 0.0 {
-        return part;
+        return transmittance;
     }
     // Four directions, each for a quarter of the flux.
     let below = |i: u8| {
         let cosine = ((f32::from(i) + 0.5) / 4.0).sqrt();
         1.0 - sheen * sheen_albedo(mu, roughness).max(sheen_albedo(cosine, roughness))
     };
-    part * (0..4).map(below).sum::<f32>() / 4.0
+    transmittance * (0..4).map(below).sum::<f32>() / 4.0
 }
 
 /// Twin of `mean_coat_transmittance`.
@@ -55,11 +56,11 @@ mod tests {
     fn coat_and_sheen_take_their_part() {
         let point =
             |above: u32| VisiblePoint { ns: [0.0, 1.0, 0.0], view: [0.0, 1.0, 0.0], above, ..Default::default() };
-        assert_eq!(mean_part(&point(0)), 1.0);
+        assert_eq!(mean_transmittance(&point(0)), 1.0);
         // Roots of 0.04 and 1, in 255ths.
-        let coat = mean_part(&point(51 | 255 << 8));
+        let coat = mean_transmittance(&point(51 | 255 << 8));
         assert!((coat - 0.96).abs() < 1e-3, "{coat}");
-        let both = mean_part(&point(51 | 255 << 8 | 255 << 16 | 128 << 24));
+        let both = mean_transmittance(&point(51 | 255 << 8 | 255 << 16 | 128 << 24));
         assert!(both < 0.9 * coat && both > 0.3, "control: sheen takes nothing, or all: {both}");
     }
 }

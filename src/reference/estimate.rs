@@ -2,15 +2,15 @@
 
 use glam::Vec3;
 
-use super::{Found, above::mean_part};
+use super::{Found, above::mean_transmittance};
 use crate::{
     density::Density,
-    layout::{MAX_NORMAL_WEIGHT, PhotonFlux, PhotonPlace, VisiblePoint, from_octahedral},
+    layout::{MAX_NORMAL_WEIGHT, PhotonFlux, PhotonPosition, VisiblePoint, from_octahedral},
 };
 
 /// The photon came from the viewer's side of the surface.
 #[must_use]
-pub fn usable(photon: &PhotonPlace, point: &VisiblePoint) -> bool {
+pub fn usable(photon: &PhotonPosition, point: &VisiblePoint) -> bool {
     from_octahedral(photon.wi).dot(Vec3::from(point.ng)) > 0.0
 }
 
@@ -24,7 +24,7 @@ fn normal_weight(point: &VisiblePoint, wi: Vec3) -> f32 {
 /// paths. The weight w_n of the interpolated normal is 1 without the side test.
 #[must_use]
 pub fn estimate(
-    (places, fluxes): (&[PhotonPlace], &[PhotonFlux]),
+    (photons, fluxes): (&[PhotonPosition], &[PhotonFlux]),
     found: &Found,
     point: &VisiblePoint,
     density: Density,
@@ -37,9 +37,9 @@ pub fn estimate(
     }
     let mut sum = [0.0; 3];
     for &i in &found.photons {
-        let (place, flux) = (&places[i as usize], &fluxes[i as usize].flux);
-        let wi = from_octahedral(place.wi);
-        let d = (Vec3::from(point.position).as_dvec3() - Vec3::from(place.position).as_dvec3()).length();
+        let (photon, flux) = (&photons[i as usize], &fluxes[i as usize].flux);
+        let wi = from_octahedral(photon.wi);
+        let d = (Vec3::from(point.position).as_dvec3() - Vec3::from(photon.position).as_dvec3()).length();
         let from_side = if side_test { normal_weight(point, wi) } else { 1.0 };
         let weight = density.weight(d / r2.sqrt()) * f64::from(from_side);
         for c in 0..3 {
@@ -47,6 +47,6 @@ pub fn estimate(
         }
     }
     let area = density.mean() * std::f64::consts::PI * r2 * emitted as f64;
-    let part = f64::from(mean_part(point));
-    std::array::from_fn(|c| f64::from(point.weight[c]) * part * sum[c] / area)
+    let transmittance = f64::from(mean_transmittance(point));
+    std::array::from_fn(|c| f64::from(point.weight[c]) * transmittance * sum[c] / area)
 }

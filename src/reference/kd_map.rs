@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{Found, KdTree, estimate, usable};
 use crate::{
     error::Result,
-    layout::{PhotonFlux, PhotonPlace, VisiblePoint},
+    layout::{PhotonFlux, PhotonPosition, VisiblePoint},
     progress::Progress,
     settings::EstimateSettings,
 };
@@ -19,7 +19,7 @@ pub const TIE: f32 = 1e-6;
 /// A photon map in a kd-tree.
 #[derive(Clone, Debug)]
 pub struct KdMap {
-    places: Vec<PhotonPlace>,
+    positions: Vec<PhotonPosition>,
     fluxes: Vec<PhotonFlux>,
     emitted: u64,
     tree: KdTree,
@@ -47,36 +47,36 @@ impl KdMap {
     /// Builds the kd-tree over the photons of `emitted` photon paths.
     ///
     /// # Panics
-    /// If there are not as many fluxes as places.
+    /// If there are not as many fluxes as positions.
     #[must_use]
-    pub fn new(places: Vec<PhotonPlace>, fluxes: Vec<PhotonFlux>, emitted: u64) -> Self {
-        assert_eq!(places.len(), fluxes.len(), "every photon has a place and a flux");
-        let positions: Vec<Vec3> = places.iter().map(|p| p.position.into()).collect();
-        Self { tree: KdTree::new(&positions), places, fluxes, emitted, left_out: Vec::new() }
+    pub fn new(positions: Vec<PhotonPosition>, fluxes: Vec<PhotonFlux>, emitted: u64) -> Self {
+        assert_eq!(positions.len(), fluxes.len(), "every photon has a position and a flux");
+        let points: Vec<Vec3> = positions.iter().map(|p| p.position.into()).collect();
+        Self { tree: KdTree::new(&points), positions, fluxes, emitted, left_out: Vec::new() }
     }
 
     /// Number of photons.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.places.len()
+        self.positions.len()
     }
 
     /// Whether the map has no photon.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.places.is_empty()
+        self.positions.is_empty()
     }
 
     /// Memory of the photons and the tree, bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        (size_of_val(self.places.as_slice()) + size_of_val(self.fluxes.as_slice())) as u64 + self.tree.bytes()
+        (size_of_val(self.positions.as_slice()) + size_of_val(self.fluxes.as_slice())) as u64 + self.tree.bytes()
     }
 
     /// Excludes a photon from all further searches.
     pub fn leave_out(&mut self, photon: u32) {
-        if let Err(place) = self.left_out.binary_search(&photon) {
-            self.left_out.insert(place, photon);
+        if let Err(index) = self.left_out.binary_search(&photon) {
+            self.left_out.insert(index, photon);
         }
     }
 
@@ -85,7 +85,7 @@ impl KdMap {
     #[must_use]
     pub fn search(&self, point: &VisiblePoint, count: u32, limit: f32) -> Vec<(f32, u32)> {
         let there = |i: usize| self.left_out.is_empty() || self.left_out.binary_search(&(i as u32)).is_err();
-        self.tree.search(point.position.into(), count, limit, |i| usable(&self.places[i], point) && there(i))
+        self.tree.search(point.position.into(), count, limit, |i| usable(&self.positions[i], point) && there(i))
     }
 
     /// Estimates the radiance at a point with `neighbors`, `kernel`, `cone_constant` and
@@ -105,7 +105,7 @@ impl KdMap {
             count: count as u32,
             fingerprint: fingerprint(&found.photons),
             tied: last_is_tied || near.len() > inside,
-            radiance: estimate((&self.places, &self.fluxes), &found, point, settings.density(), self.emitted, true),
+            radiance: estimate((&self.positions, &self.fluxes), &found, point, settings.density(), self.emitted, true),
         }
     }
 

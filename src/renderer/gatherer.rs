@@ -13,7 +13,7 @@ use crate::{
     map_kind::MapKind,
     passes::{
         EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
-        PhotonMap, Records, StepCount, Tile, filter_window, record_spacing,
+        PhotonMap, Records, StepCount, Tile, filter_footprint, record_spacing,
     },
     progress::{Progress, Stage},
     reference::{Estimate, KdMap},
@@ -69,7 +69,8 @@ impl<'a> MapGatherer<'a> {
                 Searches::KdTree(trees)
             }
         };
-        // Kernels of few photons are stretched over more: that does not widen what they tell of.
+        // Kernels of few photons are stretched over more: that does not widen the area for which
+        // they stand.
         let stretched = GatherSettings::from(estimate).neighbors as f32 / estimate.neighbors as f32;
         let sharing = EstimateSharing::new(gpu, estimate.share_reach / stretched.sqrt());
         Ok(Self { maps, search, sharing, estimate, observer, cache: None, records: None })
@@ -193,18 +194,18 @@ impl Gatherer for MapGatherer<'_> {
             stats.non_finite.gather += count.non_finite;
             tally::add_step(stats, count);
             for (pixel, slots) in (0..).zip(found.chunks(coarse.tracer.branches() as usize)) {
-                let Some(place) = coarse.tracer.pixel(tile, pixel) else { continue };
+                let Some(pixel) = coarse.tracer.pixel(tile, pixel) else { continue };
                 for (branch, (point, (light, arriving))) in
                     (0..).zip(slots).filter(|(_, (point, _))| point.next_map != 0)
                 {
-                    taken.put(place, branch, point, *light, arriving, coarse.final_rays());
+                    taken.put(pixel, branch, point, *light, arriving, coarse.final_rays());
                 }
             }
             Ok(())
         })?;
         let spacing = record_spacing(size, self.estimate.gather_spacing, coarse.tracer.branches());
         let per_pixel = |coarse: u32, fine: u32| coarse as f32 / fine as f32;
-        // Of the picture's pixels.
+        // Measured in the picture's pixels.
         let reach = self.estimate.gather_radius * coarse.tracer.pixel_height() * per_pixel(coarse.size.1, size.1);
         let grid = RecordGrid {
             first_column: window.column,
@@ -214,7 +215,7 @@ impl Gatherer for MapGatherer<'_> {
             columns_per_pixel: per_pixel(coarse.size.0, size.0),
             rows_per_pixel: per_pixel(coarse.size.1, size.1),
             reach,
-            window: filter_window(self.estimate.gather_radius, spacing),
+            footprint: filter_footprint(self.estimate.gather_radius, spacing),
         };
         let records = taken.finish(|position| reach * coarse.tracer.scale_at(position));
         self.records = Some(IrradianceRecords::new(coarse.gpu, &records, grid)?);
@@ -281,7 +282,7 @@ fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -
 }
 
 impl Searches<'_> {
-    /// As [`Self::estimates_at`].
+    /// Same as [`Self::estimates_at`].
     fn estimates(
         &mut self,
         pass: &CameraPass,
@@ -327,13 +328,13 @@ impl Searches<'_> {
         pass: &CameraPass,
         (maps, settings): (&PhotonMaps, &EstimateSettings),
         tile: &Tile,
-        (places, ends): (&[usize], &Buffer),
+        (indices, ends): (&[usize], &Buffer),
         progress: &dyn Progress,
     ) -> Result<()> {
-        let found = self.estimates_at(pass, maps, settings, (ends, places.len() as u32), progress)?;
+        let found = self.estimates_at(pass, maps, settings, (ends, indices.len() as u32), progress)?;
         let mut radiance = pass.radiance(tile)?;
-        for (&place, (light, _)) in places.iter().zip(found) {
-            (0..3).for_each(|c| radiance[place][c] += light[c]);
+        for (&index, (light, _)) in indices.iter().zip(found) {
+            (0..3).for_each(|c| radiance[index][c] += light[c]);
         }
         pass.set_radiance(&radiance);
         Ok(())
@@ -386,6 +387,6 @@ fn kd_estimates(
 
 /// Reads a map's photons back and builds a kd-tree of them.
 fn kd_map(gpu: &Gpu, map: &PhotonMap) -> Result<KdMap> {
-    let (places, fluxes) = map.read(gpu)?;
-    Ok(KdMap::new(places, fluxes, map.emitted()))
+    let (photons, fluxes) = map.read(gpu)?;
+    Ok(KdMap::new(photons, fluxes, map.emitted()))
 }

@@ -1,4 +1,4 @@
-//! Where a camera's rays start, and in which media.
+//! Start of a camera's rays, and the media there.
 //!
 //! Rays of a perspective camera start at its lens, in the media around the middle of it. Rays of an
 //! orthographic camera start all over its plane. If a solid with a medium cuts the plane, or if the

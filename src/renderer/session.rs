@@ -15,7 +15,7 @@ use crate::{
     image::{Film, Frame},
     passes::{
         CameraKernels, EstimateSharing, FinalGather, IrradianceCache, IrradianceRecords, MapKernels, PathRanges,
-        PhotonTracer, filter_window, record_spacing,
+        PhotonTracer, filter_footprint, record_spacing,
     },
     pixel_filter::PixelFilter,
     progress::{Progress, Stage},
@@ -66,8 +66,8 @@ impl<'a> Session<'a> {
         Ok(Self::open_lit(gpu, scene, lights, None, progress)?.remove(0))
     }
 
-    /// As [`Self::open`], once for each group of the scene's lights, of which there is one at
-    /// least.
+    /// Variant of [`Self::open`], once for each group of the scene's lights, of which there is one
+    /// at least.
     pub(super) fn open_groups(
         gpu: &'a Gpu,
         scene: &'a Scene,
@@ -149,7 +149,7 @@ impl<'a> Session<'a> {
         self.photon_maps_of(settings, &PathRanges::default(), progress)
     }
 
-    /// As [`Self::photon_maps`], with the photon paths of the given indices.
+    /// Variant of [`Self::photon_maps`] with the photon paths of the given indices.
     pub(super) fn photon_maps_of(
         &self,
         settings: &PhotonSettings,
@@ -261,13 +261,13 @@ impl<'a> Session<'a> {
 /// as far as the filter of records reaches.
 fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSettings, branches: u32) -> PictureSettings {
     let spacing = record_spacing(size, estimate.gather_spacing, branches);
-    let reach = filter_window(estimate.gather_radius, spacing);
+    let reach = filter_footprint(estimate.gather_radius, spacing);
     let window = picture.window(size);
     let along = |pixels: u32, origin: u32, count: u32| {
         let side = pixels.div_ceil(spacing);
-        let place = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
-        let first = place(origin).saturating_sub(reach + 1);
-        (side, first, (place(origin + count) + reach + 2).min(side) - first)
+        let scaled = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
+        let first = scaled(origin).saturating_sub(reach + 1);
+        (side, first, (scaled(origin + count) + reach + 2).min(side) - first)
     };
     let (columns, column, width) = along(size.0, window.column, window.width);
     let (rows, row, height) = along(size.1, window.row, window.height);

@@ -1,7 +1,7 @@
 //! Counts of a render, and the warnings that follow from them.
 
 use crate::{
-    emitters::LightGroup,
+    emitters::NamedLight,
     gpu::Gpu,
     layout::CHAIN_LIMIT,
     passes::{RawMap, StepCount},
@@ -14,14 +14,14 @@ pub(super) fn map_stats(map: &RawMap) -> MapStats {
 }
 
 pub(super) fn light_stats(buffers: &SceneBuffers, photons: &[u32]) -> Vec<LightStats> {
-    let groups = buffers.lights.table.groups.iter().zip(photons);
-    let stats = |(group, photons): (&LightGroup, &u32)| LightStats {
-        name: group.name.clone(),
-        kind: group.kind.to_owned(),
-        power: group.power.to_array(),
+    let lights = buffers.lights.table.named.iter().zip(photons);
+    let stats = |(light, photons): (&NamedLight, &u32)| LightStats {
+        name: light.name.clone(),
+        kind: light.kind.to_owned(),
+        power: light.power.to_array(),
         photons: u64::from(*photons),
     };
-    groups.map(stats).collect()
+    lights.map(stats).collect()
 }
 
 pub(super) fn count_faults(stats: &mut Stats, media_overflows: u64, unfinished: u64) {

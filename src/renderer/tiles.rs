@@ -339,7 +339,7 @@ impl<'a> CameraPass<'a> {
         self.gpu.submit(encoder);
     }
 
-    /// Where the light at the tile's points came from, by rays of final gathering.
+    /// Directions from which light arrives at the tile's points, by rays of final gathering.
     pub fn arriving(&self, tile: &Tile) -> Result<Vec<ArrivingLight>> {
         let Some(gather) = &self.final_gather else { return Ok(Vec::new()) };
         self.gpu.read(&gather.arriving, 0, self.tracer.point_count(tile).into())

@@ -32,7 +32,7 @@ pub struct Scene {
     pub center: DVec3,
     /// Triangles of all meshes.
     pub triangles: Vec<Triangle>,
-    /// What the corners of triangles with textures or colours carry.
+    /// Attributes at the corners of triangles with textures or colours.
     pub attributes: Vec<Attributes>,
     /// Images of the materials' textures.
     pub images: Vec<Image>,
@@ -89,7 +89,7 @@ impl Scene {
         self.uses_material(|i, _| casts[i])
     }
 
-    /// Of each material, whether what it reflects or transmits is sharp enough for caustics
+    /// For each material, whether what it reflects or transmits is sharp enough for caustics
     /// somewhere: mirrors, metals, glass and panes up to [`LoadOptions::caustic_roughness`]. For
     /// one point `shaders/lib/transport/material.wesl` decides.
     #[must_use]

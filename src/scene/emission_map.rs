@@ -1,9 +1,9 @@
-//! How much surfaces of varied emission emit: where a texture multiplies it, or not all of the
+//! Emission of surfaces on which it varies: where a texture multiplies it, or not all of the
 //! surface is there.
 //!
-//! A triangle is cut into congruent parts along the lines of its barycentric coordinates, `side` of
-//! them along an edge, so that each is a light that is nearly uniform. Row by row, a part is
-//! followed by the turned one beside it (`shaders/lib/transport/emissive.wesl`).
+//! A triangle is cut into congruent subtriangles along the lines of its barycentric coordinates,
+//! `side` of them along an edge, so that each is a light that is nearly uniform. Row by row, a
+//! subtriangle is followed by the turned one beside it (`shaders/lib/transport/emissive.wesl`).
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -15,62 +15,64 @@ use super::{
     texel_map::{Channels, Counts, TexelMap},
 };
 
-/// Most parts along an edge of a triangle.
+/// Most subtriangles along an edge of a triangle.
 const MAX_SIDE: u32 = 16;
-/// Most parts of a scene, unless it has more triangles of varied emission.
+/// Most subtriangles of a scene, unless it has more triangles of varied emission.
 const MAX_PARTS: u64 = 65_536;
-/// Points for each texel along an edge of a part by which its mean is taken, and their least and
-/// greatest number.
+/// Points for each texel along an edge of a subtriangle by which its mean is taken, and their least
+/// and greatest number.
 const POINTS_PER_TEXEL: f32 = 2.0;
 const POINTS: [u32; 2] = [4, 32];
 
-/// Place of a part in its triangle.
+/// Position of a subtriangle in its triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Part {
-    /// Its corner nearest to the triangle's first corner is that many parts along its edges.
+pub(crate) struct Subtriangle {
+    /// Its corner nearest to the triangle's first corner is that many subtriangles along its edges.
     pub column: u32,
     pub row: u32,
     /// Turned by half a turn against the triangle.
     pub is_turned: bool,
 }
 
-impl Part {
-    /// The parts of a triangle.
+impl Subtriangle {
+    /// The subtriangles of a triangle.
     pub fn all(side: u32) -> impl Iterator<Item = Self> {
         let row = move |row: u32| (0..2 * (side - row) - 1).map(move |i| (i / 2, row, i % 2 == 1));
         (0..side).flat_map(row).map(|(column, row, is_turned)| Self { column, row, is_turned })
     }
 
-    /// Weights of the triangle's second and third corner where those of the part's are `weights`.
+    /// Weights of the triangle's second and third corner where those of the subtriangle's are
+    /// `weights`.
     pub fn weights(self, side: u32, weights: Vec2) -> Vec2 {
         let corner = Vec2::new(self.column as f32, self.row as f32);
-        let place = if self.is_turned { corner + 1.0 - weights } else { corner + weights };
-        place / side as f32
+        let scaled = if self.is_turned { corner + 1.0 - weights } else { corner + weights };
+        scaled / side as f32
     }
 }
 
-/// What a part emits.
+/// Emission of a subtriangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Emitted {
-    /// Mean over the part of the factor on the emission of its material.
+    /// Mean over the subtriangle of the factor on the emission of its material.
     pub mean: DVec3,
     /// Whether the factor can be above 0 somewhere.
     pub is_lit: bool,
 }
 
-/// A primitive of varied emission, cut into parts.
+/// A primitive of varied emission, cut into subtriangles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Cut {
     /// Parts along an edge; 0 if it emits nothing.
     pub side: u32,
     /// `side` squared.
-    pub parts: Vec<Emitted>,
+    pub subtriangles: Vec<Emitted>,
 }
 
 impl Cut {
     /// Mean over the primitive of the factor on the emission of its material.
     pub fn mean(&self) -> DVec3 {
-        self.parts.iter().map(|part| part.mean).sum::<DVec3>() / (self.parts.len() as f64).max(1.0)
+        self.subtriangles.iter().map(|subtriangle| subtriangle.mean).sum::<DVec3>()
+            / (self.subtriangles.len() as f64).max(1.0)
     }
 }
 
@@ -126,28 +128,28 @@ impl<'a> EmissionMap<'a> {
         }
         let cut = |(primitive, side): (&usize, &u32)| {
             let side = (*side).min(most);
-            let parts = if side == 0 { Vec::new() } else { self.parts(*primitive, side) };
-            (*primitive, Cut { side, parts })
+            let subtriangles = if side == 0 { Vec::new() } else { self.subtriangles(*primitive, side) };
+            (*primitive, Cut { side, subtriangles })
         };
         varied.par_iter().zip(&sides).map(cut).collect()
     }
 
-    /// Number of parts that a primitive of varied emission should be cut into, along an edge; 0 if
-    /// it emits nothing.
+    /// Number of subtriangles that a primitive of varied emission should be cut into, along an
+    /// edge; 0 if it emits nothing.
     fn side(&self, primitive: usize) -> u32 {
         let Some((triangle, own)) = self.triangle(primitive) else {
-            return u32::from(self.parts(primitive, 1)[0].is_lit);
+            return u32::from(self.subtriangles(primitive, 1)[0].is_lit);
         };
         if !self.is_lit(triangle, &own, |weights| weights) {
             return 0;
         }
-        // One part for each texel.
+        // One subtriangle for each texel.
         let wanted = self.extent(triangle, &own).ceil() as u32;
         wanted.clamp(1, MAX_SIDE).next_power_of_two()
     }
 
-    /// What each part of a primitive emits. A sphere is one part.
-    fn parts(&self, primitive: usize, side: u32) -> Vec<Emitted> {
+    /// Emission of each subtriangle of a primitive. A sphere is one subtriangle.
+    fn subtriangles(&self, primitive: usize, side: u32) -> Vec<Emitted> {
         let Some((triangle, own)) = self.triangle(primitive) else {
             let sphere = &self.scene.spheres[primitive - self.scene.triangles.len()];
             let material = &self.scene.materials[sphere.material as usize];
@@ -156,15 +158,16 @@ impl<'a> EmissionMap<'a> {
         };
         let points = (POINTS_PER_TEXEL * self.extent(triangle, &own) / side as f32).ceil() as u32;
         let points = points.clamp(POINTS[0], POINTS[1]);
-        let emitted = |part: Part| {
-            if !self.is_lit(triangle, &own, |weights| part.weights(side, weights)) {
+        let emitted = |subtriangle: Subtriangle| {
+            if !self.is_lit(triangle, &own, |weights| subtriangle.weights(side, weights)) {
                 return Emitted { mean: DVec3::ZERO, is_lit: false };
             }
-            let middle = |point: Part| part.weights(side, point.weights(points, Vec2::splat(1.0 / 3.0)));
-            let sum: DVec3 = Part::all(points).map(|point| self.factor(triangle, &own, middle(point)).as_dvec3()).sum();
+            let middle = |point: Subtriangle| subtriangle.weights(side, point.weights(points, Vec2::splat(1.0 / 3.0)));
+            let sum: DVec3 =
+                Subtriangle::all(points).map(|point| self.factor(triangle, &own, middle(point)).as_dvec3()).sum();
             Emitted { mean: sum / f64::from(points * points), is_lit: true }
         };
-        Part::all(side).map(emitted).collect()
+        Subtriangle::all(side).map(emitted).collect()
     }
 
     /// A triangle and what its corners carry; `None` for a sphere.
@@ -187,10 +190,10 @@ impl<'a> EmissionMap<'a> {
         maps.map(|map| map.extent(own.uvs[map.texture.uv_set as usize])).fold(0.0, f32::max)
     }
 
-    /// Whether the factor can be above 0 in a part; `place` gives weights in the triangle for those
-    /// in the part.
-    fn is_lit(&self, triangle: &Triangle, own: &Attributes, place: impl Fn(Vec2) -> Vec2) -> bool {
-        let corners = [Vec2::ZERO, Vec2::X, Vec2::Y].map(place);
+    /// Whether the factor can be above 0 in a subtriangle; `to_triangle` gives weights in the
+    /// triangle for those in the subtriangle.
+    fn is_lit(&self, triangle: &Triangle, own: &Attributes, to_triangle: impl Fn(Vec2) -> Vec2) -> bool {
+        let corners = [Vec2::ZERO, Vec2::X, Vec2::Y].map(to_triangle);
         let lit = |map: &TexelMap<'_>| {
             let uvs = own.uvs[map.texture.uv_set as usize];
             map.is_lit(corners.map(|weights| interpolated(uvs, weights)))
@@ -213,7 +216,7 @@ impl<'a> EmissionMap<'a> {
     }
 }
 
-/// Part of a surface that is there, by its opacity.
+/// Fraction of a surface that is there, by its opacity.
 fn coverage(material: &Material, opacity: f32) -> f32 {
     match material.alpha {
         Alpha::Opaque => 1.0,
@@ -235,19 +238,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_tile_the_triangle() {
+    fn subtriangles_tile_the_triangle() {
         for side in [1, 2, 16] {
-            let parts: Vec<Part> = Part::all(side).collect();
-            assert_eq!(parts.len(), (side * side) as usize);
-            for (i, part) in parts.iter().enumerate() {
-                // The kernels' formula for the number of a part.
-                let before = part.row * (2 * side - part.row) + 2 * part.column + u32::from(part.is_turned);
+            let subtriangles: Vec<Subtriangle> = Subtriangle::all(side).collect();
+            assert_eq!(subtriangles.len(), (side * side) as usize);
+            for (i, subtriangle) in subtriangles.iter().enumerate() {
+                // The kernels' formula for the number of a subtriangle.
+                let before = subtriangle.row * (2 * side - subtriangle.row)
+                    + 2 * subtriangle.column
+                    + u32::from(subtriangle.is_turned);
                 assert_eq!(before, i as u32);
-                let middle = part.weights(side, Vec2::splat(1.0 / 3.0));
-                assert!(middle.min_element() > 0.0 && middle.element_sum() < 1.0, "{part:?} lies outside");
-                let place = middle * side as f32;
-                assert_eq!((place.floor() - Vec2::new(part.column as f32, part.row as f32)).length(), 0.0);
-                assert_eq!(place.fract().element_sum() > 1.0, part.is_turned);
+                let middle = subtriangle.weights(side, Vec2::splat(1.0 / 3.0));
+                assert!(middle.min_element() > 0.0 && middle.element_sum() < 1.0, "{subtriangle:?} lies outside");
+                let scaled = middle * side as f32;
+                assert_eq!(
+                    (scaled.floor() - Vec2::new(subtriangle.column as f32, subtriangle.row as f32)).length(),
+                    0.0
+                );
+                assert_eq!(scaled.fract().element_sum() > 1.0, subtriangle.is_turned);
             }
         }
     }

@@ -96,7 +96,7 @@ impl Environment {
     }
 
     /// Uniform sky of radiance 1 with a smooth transition to a ground of 0.3 at the horizon. Under
-    /// uniform light a white object could not be told from its background.
+    /// uniform light a white object could not be distinguished from its background.
     #[must_use]
     pub fn sky() -> Self {
         let pixels = vec![[1.0; 3], [1.0; 3], [GROUND; 3], [GROUND; 3]];

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{Material, Scene, Surface};
 use crate::{Error, Result};
 
-/// Maximum number of groups that a picture tells apart.
+/// Maximum number of groups of a picture.
 const MAX_GROUPS: usize = 32;
 /// Group of what shows its colour without light.
 const UNLIT: &str = "unlit";
@@ -24,7 +24,7 @@ impl Scene {
         let lights = self.lights.iter().map(|light| group(light.group.as_ref(), &light.name));
         let emissive = surfaces.filter_map(|(_, material)| material.group_of_light());
         let environment = self.environment.iter().map(|environment| group(None, &environment.name));
-        // What is unlit comes first: the other layers are those of the first group.
+        // Unlit surfaces come first: the other layers are those of the first group.
         for name in unlit.chain(lights).chain(emissive).chain(environment) {
             if !names.contains(&name) {
                 names.push(name);

@@ -120,13 +120,13 @@ pub struct Medium {
     pub dispersion: f32,
 }
 
-/// How much of a surface is there.
+/// Coverage of a surface: how much of it is there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Alpha {
     /// All of it.
     #[default]
     Opaque,
-    /// Where the opacity is at least the cutoff.
+    /// Is there where the opacity is at least the cutoff.
     Mask {
         /// At least 0.
         cutoff: f32,
@@ -157,7 +157,7 @@ pub struct Textures {
     pub clearcoat: Option<Texture>,
     /// G: roughness of the clearcoat.
     pub clearcoat_roughness: Option<Texture>,
-    /// As `normal`, of the clearcoat.
+    /// Same as `normal`, for the clearcoat.
     pub clearcoat_normal: Option<Texture>,
     /// RGB, sRGB: colour of the sheen.
     pub sheen_color: Option<Texture>,
@@ -206,7 +206,7 @@ impl Textures {
 pub struct Material {
     /// Name in the file.
     pub name: String,
-    /// How the surface scatters light.
+    /// Scattering of light at the surface.
     pub surface: Surface,
     /// Roughness of all lobes but the diffuse one, 0 to 1: the width of GGX is its square. Below
     /// [`SHARP_ROUGHNESS`] they are perfectly specular.
@@ -255,13 +255,13 @@ pub struct Material {
     pub emission: Vec3,
     /// Whether the back side emits the same radiance.
     pub double_sided: bool,
-    /// How much of the surface is there.
+    /// Coverage: how much of the surface is there.
     pub alpha: Alpha,
     /// Opacity, 0 to 1; see [`Alpha`].
     pub opacity: f32,
     /// Factor on the x and y of the normal map.
     pub normal_scale: f32,
-    /// Of several solids that claim the same space, that of the highest priority fills it; among
+    /// Priority among solids that claim the same space: that of the highest fills it; among
     /// equals the smallest. 0 unless the file says otherwise.
     pub priority: i32,
     /// Group that its emission is counted to in layers of lights; `None`: one of its own, by its

@@ -23,7 +23,7 @@ pub use camera::{Camera, Projection};
 pub use contents::Scene;
 pub use describe::{CameraInfo, EmitterInfo, LightInfo, SceneInfo};
 pub use describe_materials::{ImageInfo, MaterialInfo, TextureInfo};
-pub(crate) use emission_map::{Cut, EmissionMap, Emitted, Part};
+pub(crate) use emission_map::{Cut, EmissionMap, Emitted, Subtriangle};
 pub use environment::Environment;
 pub(crate) use light::spot_heights;
 pub use light::{LUMENS_PER_WATT, Light, LightKind};

@@ -11,7 +11,7 @@ use crate::image::srgb_decode;
 /// Slack for the rounding of texture coordinates, in texels.
 const ROUNDING: f32 = 0.01;
 
-/// What counts in a texture.
+/// Channels that count in a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Channels {
     /// The colour.
@@ -83,9 +83,9 @@ impl TexelMap<'_> {
         if !self.texture.is_linear {
             return texel(0, 0);
         }
-        let part = corner - low;
-        let row = |dy: i64| texel(0, dy).lerp(texel(1, dy), part.x);
-        row(0).lerp(row(1), part.y)
+        let fraction = corner - low;
+        let row = |dy: i64| texel(0, dy).lerp(texel(1, dy), fraction.x);
+        row(0).lerp(row(1), fraction.y)
     }
 
     /// Whether the texture may be other than zero within a triangle of texture coordinates: some
@@ -172,7 +172,7 @@ mod tests {
         Image { name: String::new(), width: 11, height: 7, texels: (0..77).map(texel).collect() }
     }
 
-    /// Regions of a texture that are told to be dark but have a bright point, that are told to be
+    /// Regions of a texture that are reported as dark but have a bright point, that are reported as
     /// dark, and that have a bright point.
     fn regions(map: &TexelMap<'_>) -> [usize; 3] {
         let part = |k: usize, step: f32| (k as f32 * step).fract();

@@ -15,7 +15,7 @@ pub struct Image {
     pub texels: Vec<[u8; 4]>,
 }
 
-/// What lies beyond the border of an image.
+/// Texels beyond the border of an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
     /// The image again.
@@ -36,9 +36,9 @@ pub struct Texture {
     pub wrap: [Wrap; 2],
     /// Texels are interpolated; otherwise the nearest counts.
     pub is_linear: bool,
-    /// Where the image is seen from afar, smaller versions of it are read.
+    /// Smaller versions of the image are read where it is seen from afar.
     pub is_mipmapped: bool,
-    /// Which of [`Attributes::uvs`].
+    /// Index in [`Attributes::uvs`].
     pub uv_set: u32,
     /// Rows of the transform of texture coordinates: u' = row 0 · (u, v, 1), v' = row 1 · (u, v, 1)
     /// (KHR_texture_transform).

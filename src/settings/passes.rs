@@ -15,8 +15,8 @@ use crate::error::Result;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PassSettings {
-    /// Part of the photons that a pass keeps, α, in [`Self::ALPHA`]: the smaller, the faster radii
-    /// shrink, and the more noise is left. 1: they do not shrink.
+    /// Fraction of the photons that a pass keeps, α, in [`Self::ALPHA`]: the smaller, the faster
+    /// radii shrink, and the more noise is left. 1: they do not shrink.
     pub alpha: f64,
 }
 
@@ -97,7 +97,7 @@ impl PassRange {
         self.end - self.first
     }
 
-    /// As many passes as 32-bit indices of the numbers for sampling suffice for.
+    /// Maximum number of passes: as many as 32-bit indices of the numbers for sampling suffice for.
     #[must_use]
     pub fn longest(settings: &Settings) -> Self {
         let most = most_samples(&settings.photons, &settings.picture) / u64::from(settings.picture.spp.max(1));

@@ -8,7 +8,7 @@ use crate::error::Result;
 
 /// Maximum length of a path, surfaces: the key of a staged photon has no bits for more positions
 /// along a path.
-pub const MAX_BOUNCES: u32 = crate::layout::PLACE_MASK;
+pub const MAX_BOUNCES: u32 = crate::layout::PHOTON_INDEX_MASK;
 
 /// Light that reaches the picture, and the method that computes it (the report's five modes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use super::Settings;
 
-/// What a picture is for: each stands for a set of photons, samples and final gathering.
+/// Purposes of a picture: each stands for a set of photons, samples and final gathering.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
     /// To look at while a scene is made.
@@ -12,7 +12,7 @@ pub enum Quality {
     Normal,
     /// Clean edges and penumbrae as well.
     High,
-    /// As good as the program can do in one pass.
+    /// Best that the program can do in one pass.
     Final,
 }
 

@@ -11,7 +11,7 @@ use crate::error::Result;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
-    /// How lights are read and sampled.
+    /// Reading and sampling of lights.
     pub lights: LightSettings,
     /// The first pass.
     pub photons: PhotonSettings,
@@ -56,8 +56,8 @@ pub(crate) fn check_samples(photons: &PhotonSettings, picture: &PictureSettings)
     check_sample_count(photons, picture, picture.spp.into(), ("picture.spp", picture.spp.to_string()))
 }
 
-/// As [`check_samples`], for a number of samples of all passes together. `setting` is refused: its
-/// name and value.
+/// Variant of [`check_samples`] for a number of samples of all passes together. `setting` is
+/// refused: its name and value.
 pub(super) fn check_sample_count(
     photons: &PhotonSettings,
     picture: &PictureSettings,

@@ -113,8 +113,8 @@ pub(super) fn heat_map(title: &str, columns: &[String], rows: &[String], values:
                     area.draw(&Text::new("-", middle, centred(15)))?;
                     continue;
                 };
-                let place = if high > low { (value / low).ln() / (high / low).ln() } else { 0.5 };
-                let (color, ink) = viridis(place);
+                let fraction = if high > low { (value / low).ln() / (high / low).ln() } else { 0.5 };
+                let (color, ink) = viridis(fraction);
                 let corners = [(x, y), (x + CELL.0 - 2, y + CELL.1 - 2)];
                 area.draw(&Rectangle::new(corners, color.filled()))?;
                 area.draw(&Text::new(brief(value), middle, centred(15).color(&ink)))?;
@@ -126,9 +126,9 @@ pub(super) fn heat_map(title: &str, columns: &[String], rows: &[String], values:
 
 /// Colour of the viridis scale at 0 to 1, and a text colour with contrast to it; neither is
 /// [`INK`].
-fn viridis(place: f64) -> (RGBColor, RGBColor) {
-    let [r, g, b] = colorous::VIRIDIS.eval_continuous(place.clamp(0.0, 1.0)).as_array();
-    let ink = if place < 0.55 { RGBColor(255, 255, 255) } else { RGBColor(1, 1, 1) };
+fn viridis(fraction: f64) -> (RGBColor, RGBColor) {
+    let [r, g, b] = colorous::VIRIDIS.eval_continuous(fraction.clamp(0.0, 1.0)).as_array();
+    let ink = if fraction < 0.55 { RGBColor(255, 255, 255) } else { RGBColor(1, 1, 1) };
     (RGBColor(r, g, b), ink)
 }
 

@@ -26,7 +26,7 @@ pub struct Claim {
     pub claim: &'static str,
     /// Measurement in words.
     pub measured: String,
-    /// What had to be measured for the claim to hold.
+    /// Result that had to be measured for the claim to hold.
     pub rule: &'static str,
     /// Result of applying the rule to the measurement.
     pub verdict: Verdict,

@@ -53,16 +53,16 @@ pub(super) fn energy(rows: &[&Row]) -> Finding {
 
 pub(super) fn gather_dominates(rows: &[&Row]) -> Finding {
     let timed = rows.iter().filter(|row| row.mode.traces_photons() && row.seconds.total > 0.0);
-    let shares: Vec<f64> = timed.map(|row| row.seconds.gather / row.seconds.total).collect();
-    let (low, high) = range(shares.iter().copied())?;
-    let most = shares.iter().filter(|share| **share > 0.5).count();
+    let fractions: Vec<f64> = timed.map(|row| row.seconds.gather / row.seconds.total).collect();
+    let (low, high) = range(fractions.iter().copied())?;
+    let most = fractions.iter().filter(|fraction| **fraction > 0.5).count();
     let text = format!(
         "{:.0} % to {:.0} % of the total time, more than half in {most} of {} pictures",
         100.0 * low,
         100.0 * high,
-        shares.len()
+        fractions.len()
     );
-    Some((text, most == shares.len()))
+    Some((text, most == fractions.len()))
 }
 
 /// Growth of the gather's time from the first to the last row of each group, as text and as minimum

@@ -8,7 +8,7 @@ use serde::Serialize;
 pub enum Question {
     /// Constant total energy over n and k.
     Energy,
-    /// Gather time as the largest share of the total time.
+    /// Gather time as the largest fraction of the total time.
     GatherDominates,
     /// Growth of the gather time with k.
     TimeWithNeighbors,

@@ -96,8 +96,8 @@ impl<'a> Layout<'a> {
     fn draw_cell(&self, canvas: &mut Canvas, (x, y): (u32, u32), row: &Row) {
         let middle = (x + self.cell.0 / 2) as i32;
         let mut caption = |line: u32, text: &str, color: Rgb8| {
-            let place = (middle, (y + self.cell.1 + 2 + line * (LINE - 2)) as i32);
-            canvas.write(text, place, CAPTION_FONT, color, Alignment::Center);
+            let position = (middle, (y + self.cell.1 + 2 + line * (LINE - 2)) as i32);
+            canvas.write(text, position, CAPTION_FONT, color, Alignment::Center);
         };
         if row.error.is_some() {
             caption(0, "failed", INK);

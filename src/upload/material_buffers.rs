@@ -131,9 +131,9 @@ fn attributes(own: &Attributes) -> layout::Attributes {
     }
 }
 
-/// Row of the table of materials. `place` adds a texture, of colours or not, and returns where it
+/// Row of the table of materials. `add` adds a texture, of colours or not, and returns where it
 /// lies.
-fn record(material: &Material, unit: LightUnit, mut place: impl FnMut(&Texture, bool) -> u32) -> MaterialRecord {
+fn record(material: &Material, unit: LightUnit, mut add: impl FnMut(&Texture, bool) -> u32) -> MaterialRecord {
     let surface = &material.surface;
     let (metallic, f0, specular) = match *surface {
         Surface::Layered { metallic, f0, specular, .. } => (metallic, f0.to_array(), specular),
@@ -149,33 +149,33 @@ fn record(material: &Material, unit: LightUnit, mut place: impl FnMut(&Texture, 
         Alpha::Blend => BLEND_BIT,
     };
     let all = &material.textures;
-    let mut slot = |texture: &Option<Texture>, is_color| texture.as_ref().map_or(0, |t| place(t, is_color));
+    let mut row_of = |texture: &Option<Texture>, is_color| texture.as_ref().map_or(0, |t| add(t, is_color));
     let textures = [
         [
-            slot(&all.base_color, true),
-            slot(&all.metallic_roughness, false),
-            slot(&all.normal, false),
-            slot(&all.emission, true),
+            row_of(&all.base_color, true),
+            row_of(&all.metallic_roughness, false),
+            row_of(&all.normal, false),
+            row_of(&all.emission, true),
         ],
         [
-            slot(&all.specular, false),
-            slot(&all.specular_color, true),
-            slot(&all.transmission, false),
-            slot(&all.diffuse_transmission, false),
+            row_of(&all.specular, false),
+            row_of(&all.specular_color, true),
+            row_of(&all.transmission, false),
+            row_of(&all.diffuse_transmission, false),
         ],
         [
-            slot(&all.diffuse_transmission_color, true),
-            slot(&all.clearcoat, false),
-            slot(&all.clearcoat_roughness, false),
-            slot(&all.clearcoat_normal, false),
+            row_of(&all.diffuse_transmission_color, true),
+            row_of(&all.clearcoat, false),
+            row_of(&all.clearcoat_roughness, false),
+            row_of(&all.clearcoat_normal, false),
         ],
         [
-            slot(&all.sheen_color, true),
-            slot(&all.sheen_roughness, false),
-            slot(&all.anisotropy, false),
-            slot(&all.iridescence, false),
+            row_of(&all.sheen_color, true),
+            row_of(&all.sheen_roughness, false),
+            row_of(&all.anisotropy, false),
+            row_of(&all.iridescence, false),
         ],
-        [slot(&all.iridescence_thickness, false), 0, 0, 0],
+        [row_of(&all.iridescence_thickness, false), 0, 0, 0],
     ];
     // Finishes are those of layers.
     let is_finished = material.is_finished() && !surface.transmits();
@@ -226,17 +226,17 @@ fn texture_record(texture: &Texture, is_color: bool, texels: &mut Texels<'_>) ->
     };
     let [u, v] = texture.wrap.map(wrap);
     let bit = |is: bool, bit: u32| if is { bit } else { 0 };
-    let placed = texels.place(texture.image, is_color, texture.is_mipmapped);
+    let image = texels.add(texture.image, is_color, texture.is_mipmapped);
     let row = |row: [f32; 3]| [row[0], row[1], row[2], 0.0];
     TextureRecord {
-        first: placed.first,
-        size: placed.width | (placed.height << 16),
+        first: image.first,
+        size: image.width | (image.height << 16),
         flags: u
             | (v << 2)
             | bit(texture.is_linear, LINEAR_BIT)
             | bit(is_color, SRGB_BIT)
             | bit(texture.uv_set == 1, SECOND_UV_BIT),
-        levels: placed.levels,
+        levels: image.levels,
         transform: texture.transform.map(row),
     }
 }

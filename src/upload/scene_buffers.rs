@@ -23,7 +23,7 @@ use crate::{
 #[derive(Debug)]
 pub struct SceneBuffers {
     nodes: Arc<Buffer>,
-    primitives: Windows,
+    primitives: Halves,
     normals: Table,
     pub materials: MaterialBuffers,
     media: Table,
@@ -43,7 +43,7 @@ pub struct SceneBuffers {
     /// diffuse base.
     pub splits: bool,
     pub lights: LightBuffers,
-    /// Which surfaces bound which solids.
+    /// Solids and the surfaces that bound them.
     pub solids: Solids,
 }
 
@@ -59,11 +59,11 @@ pub fn sampler_constant(sampler: Sampler) -> (&'static str, f64) {
 
 /// An array in one binding, or in two where it exceeds one.
 #[derive(Debug)]
-struct Windows {
+struct Halves {
     low: Buffer,
     high: Buffer,
     /// Elements in `low` if `high` is used, else 0.
-    window: u64,
+    split: u64,
 }
 
 impl SceneBuffers {
@@ -85,7 +85,7 @@ impl SceneBuffers {
         let contacts: Arc<[_]> = contacts(scene, bvh).into();
         Ok(Self {
             nodes: Arc::new(gpu.storage_with("bvh nodes", &bvh.nodes)?),
-            primitives: Windows::new::<Primitive>(
+            primitives: Halves::new::<Primitive>(
                 gpu,
                 "primitives",
                 &marked(&bvh.primitives, scene, &solids, &contacts, &lights.table),
@@ -120,7 +120,7 @@ impl SceneBuffers {
         let primitives = marked(&bvh.primitives, scene, &self.solids, &self.contacts, &lights.table);
         Ok(Self {
             nodes: Arc::clone(&self.nodes),
-            primitives: Windows::new::<Primitive>(gpu, "primitives", &primitives)?,
+            primitives: Halves::new::<Primitive>(gpu, "primitives", &primitives)?,
             normals: self.normals.clone(),
             materials: self.materials.relit(gpu, scene, settings.unit)?,
             media: self.media.clone(),
@@ -137,13 +137,13 @@ impl SceneBuffers {
         self.kernel_with(gpu, stem, &[])
     }
 
-    /// As [`Self::kernel`], with further `override` constants.
+    /// Variant of [`Self::kernel`] with further `override` constants.
     #[must_use]
     pub fn kernel_with(&self, gpu: &Gpu, stem: &str, others: &[(&str, f64)]) -> Kernel {
         self.kernel_of(gpu, shader(stem), others)
     }
 
-    /// As [`Self::kernel_with`], for a shader of another table: the probes of the tests.
+    /// Variant of [`Self::kernel_with`] for a shader of another table: the probes of the tests.
     #[doc(hidden)]
     #[must_use]
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
@@ -161,8 +161,8 @@ impl SceneBuffers {
             ("HAS_ABSORPTION", f64::from(u8::from(self.has_absorption))),
             ("HAS_VARIED_LIGHTS", f64::from(u8::from(self.lights.table.is_varied))),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
-            ("SPLIT", f64::from(u8::from(self.primitives.window > 0))),
-            ("PRIMITIVE_WINDOW", window_or_all(self.primitives.window)),
+            ("SPLIT", f64::from(u8::from(self.primitives.split > 0))),
+            ("PRIMITIVE_SPLIT", split_or_none(self.primitives.split)),
         ];
         overrides.extend_from_slice(others);
         let [light_nodes, pixels, cells, rows] = self.lights.tables();
@@ -185,17 +185,17 @@ impl SceneBuffers {
     }
 }
 
-impl Windows {
+impl Halves {
     fn new<T: Pod>(gpu: &Gpu, label: &str, data: &[T]) -> Result<Self> {
         let fits = usize::try_from(gpu.max_binding() / size_of::<T>() as u64).unwrap_or(usize::MAX);
         let (low, high) = data.split_at(data.len().min(fits));
-        let window = if high.is_empty() { 0 } else { low.len() as u64 };
-        Ok(Self { low: gpu.storage_with(label, low)?, high: gpu.storage_with(label, high)?, window })
+        let split = if high.is_empty() { 0 } else { low.len() as u64 };
+        Ok(Self { low: gpu.storage_with(label, low)?, high: gpu.storage_with(label, high)?, split })
     }
 }
 
-fn window_or_all(window: u64) -> f64 {
-    if window == 0 { f64::from(u32::MAX) } else { window as f64 }
+fn split_or_none(split: u64) -> f64 {
+    if split == 0 { f64::from(u32::MAX) } else { split as f64 }
 }
 
 /// The primitives, each with the light that it is, and marked as [`Primitive::material`] says.

@@ -11,7 +11,7 @@ use crate::{
 
 /// An image among the texels.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Placed {
+pub(super) struct ImageTexels {
     /// Index of its first texel.
     pub first: u32,
     pub width: u32,
@@ -24,7 +24,7 @@ pub(super) struct Placed {
 pub(super) struct Texels<'a> {
     images: &'a [Image],
     words: Vec<u32>,
-    known: HashMap<(u32, bool, bool), Placed>,
+    known: HashMap<(u32, bool, bool), ImageTexels>,
 }
 
 impl<'a> Texels<'a> {
@@ -32,11 +32,11 @@ impl<'a> Texels<'a> {
         Self { images, words: Vec::new(), known: HashMap::new() }
     }
 
-    /// Where an image lies, which is added at its first use. `is_color`: it is averaged as colours
-    /// by the sRGB curve, weighted by their opacity. `is_mipmapped`: with smaller versions.
-    pub fn place(&mut self, image: u32, is_color: bool, is_mipmapped: bool) -> Placed {
-        if let Some(placed) = self.known.get(&(image, is_color, is_mipmapped)) {
-            return *placed;
+    /// The texels of an image, which is added at its first use. `is_color`: it is averaged as
+    /// colours by the sRGB curve, weighted by their opacity. `is_mipmapped`: with smaller versions.
+    pub fn add(&mut self, image: u32, is_color: bool, is_mipmapped: bool) -> ImageTexels {
+        if let Some(added) = self.known.get(&(image, is_color, is_mipmapped)) {
+            return *added;
         }
         let source = &self.images[image as usize];
         let first = self.words.len() as u32;
@@ -49,9 +49,9 @@ impl<'a> Texels<'a> {
             (width, height, levels) = ((width / 2).max(1), (height / 2).max(1), levels + 1);
             self.words.extend(level.iter().map(|texel| u32::from_le_bytes(*texel)));
         }
-        let placed = Placed { first, width: source.width, height: source.height, levels };
-        self.known.insert((image, is_color, is_mipmapped), placed);
-        placed
+        let added = ImageTexels { first, width: source.width, height: source.height, levels };
+        self.known.insert((image, is_color, is_mipmapped), added);
+        added
     }
 
     pub fn into_words(self) -> Vec<u32> {
@@ -75,7 +75,7 @@ fn halved(finer: &[[u8; 4]], (width, height): (u32, u32), is_color: bool) -> Vec
         for y in covered(i / columns, rows, height) {
             for x in covered(i % columns, columns, width) {
                 let [r, g, b, a] = finer[(y * width + x) as usize];
-                // What is not there has no colour.
+                // A texel that is not there has no colour.
                 let own = if is_color { f32::from(a).max(1e-3) } else { 1.0 };
                 for (sum, value) in sum.iter_mut().zip([r, g, b]) {
                     *sum += own * linear[usize::from(value)];

@@ -410,7 +410,7 @@ fn light_of_nothing_gives_a_black_picture() {
     }
     let (radiance, stderr) = brightest("dark.gltf");
     assert!(radiance > 0.9 && stderr.contains("no light: lit by a uniform sky"), "control: {radiance}, {stderr}");
-    // What the surface reflects comes on top of the background.
+    // Light that the surface reflects comes on top of the background.
     let lit = brightest("dark.gltf --background 0,0.25,0").0;
     assert!((0.25..0.5).contains(&lit), "control: {lit}");
 }

@@ -79,7 +79,7 @@ fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
     let status: Value = serde_json::from_str(&succeeds(folder, "status b.exr --passes 7 --json")).expect("JSON");
     assert_eq!(status["missing"], serde_json::json!(["--passes 0..2", "--passes 5..7"]));
     assert_eq!((&status["complete"], &status["windows"][0]["passes"][0]), (&Value::from(false), &Value::from("2..5")));
-    // What must not be merged.
+    // Parts that must not be merged.
     let gap = fails(folder, "merge b.exr -o x.exr");
     assert!(gap.contains("parts are missing: --passes 0..2;") && gap.contains("--allow-gaps"), "{gap}");
     succeeds(folder, "merge b.exr -o x.exr -q --allow-gaps");

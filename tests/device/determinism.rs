@@ -67,7 +67,7 @@ fn emitted_directions(first: u64, count: u32, sampler: Sampler, strata: u32) -> 
     emitted_directions_of(LightKind::Point, first, count, sampler, strata)
 }
 
-/// As [`emitted_directions`], for another kind of light.
+/// Variant of [`emitted_directions`] for another kind of light.
 fn emitted_directions_of(kind: LightKind, first: u64, count: u32, sampler: Sampler, strata: u32) -> Vec<Vec3> {
     let gpu = gpu();
     let mut scene = scene(&[diffuse(0.5)]);

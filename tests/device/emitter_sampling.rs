@@ -152,10 +152,10 @@ fn check_density(lamps: &Lamps) {
     let seen: f64 = probabilities.iter().sum();
     probabilities.iter_mut().for_each(|p| *p /= seen);
     let drawn = visible(NORMAL);
-    let share = drawn.len() as f64 / SAMPLES as f64;
+    let fraction = drawn.len() as f64 / SAMPLES as f64;
     assert!(
-        (share - seen).abs() < 4.0 * (seen * (1.0 - seen) / SAMPLES as f64).sqrt() + 1e-3,
-        "{share} instead of {seen}"
+        (fraction - seen).abs() < 4.0 * (seen * (1.0 - seen) / SAMPLES as f64).sqrt() + 1e-3,
+        "{fraction} instead of {seen}"
     );
     let test = |drawn: Vec<[f32; 4]>| deviate(&grid.counts(drawn), &probabilities);
     let found = test(drawn);

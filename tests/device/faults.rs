@@ -50,12 +50,12 @@ fn cut_dispatches_change_no_bit() {
         (frame, gpu.dispatches())
     };
     let (whole, uncut) = picture(Pacing::Whole, &settings);
-    let (cut, parts) = picture(Pacing::Parts(256), &settings);
+    let (cut, chunks) = picture(Pacing::Chunks(256), &settings);
     assert!(cut == whole, "parts of 256 invocations give another picture");
-    assert!(parts > uncut + 100, "control: {uncut} dispatches, {parts} when cut");
-    let (timed, parts) = picture(Pacing::Measured, &settings);
+    assert!(chunks > uncut + 100, "control: {uncut} dispatches, {chunks} when cut");
+    let (timed, chunks) = picture(Pacing::Measured, &settings);
     assert!(timed == whole, "dispatches cut by time give another picture");
-    assert!(parts >= uncut, "{uncut} dispatches, {parts} when timed");
+    assert!(chunks >= uncut, "{uncut} dispatches, {chunks} when timed");
     let (other, _) = picture(Pacing::Whole, &settings.with(|s| s.photons.seed = 1));
     assert!(other != whole, "control: the seed changes nothing");
 }

@@ -11,7 +11,7 @@
 use std::num::NonZero;
 
 use caustica::{
-    layout::{PhotonFlux, PhotonPlace, octahedral},
+    layout::{PhotonFlux, PhotonPosition, octahedral},
     progress::Silent,
     reference::{Found, KdMap, KdTree, brute_force, fingerprint},
     settings::EstimateSettings,
@@ -116,8 +116,8 @@ fn it_finds_the_distances_that_kiddo_finds() {
 /// A map of photons on a line from the origin, all arriving from above, and a visible point at the
 /// origin.
 fn line(distances: &[f32]) -> (KdMap, caustica::layout::VisiblePoint) {
-    let place = |&x: &f32| PhotonPlace { position: [x, 0.0, 0.0], wi: octahedral(Vec3::Y) };
-    let map = KdMap::new(distances.iter().map(place).collect(), vec![PhotonFlux::default(); distances.len()], 1);
+    let photon = |&x: &f32| PhotonPosition { position: [x, 0.0, 0.0], wi: octahedral(Vec3::Y) };
+    let map = KdMap::new(distances.iter().map(photon).collect(), vec![PhotonFlux::default(); distances.len()], 1);
     let mut origin = point(&mut Random(1), false);
     (origin.position, origin.ng, origin.ns) = ([0.0; 3], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]);
     (map, origin)

@@ -42,11 +42,11 @@ const COSINES: [f64; 6] = [0.02, 0.1, 0.3, 0.5, 0.7, 0.9];
 const INTEGRATED: [(f64, [f64; 6]); 2] =
     [(0.35, [0.8058, 0.5390, 0.2476, 0.1134, 0.0458, 0.0123]), (0.8, [0.8924, 0.6940, 0.4555, 0.3157, 0.2204, 0.1477])];
 
-/// Albedo of sheen, what it leaves below, and share of a clear coat.
+/// Albedo of sheen, what it leaves below, and weight of a clear coat.
 fn layers(mu: f64, other: f64, roughness: f64, colour: f64, clearcoat: f64) -> [f64; 3] {
     let row = [[mu, roughness, colour, clearcoat], [other, 0.0, 0.0, 0.0]].map(|r| r.map(|x| x as f32));
-    let [albedo, left, share, _] = Probe::new("probe_layers").run(&[row])[0].map(f64::from);
-    [albedo, left, share]
+    let [albedo, left, weight, _] = Probe::new("probe_layers").run(&[row])[0].map(f64::from);
+    [albedo, left, weight]
 }
 
 #[test]
@@ -92,9 +92,9 @@ fn sheen_reflects_what_others_integrated() {
 #[test]
 fn clear_coats_are_seen_by_schlick() {
     for mu in [0.0_f64, 0.2, 0.6, 1.0] {
-        let share = |coat: f64| layers(mu, 1.0, 0.5, 0.0, coat)[2];
+        let weight = |coat: f64| layers(mu, 1.0, 0.5, 0.0, coat)[2];
         let schlick = 0.04 + 0.96 * (1.0 - mu).powi(5);
-        assert!((share(0.7) - 0.7 * schlick).abs() < 1e-6, "cosine {mu}: {}", share(0.7));
-        assert!((share(0.6) - 0.7 * schlick).abs() > 1e-3, "control: another coat, cosine {mu}");
+        assert!((weight(0.7) - 0.7 * schlick).abs() < 1e-6, "cosine {mu}: {}", weight(0.7));
+        assert!((weight(0.6) - 0.7 * schlick).abs() > 1e-3, "control: another coat, cosine {mu}");
     }
 }

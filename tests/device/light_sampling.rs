@@ -113,8 +113,8 @@ fn surfaces_send_by_the_cosine() {
         of_unit_square(directions.iter().map(|d| {
             let [height, azimuth] = height_and_azimuth(*d, normal);
             let sine2 = height * (2.0 - height);
-            let share = if height < 1.0 { sine2 } else { 2.0 - sine2 };
-            [if both { 0.5 * share } else { share }, azimuth]
+            let fraction = if height < 1.0 { sine2 } else { 2.0 - sine2 };
+            [if both { 0.5 * fraction } else { fraction }, azimuth]
         }))
     };
     for both in [false, true] {

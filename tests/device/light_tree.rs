@@ -33,7 +33,7 @@ fn many_lights() -> Scene {
     let mut random = Random(3);
     let mut scene = scene(&[diffuse(0.5)]);
     add_quad(&mut scene, vec3(-9.0, 0.0, 9.0), Vec3::X * 18.0, Vec3::NEG_Z * 18.0, 0);
-    let place =
+    let position =
         |random: &mut Random| vec3(9.0 * random.unit() - 4.5, 3.0 * random.unit() - 0.5, 9.0 * random.unit() - 4.5);
     for i in 0..60 {
         let kind = match i % 3 {
@@ -41,7 +41,7 @@ fn many_lights() -> Scene {
             1 => LightKind::Spot { inner: 0.0, outer: 0.02 + 1.5 * random.unit().powi(2) },
             _ => LightKind::Spot { inner: 0.4 * random.unit(), outer: 0.41 + random.unit() },
         };
-        let light = point_light(place(&mut random), 10.0_f32.powf(3.0 * random.unit() - 2.0));
+        let light = point_light(position(&mut random), 10.0_f32.powf(3.0 * random.unit() - 2.0));
         scene.lights.push(Light { kind, direction: direction(&mut random), ..light });
     }
     for _ in 0..3 {
@@ -52,12 +52,12 @@ fn many_lights() -> Scene {
         scene.materials.push(emissive(if both { "both" } else { "front" }, 0.0, 5.0, both));
         for i in 0..120 {
             let side = if i == 0 { 3.0 } else { 0.02 + 0.4 * random.unit().powi(3) };
-            let (corner, a, b) = (place(&mut random), direction(&mut random), direction(&mut random));
+            let (corner, a, b) = (position(&mut random), direction(&mut random), direction(&mut random));
             let positions = [corner, corner + side * a, corner + side * b];
             scene.triangles.push(Triangle::new(positions, [a.cross(b).normalize(); 3], 1 + u32::from(both)));
         }
     }
-    scene.spheres.extend((0..5).map(|_| sphere(place(&mut random), 0.05 + 0.2 * random.unit(), 1)));
+    scene.spheres.extend((0..5).map(|_| sphere(position(&mut random), 0.05 + 0.2 * random.unit(), 1)));
     scene.environment = Some(sky(3.0));
     scene
 }
@@ -110,7 +110,7 @@ fn lights_are_chosen_with_the_probability_that_is_told() {
 }
 
 /// Points of a light from which it shines, each with the direction that it faces (0: all).
-fn places(light: &layout::Light) -> Vec<DVec3> {
+fn points_of(light: &layout::Light) -> Vec<DVec3> {
     let [p, e1, e2] = [light.position, light.e1, light.e2].map(|v| Vec3::from_array(v).as_dvec3());
     match light.kind {
         layout::TRIANGLE_LIGHT => {
@@ -124,25 +124,25 @@ fn places(light: &layout::Light) -> Vec<DVec3> {
     }
 }
 
-/// Whether light from one of its places reaches a surface, which nothing hides.
+/// Whether light from one of its points reaches a surface, which nothing hides.
 fn lights_up(light: &layout::Light, point: DVec3, normal: DVec3) -> bool {
     let [p, axis, e2] = [light.position, light.e1, light.e2].map(|v| Vec3::from_array(v).as_dvec3());
     let above = |to_light: DVec3| normal == DVec3::ZERO || to_light.normalize().dot(normal) > 1e-3;
     match light.kind {
         layout::DIRECTIONAL_LIGHT => above(-axis),
         layout::ENVIRONMENT_LIGHT => true,
-        _ => places(light).into_iter().any(|place| {
-            let away = (point - place).normalize();
+        _ => points_of(light).into_iter().any(|end| {
+            let away = (point - end).normalize();
             let shines = match light.kind {
                 layout::SPOT_LIGHT => 1.0 - away.dot(axis) < e2.x * 0.999,
                 layout::TRIANGLE_LIGHT => {
                     let cosine = axis.cross(e2).normalize().dot(away);
                     cosine > 1e-3 || (f64::from(light.solid_angle) > 1.5 * PI && cosine < -1e-3)
                 }
-                layout::SPHERE_LIGHT => (place - p).dot(away) > 0.0,
+                layout::SPHERE_LIGHT => (end - p).dot(away) > 0.0,
                 _ => true,
             };
-            shines && above(place - point)
+            shines && above(end - point)
         }),
     }
 }

@@ -3,7 +3,7 @@
 use caustica::{
     density::{Density, DensityKernel},
     gpu::{Buffer, Gpu},
-    layout::{Gathered, Photon, PhotonFlux, PhotonPlace, VisiblePoint, from_octahedral},
+    layout::{Gathered, Photon, PhotonFlux, PhotonPosition, VisiblePoint, from_octahedral},
     passes::{
         estimate::gather::{Gather, GatherOptions, GatherSettings, GatherStats, gathered_buffer},
         maps::radix_sort::RadixSort,
@@ -76,34 +76,34 @@ fn settings(k: u32) -> GatherSettings {
 /// whose answer rounding decides are left out: devices round sums of products in different ways.
 fn differences(
     answer: &Answer,
-    (places, fluxes): (&[PhotonPlace], &[PhotonFlux]),
+    (photons, fluxes): (&[PhotonPosition], &[PhotonFlux]),
     points: &[VisiblePoint],
     settings: &GatherSettings,
     side_test: bool,
 ) -> usize {
-    let positions: Vec<Vec3> = places.iter().map(|p| p.position.into()).collect();
+    let positions: Vec<Vec3> = photons.iter().map(|p| p.position.into()).collect();
     let wrong = |(i, point): (usize, &VisiblePoint)| {
-        let accepted = |p: usize| !side_test || usable(&places[p], point);
+        let accepted = |p: usize| !side_test || usable(&photons[p], point);
         let k = settings.radius.map_or(settings.neighbors, |_| u32::MAX);
         let bound = settings.radius.or(settings.max_radius);
         let found = brute_force(&positions, point.position.into(), k, bound, accepted);
         let flat = VisiblePoint { ns: point.ng, ..*point };
         let expected = if side_test { *point } else { flat };
-        let radiance = estimate((places, fluxes), &found, &expected, settings.density, EMITTED, side_test);
-        !agrees(&answer.gathered[i], &answer.radiance[i], &found, radiance) && !is_close_call(places, point, &found)
+        let radiance = estimate((photons, fluxes), &found, &expected, settings.density, EMITTED, side_test);
+        !agrees(&answer.gathered[i], &answer.radiance[i], &found, radiance) && !is_close_call(photons, point, &found)
     };
     points.iter().enumerate().filter(|(_, p)| p.next_map != 0).filter(|p| wrong(*p)).count()
 }
 
 /// Whether a photon about as far away as the last one of an estimate, or nearer, lies in the plane
 /// of the point, or two lie at different distances that are about that of the last one.
-fn is_close_call(places: &[PhotonPlace], point: &VisiblePoint, found: &Found) -> bool {
+fn is_close_call(photons: &[PhotonPosition], point: &VisiblePoint, found: &Found) -> bool {
     let position = Vec3::from(point.position);
     let (last, slack) = (f64::from(found.radius_squared), 2e-6 * f64::from(found.radius_squared));
-    let squared = |p: &PhotonPlace| f64::from(Vec3::from(p.position).distance_squared(position));
-    let along = |p: &PhotonPlace| from_octahedral(p.wi).dot(point.ng.into()).abs();
-    let in_plane = places.iter().any(|p| squared(p) <= last + slack && along(p) < 2e-6);
-    let at_the_end: Vec<f64> = places.iter().map(squared).filter(|d| (d - last).abs() <= slack).collect();
+    let squared = |p: &PhotonPosition| f64::from(Vec3::from(p.position).distance_squared(position));
+    let along = |p: &PhotonPosition| from_octahedral(p.wi).dot(point.ng.into()).abs();
+    let in_plane = photons.iter().any(|p| squared(p) <= last + slack && along(p) < 2e-6);
+    let at_the_end: Vec<f64> = photons.iter().map(squared).filter(|d| (d - last).abs() <= slack).collect();
     in_plane || at_the_end.iter().any(|d| *d != at_the_end[0])
 }
 
@@ -119,20 +119,20 @@ fn agrees(gathered: &Gathered, radiance: &[f32; 4], found: &Found, expected: [f6
 fn check(bench: &mut Bench, photons: &[Photon], points: &[VisiblePoint], settings: &GatherSettings, side_test: bool) {
     let map = bench.map(photons);
     let answer = bench.ask(side_test, &map, points, settings);
-    let (places, fluxes) = map.read(bench.gpu).unwrap();
-    let wrong = differences(&answer, (&places, &fluxes), points, settings, side_test);
+    let (photons, fluxes) = map.read(bench.gpu).unwrap();
+    let wrong = differences(&answer, (&photons, &fluxes), points, settings, side_test);
     assert_eq!(wrong, 0, "{} photons, {settings:?}, side test {side_test}", photons.len());
     if photons.len() > 1 && settings.radius.or(settings.max_radius).is_none() {
         let last = points.iter().rfind(|p| p.next_map != 0).unwrap();
-        let distance = |p: &PhotonPlace| Vec3::from(p.position).distance(last.position.into());
-        let lost = (0..places.len())
-            .filter(|&i| !side_test || usable(&places[i], last))
-            .min_by(|&a, &b| distance(&places[a]).total_cmp(&distance(&places[b])));
+        let distance = |p: &PhotonPosition| Vec3::from(p.position).distance(last.position.into());
+        let lost = (0..photons.len())
+            .filter(|&i| !side_test || usable(&photons[i], last))
+            .min_by(|&a, &b| distance(&photons[a]).total_cmp(&distance(&photons[b])));
         let Some(lost) = lost else { return };
-        let (mut fewer_places, mut fewer_fluxes) = (places, fluxes);
-        fewer_places.remove(lost);
+        let (mut fewer_photons, mut fewer_fluxes) = (photons, fluxes);
+        fewer_photons.remove(lost);
         fewer_fluxes.remove(lost);
-        assert!(differences(&answer, (&fewer_places, &fewer_fluxes), points, settings, side_test) > 0);
+        assert!(differences(&answer, (&fewer_photons, &fewer_fluxes), points, settings, side_test) > 0);
     }
 }
 
@@ -257,10 +257,10 @@ fn every_kernel_sums_what_its_formula_says() {
         let other = Density { kernel: DensityKernel::ALL[(kernel as usize + 1) % 5], ..density };
         let map = bench.map(&photons);
         let answer = bench.ask(true, &map, &points, &bounded);
-        let (places, fluxes) = map.read(bench.gpu).unwrap();
+        let (photons, fluxes) = map.read(bench.gpu).unwrap();
         let asked = GatherSettings { density: other, ..bounded };
         assert!(
-            differences(&answer, (&places, &fluxes), &points, &asked, true) > 50,
+            differences(&answer, (&photons, &fluxes), &points, &asked, true) > 50,
             "{kernel:?} passes for {other:?}"
         );
     }
@@ -301,8 +301,8 @@ fn each_kernel_integrates_to_1_over_its_disc() {
     let side = 200;
     let mut photons = uniform_box(&mut random, side * side);
     for (i, p) in photons.iter_mut().enumerate() {
-        let place = |cell: usize, jitter: f32| (cell as f32 + jitter) / side as f32;
-        p.position = [place(i % side, random.unit()), 0.0, place(i / side, random.unit())];
+        let along = |cell: usize, jitter: f32| (cell as f32 + jitter) / side as f32;
+        p.position = [along(i % side, random.unit()), 0.0, along(i / side, random.unit())];
         (p.flux, p.wi) = ([1.0; 3], caustica::layout::octahedral(Vec3::Y));
     }
     let mut points: Vec<_> = (0..1000).map(|_| point(&mut random, false)).collect();
@@ -416,21 +416,21 @@ fn photons_in_several_windows_are_found_as_in_one() {
     let photons = caustic_box(&mut random, 5000, 0.3, 1e-2);
     let points: Vec<_> = (0..200).map(|_| point(&mut random, false)).collect();
     let whole = bench.map(&photons);
-    let kernels = MapKernels::windowed(bench.gpu, 4096);
+    let kernels = MapKernels::segmented(bench.gpu, 4096);
     let split = |photons: &[Photon]| {
-        let store = PhotonStore::windowed(bench.gpu, 5000, 1024).unwrap();
+        let store = PhotonStore::segmented(bench.gpu, 5000, 1024).unwrap();
         store.write(bench.gpu, photons);
         PhotonMap::build(bench.gpu, &kernels, store, 5000, EMITTED).unwrap()
     };
-    let windowed = split(&photons);
-    assert_eq!((whole.windows(), windowed.windows()), (1, 2));
-    assert!(whole.read(bench.gpu).unwrap() == windowed.read(bench.gpu).unwrap());
+    let segmented = split(&photons);
+    assert_eq!((whole.segments(), segmented.segments()), (1, 2));
+    assert!(whole.read(bench.gpu).unwrap() == segmented.read(bench.gpu).unwrap());
     let mut fewer = photons.clone();
     fewer[4999] = fewer[0];
     let other = split(&fewer);
     for k in [10, 500] {
         let expected = bench.ask(true, &whole, &points, &settings(k));
-        assert_eq!(bench.ask(true, &windowed, &points, &settings(k)), expected);
+        assert_eq!(bench.ask(true, &segmented, &points, &settings(k)), expected);
         assert!(
             k < 500 || bench.ask(true, &other, &points, &settings(k)) != expected,
             "the control: another last photon"
@@ -485,13 +485,13 @@ fn the_estimate_is_unbiased_with_the_next_photon() {
     assert!((mean - 1.0).abs() < 0.01, "{mean}");
     // Control: with the radius of the k-th photon the mean is too bright, by weight(r) / (k - 1) /
     // mean weight.
-    let (places, fluxes) = map.read(bench.gpu).unwrap();
-    let positions: Vec<Vec3> = places.iter().map(|p| p.position.into()).collect();
+    let (photons, fluxes) = map.read(bench.gpu).unwrap();
+    let positions: Vec<Vec3> = photons.iter().map(|p| p.position.into()).collect();
     let with_kth = |p: &VisiblePoint| {
         let mut found = brute_force(&positions, p.position.into(), 10, None, |_| true);
         let last = *found.photons.last().unwrap() as usize;
         found.radius_squared = positions[last].distance_squared(p.position.into());
-        estimate((&places, &fluxes), &found, p, CONE, EMITTED, true)[0]
+        estimate((&photons, &fluxes), &found, p, CONE, EMITTED, true)[0]
     };
     let mean = points.iter().step_by(10).map(with_kth).sum::<f64>() / points.len() as f64 * 10.0 / even;
     let expected = 1.0 + 0.5 / 9.0 / (2.0 / 3.0);

@@ -19,12 +19,12 @@ use super::{
 
 const AXES: [Vec3; 4] = [Vec3::Z, Vec3::NEG_Z, Vec3::X, vec3(0.48, -0.6, -0.64)];
 
-/// Directions against a density of which `share` tells how much lies below a height, 1 − cos, about
+/// Directions against a density of which `fraction` is what lies below a height, 1 − cos, about
 /// the axis.
-fn about(axis: Vec3, directions: Vec<[f32; 4]>, share: impl Fn(f64) -> f64) -> Deviate {
+fn about(axis: Vec3, directions: Vec<[f32; 4]>, fraction: impl Fn(f64) -> f64) -> Deviate {
     of_unit_square(directions.into_iter().map(|d| {
         let [height, azimuth] = height_and_azimuth(d, axis);
-        [share(height), azimuth]
+        [fraction(height), azimuth]
     }))
 }
 
@@ -56,12 +56,12 @@ fn cones_are_uniform() {
 #[test]
 fn the_hemisphere_follows_the_cosine() {
     // The fraction below the height h is sin²θ.
-    let share = |h: f64| h * (2.0 - h);
+    let fraction = |h: f64| h * (2.0 - h);
     for axis in AXES {
         let drawn = Probe::new("probe_cosine").run(&rows(SAMPLES, axis.extend(0.0).to_array()));
-        let found = about(axis, drawn, share);
+        let found = about(axis, drawn, fraction);
         assert!(found.fits(), "about {axis}: {found:?}");
-        let uniform = about(axis, cone(axis, 1.0), share);
+        let uniform = about(axis, cone(axis, 1.0), fraction);
         assert!(!uniform.fits(), "control: a uniform hemisphere about {axis}: {uniform:?}");
     }
 }
@@ -84,10 +84,12 @@ fn discs_are_uniform() {
 fn linear_densities_are_drawn() {
     let drawn = |a: f32, b: f32| Probe::new("probe_linear").run(&rows(SAMPLES, [a, b, 0.0, 0.0]));
     for (a, b) in [(1.0, 3.0), (0.0, 2.0), (5.0, 0.0), (1.0, 1.1)] {
-        let share = |x: f64| (f64::from(a) * x + 0.5 * f64::from(b - a) * x * x) / (0.5 * f64::from(a + b));
+        let fraction = |x: f64| (f64::from(a) * x + 0.5 * f64::from(b - a) * x * x) / (0.5 * f64::from(a + b));
         let test = |drawn: Vec<[f32; 4]>| {
             // The second coordinate is the random number itself.
-            of_unit_square(drawn.iter().zip(rows(SAMPLES, [0.0; 4])).map(|(d, r)| [share(d[0].into()), r[0][1].into()]))
+            of_unit_square(
+                drawn.iter().zip(rows(SAMPLES, [0.0; 4])).map(|(d, r)| [fraction(d[0].into()), r[0][1].into()]),
+            )
         };
         let (found, other) = (test(drawn(a, b)), test(drawn(b, a)));
         assert!(found.fits(), "from {a} to {b}: {found:?}");

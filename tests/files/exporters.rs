@@ -18,9 +18,9 @@ fn map() -> Vec<u8> {
     png(uniform(1, 1, [140, 120, 250, 255]))
 }
 
-/// As Blender's exporter writes a GLB: one buffer with a view for each attribute and image, named
-/// everything, defaults left out, coordinates scaled by KHR_texture_transform, light and camera
-/// turned by their nodes.
+/// A GLB as Blender's exporter writes it: one buffer with a view for each attribute and image,
+/// named everything, defaults left out, coordinates scaled by KHR_texture_transform, light and
+/// camera turned by their nodes.
 fn blender() -> Vec<u8> {
     let mut bin = Vec::new();
     let mut views = Vec::new();
@@ -83,8 +83,8 @@ fn glb(gltf: &Value, bin: Vec<u8>) -> Vec<u8> {
     [b"glTF", &word(2)[..], &word(length), &word(text.len()), b"JSON", &text, &word(bin.len()), b"BIN\0", &bin].concat()
 }
 
-/// As three.js' exporter writes a glTF: data URIs, attributes interleaved in one view, indices of
-/// 32 bits, matrices, all members of samplers and materials, and more objects in another order.
+/// A glTF as three.js' exporter writes it: data URIs, attributes interleaved in one view, indices
+/// of 32 bits, matrices, all members of samplers and materials, and more objects in another order.
 fn three(change: impl FnOnce(&mut Value)) -> Vec<u8> {
     let vertex = |v: usize| [&POSITIONS[3 * v..][..3], &NORMALS[3 * v..][..3], &UVS[2 * v..][..2]].concat();
     let vertices: Vec<u8> = (0..4).flat_map(|v| floats(&vertex(v))).collect();
@@ -137,8 +137,8 @@ fn read(bytes: &[u8]) -> Scene {
     Scene::read(bytes, path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// What a picture depends on. Texture coordinates are those where the images are sampled; images
-/// count by what they show, whatever their names.
+/// All that a picture depends on. Texture coordinates are those where the images are sampled;
+/// images count by what they show, whatever their names.
 fn shown(scene: &Scene) -> impl PartialEq + std::fmt::Debug + use<> {
     let mut material = scene.materials[0].clone();
     let [color, normal] = [&mut material.textures.base_color, &mut material.textures.normal].map(|texture| {
@@ -152,9 +152,9 @@ fn shown(scene: &Scene) -> impl PartialEq + std::fmt::Debug + use<> {
         scene.attributes.iter().map(|attributes| attributes.uvs[0].map(at)).collect::<Vec<_>>()
     };
     let tangents: Vec<_> = scene.attributes.iter().map(|attributes| attributes.tangents).collect();
-    let places = [sampled(color.0), sampled(normal.0)];
+    let samples = [sampled(color.0), sampled(normal.0)];
     let lights = (scene.lights.clone(), scene.cameras.clone(), scene.center);
-    ((scene.triangles.clone(), tangents, places), (material, color.1, normal.1), lights)
+    ((scene.triangles.clone(), tangents, samples), (material, color.1, normal.1), lights)
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What corners of triangles carry for textures: coordinates, colours, tangents.
+//! Attributes of corners of triangles for textures: coordinates, colours, tangents.
 
 use caustica::scene::{Attributes, Scene};
 use glam::{Vec2, Vec3, Vec4};
@@ -186,7 +186,7 @@ fn tangents_are_made_along_the_image() {
     let mirrored = uvs([1.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
     assert!(near(frame(&mirrored), [-Vec3::X, Vec3::Y]));
     assert_eq!(only(&mirrored).tangents[0].w, -1.0);
-    // Texture coordinates without an area tell no direction: any in the plane will do.
+    // Texture coordinates without an area determine no direction: any in the plane will do.
     let none = frame(&uvs([0.5; 6]));
     assert!(none.iter().all(|axis| axis.is_normalized() && axis.z.abs() < 1e-6), "{none:?}");
     // A transform turns the image on the surface, and its tangents with it.

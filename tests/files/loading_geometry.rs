@@ -129,16 +129,16 @@ fn morph_targets_move_vertices_and_normals_by_default_weights() {
     gltf["extensionsUsed"].as_array_mut().expect("a list").push("KHR_mesh_quantization".into());
     gltf["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals.into();
     gltf["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": up, "NORMAL": turn }, { "POSITION": small }]);
-    let places = |gltf: &Value| {
+    let positions = |gltf: &Value| {
         let scene = loaded(gltf);
         let center = scene.center.as_vec3();
         (scene.triangles[0].positions.map(|p| p + center), scene.triangles[0].normals[0])
     };
     let rest = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    assert_eq!(places(&gltf), (rest, Vec3::Z), "without weights nothing moves");
+    assert_eq!(positions(&gltf), (rest, Vec3::Z), "without weights nothing moves");
     gltf["meshes"][0]["weights"] = json!([0.5, 3]);
     let expected = [Vec3::new(0.0, 0.0, 0.5), Vec3::new(4.0, 0.0, 0.5), Vec3::new(0.0, 1.0, 0.5)];
-    let (moved, normal) = places(&gltf);
+    let (moved, normal) = positions(&gltf);
     assert_eq!(moved, expected);
     assert!((normal - Vec3::new(1.0, 0.0, 1.0).normalize()).length() < 1e-6, "{normal}");
     // A node's weights override those of the mesh, for this node only.
@@ -171,11 +171,11 @@ fn skins_stand_as_their_joints_do() {
     gltf["nodes"][0] = json!({ "mesh": 0, "skin": 0, "translation": [100, 100, 100] });
     push(&mut gltf, "nodes", json!({ "children": [4] }));
     push(&mut gltf, "nodes", json!({ "translation": [1, 0, 4] }));
-    let places = |gltf: &Value| {
+    let positions = |gltf: &Value| {
         let scene = loaded(gltf);
         scene.triangles[0].positions.map(|p| p + scene.center.as_vec3())
     };
-    assert_eq!(places(&gltf), [Vec3::ZERO, Vec3::new(1.0, 0.0, 4.0), Vec3::new(0.0, 1.0, 2.0)]);
+    assert_eq!(positions(&gltf), [Vec3::ZERO, Vec3::new(1.0, 0.0, 4.0), Vec3::new(0.0, 1.0, 2.0)]);
     // Joints with a reflection keep the orientation of the surface.
     gltf["nodes"][3]["scale"] = json!([1, 1, -1]);
     let mirrored = loaded(&gltf).triangles[0].geometric_normal();
@@ -209,10 +209,10 @@ fn instances_stand_where_their_attributes_say() {
     gltf["nodes"][0]["extensions"] = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
     gltf["nodes"][0]["translation"] = json!([0, 0, 1]);
     let scene = loaded(&gltf);
-    let places: Vec<_> =
+    let positions: Vec<_> =
         scene.triangles.iter().flat_map(|t| t.positions.map(|p| (p + scene.center.as_vec3()).round())).collect();
     let expected = [[0, 0, 1], [1, 0, 1], [0, 1, 1], [0, 0, 6], [-2, 0, 6], [0, -2, 6]];
-    assert_eq!(places, expected.map(|[x, y, z]: [i16; 3]| Vec3::new(x.into(), y.into(), z.into())));
+    assert_eq!(positions, expected.map(|[x, y, z]: [i16; 3]| Vec3::new(x.into(), y.into(), z.into())));
 
     let refused = |attributes: Value| {
         let mut gltf = gltf.clone();

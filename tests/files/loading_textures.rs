@@ -135,7 +135,7 @@ fn every_property_has_its_texture() {
     });
     gltf["materials"][0] = material.clone();
     let scene = loaded(&gltf);
-    // The image that a texture shows, told by the number in its texels.
+    // The image that a texture shows, by the number in its texels.
     let shown = |texture: Option<Texture>| texture.map(|texture| scene.images[texture.image as usize].texels[0][0]);
     let textures = &scene.materials[0].textures;
     let read = [
@@ -169,7 +169,7 @@ fn every_property_has_its_texture() {
     gltf["materials"][0] = material.clone();
     assert_eq!(message(load(&gltf)), "materials[0].normalTexture.scale: inf is not finite");
     material["normalTexture"]["scale"] = 1.into();
-    // All metal by its factor; the texture tells what of it transmits light.
+    // All metal by its factor; the texture decides what of it transmits light.
     material["pbrMetallicRoughness"]["metallicFactor"] = 1.into();
     gltf["materials"][0] = material;
     let scene = loaded(&gltf);

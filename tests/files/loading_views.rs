@@ -1,4 +1,4 @@
-//! What a file says of what is seen: hidden nodes, clipping planes, mirrored cameras, dark lights.
+//! Views in files: hidden nodes, clipping planes, mirrored cameras, dark lights.
 
 use std::path::Path;
 
@@ -145,8 +145,8 @@ fn clipping_planes_are_read() {
 fn environments_may_be_held_in_any_of_eight_orders() {
     // Four columns and three rows, each pixel of its own colour.
     let pixel = |x: u8, y: u8| [40 * (x + 1), 60 * (y + 1), 200, 129];
-    let read = |sizes: &str, places: &[(u8, u8)]| {
-        let pixels: Vec<u8> = places.iter().flat_map(|(x, y)| pixel(*x, *y)).collect();
+    let read = |sizes: &str, order: &[(u8, u8)]| {
+        let pixels: Vec<u8> = order.iter().flat_map(|(x, y)| pixel(*x, *y)).collect();
         let bytes = [format!("#?RADIANCE\n\n{sizes}\n").as_bytes(), &pixels].concat();
         Environment::from_bytes(&bytes, Path::new("sky.hdr"), 1.0, 0.0).unwrap_or_else(|error| panic!("{error}"))
     };
@@ -158,10 +158,10 @@ fn environments_may_be_held_in_any_of_eight_orders() {
         let (x, y) = (if from_right { "-X 4" } else { "+X 4" }, if from_bottom { "+Y 3" } else { "-Y 3" });
         let rows: Vec<_> = order(3, from_bottom).flat_map(|y| order(4, from_right).map(move |x| (x, y))).collect();
         let columns: Vec<_> = order(4, from_right).flat_map(|x| order(3, from_bottom).map(move |y| (x, y))).collect();
-        for (sizes, places) in [(format!("{y} {x}"), &rows), (format!("{x} {y}"), &columns)] {
-            let turned = read(&sizes, places);
+        for (sizes, order) in [(format!("{y} {x}"), &rows), (format!("{x} {y}"), &columns)] {
+            let turned = read(&sizes, order);
             assert_eq!((turned.width, turned.height, &turned.pixels), (4, 3, &usual.pixels), "{sizes}");
-            let control = read("-Y 3 +X 4", places);
+            let control = read("-Y 3 +X 4", order);
             assert_eq!(control.pixels == usual.pixels, sizes == "-Y 3 +X 4", "control: {sizes}");
         }
     }

@@ -260,7 +260,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "meshopt",
             "accessor",
             "draco", //
-            // What it holds.
+            // Its contents.
             "textures",
             "images",
             "materials",

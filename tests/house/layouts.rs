@@ -46,7 +46,7 @@ fn twins() -> Vec<Twin> {
         TextureRecord { first, size, flags, levels, transform }
         Attributes { uvs, colors, tangents, pad }
         Medium { tint, ior, absorption, dispersion }
-        Light { position, kind, e1, group, e2, solid_angle, emission, area, media, back_media, material, attributes, part, side, leaf, root, pad0, pad1 }
+        Light { position, kind, e1, named, e2, solid_angle, emission, area, media, back_media, material, attributes, subtriangle, side, leaf, root, pad0, pad1 }
         LightNode { center, half, shine }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
@@ -60,16 +60,16 @@ fn twins() -> Vec<Twin> {
         Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, pad0, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, cells_from }
         FinalStep { first_ray, rays_now, rays, chosen, joint, pad0, pad1, pad2 }
-        CellGrid { per_metre, levels, mask, points, asked, pad0, pad1, pad2 }
+        CellGrid { per_metre, levels, mask, points, next_map, pad0, pad1, pad2 }
         ArrivingLight { direction, light, nearness, pad0, pad1, pad2 }
         IrradianceRecord { position, ng, irradiance, direction_and_reach }
-        RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, window }
-        IrradianceCell { place, level, position, split, normal, pad0, irradiance, pad1 }
+        RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, footprint }
+        IrradianceCell { coordinates, level, position, split, normal, pad0, irradiance, pad1 }
         FirstHit { normal, depth, albedo, alpha, position, id, uv, pad0, pad1 }
         DirectLight { light, points, pad0, pad1 }
         EmitterSample { points, sample, samples, roots }
         Cell { lo, wi_lo, hi, wi_hi }
-        PhotonPlace { position, wi }
+        PhotonPosition { position, wi }
         PhotonFlux { flux, normal }
         MapInfo { count, levels, split, pad }
         GatherInfo { count, first, neighbors, fixed_radius, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, map_number, pad0, pad1 }
@@ -77,8 +77,8 @@ fn twins() -> Vec<Twin> {
         ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, map_number }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
-        KeyStep { count, window_first, window_count, fine }
-        MoveStep { sorted_first, sorted_count, window_first, window_count }
+        KeyStep { count, segment_first, segment_count, fine }
+        MoveStep { sorted_first, sorted_count, segment_first, segment_count }
         GridStep { photons, level, base, finer_base, finer_count, first_cell, cell_count, pad }
     }
 }
@@ -164,8 +164,8 @@ fn constants() -> Vec<(&'static str, f64)> {
         CAUSTIC_MAP,
         MAP_KINDS,
         PATH_MASK,
-        PLACE_SHIFT,
-        PLACE_MASK,
+        PHOTON_INDEX_SHIFT,
+        PHOTON_INDEX_MASK,
         KIND_SHIFT,
         SAMPLER_RANDOM,
         SAMPLER_SOBOL,
@@ -385,7 +385,7 @@ fn bound_names(wgsl: &str) -> Vec<String> {
 const GOOD: &str = "
     const WORKGROUP_SIZE: u32 = 64u;
     const SPHERE_BIT = 1u << 31u;
-    const PLACE_MASK = 0xfffu;
+    const PHOTON_INDEX_MASK = 0xfffu;
     struct Photon { position: vec3f, wi: u32, flux: vec3f, normal: u32 }
     struct Path {
         origin: vec3f, history: u32, direction: vec3f, bounces: u32, beta: vec3f, left: u32, media: array<u32, 4>,
@@ -412,7 +412,7 @@ fn each_kind_of_disagreement_is_reported() {
         (", normal: u32 }", ", normal: u32, more: u32 }", "Photon takes"),
         ("SPHERE_BIT = 1u << 31u", "SPHERE_BIT = 1u << 30u", "SPHERE_BIT is"),
         ("= 64u", "= 32u", "WORKGROUP_SIZE is"),
-        ("PLACE_MASK = 0xfffu", "PLACE_MASK = 0x7ffu", "PLACE_MASK is"),
+        ("PHOTON_INDEX_MASK = 0xfffu", "PHOTON_INDEX_MASK = 0x7ffu", "PHOTON_INDEX_MASK is"),
         ("@workgroup_size(WORKGROUP_SIZE)", "@workgroup_size(8, 8)", "workgroups of"),
         ("media: array<u32, 4>", "media: array<Stranger, 4>", "Stranger lies in a buffer"),
         ("struct Photon", "@group(2) @binding(1) var<storage> s: array<SearchState>; struct Photon", "SearchState"),

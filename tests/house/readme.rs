@@ -41,11 +41,11 @@ fn ci_runs_the_readme_test_command() {
 fn named_tests(text: &str) -> Vec<(&str, &str)> {
     let mut file = "";
     let names = text.split('`').filter_map(|word| {
-        let (place, name) = word.split_once("::")?;
-        if place != "…" {
-            file = place;
+        let (written, name) = word.split_once("::")?;
+        if written != "…" {
+            file = written;
         }
-        (place == "…" || place.ends_with(".rs")).then_some((file, name))
+        (written == "…" || written.ends_with(".rs")).then_some((file, name))
     });
     names.collect()
 }

@@ -8,15 +8,15 @@
 use std::path::Path;
 
 use caustica::{renderer::Render, scene::Scene, settings::Mode};
-use support::surfaces::{bias, estimates, places};
+use support::surfaces::{bias, cases, estimates};
 use support::{gpu, mean, render_scene, settings};
 
 #[test]
 fn rejection_and_correction_are_right_together_and_wrong_alone() {
-    for place in places(400) {
-        let [raw, rejects, corrects, both] = estimates(gpu(), &place, 3).map(|found| bias(&place, &found));
+    for case in cases(400) {
+        let [raw, rejects, corrects, both] = estimates(gpu(), &case, 3).map(|found| bias(&case, &found));
         let found =
-            format!("{}: raw {raw:.3}, rejection {rejects:.3}, correction {corrects:.3}, both {both:.3}", place.name);
+            format!("{}: raw {raw:.3}, rejection {rejects:.3}, correction {corrects:.3}, both {both:.3}", case.name);
         assert!(both.abs() < 0.06, "{found}");
         assert!(raw.abs() > 0.15, "control: {found}");
         assert!(rejects.abs().max(corrects.abs()) > 0.15, "control: {found}");

@@ -29,7 +29,7 @@ fn room(half_view: f32) -> Scene {
     scene
 }
 
-/// Surface over a grid of `u` and `v` from 0 to 1, which yields places and normals.
+/// Surface over a grid of `u` and `v` from 0 to 1, which yields positions and normals.
 fn add_grid(scene: &mut Scene, (nu, nv): (u32, u32), at: impl Fn(f32, f32) -> (Vec3, Vec3)) {
     for i in 0..nu {
         for j in 0..nv {

@@ -114,7 +114,7 @@ fn every_prefix_is_fair_and_spread() {
                 let expected = n as f64 / 8.0;
                 let chi = counts.iter().map(|&c| (c as f64 - expected).powi(2) / expected).sum::<f64>();
                 // 7 degrees of freedom: the 99.99 % point is 29.9.
-                assert!(chi < 29.9, "{n} places: chi-square {chi}");
+                assert!(chi < 29.9, "{n} intervals: chi-square {chi}");
             }
         }
     }
@@ -131,8 +131,8 @@ fn two_dimensions_are_spread_together() {
             let (columns, rows) = (1 << level, 256 >> level);
             let mut seen = vec![0; 256];
             for p in points {
-                let place = |x: f64, parts: usize| (((x + 0.5) * parts as f64) as usize).min(parts - 1);
-                seen[place(p.x, columns) * rows + place(p.y, rows)] += 1;
+                let interval = |x: f64, parts: usize| (((x + 0.5) * parts as f64) as usize).min(parts - 1);
+                seen[interval(p.x, columns) * rows + interval(p.y, rows)] += 1;
             }
             seen.iter().all(|n| *n == 1)
         })
@@ -159,11 +159,11 @@ fn matrices_follow_from_their_polynomials() {
     let text = include_str!("../../shaders/lib/core/sampler.wesl");
     let is_there = |i: usize, [z, w]: [u32; 2]| {
         let (z, w) = (z.reverse_bits(), w.reverse_bits());
-        text.contains(&format!("column(place, {:#x}u, vec2u({z:#x}u, {w:#x}u))", 1_u32 << i))
+        text.contains(&format!("column(index, {:#x}u, vec2u({z:#x}u, {w:#x}u))", 1_u32 << i))
     };
     let columns = sobol_columns();
     columns.iter().enumerate().for_each(|(i, column)| assert!(is_there(i, *column), "column {i}"));
-    assert_eq!(text.matches(" column(place, ").count(), columns.len(), "further columns");
+    assert_eq!(text.matches(" column(index, ").count(), columns.len(), "further columns");
     assert!(!is_there(7, columns[8]), "control: any column passes");
 }
 

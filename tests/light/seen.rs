@@ -1,4 +1,4 @@
-//! What a camera sees, and what it does not.
+//! Visibility to a camera: near and far planes, faces, what is hidden.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|

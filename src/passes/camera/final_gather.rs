@@ -55,7 +55,7 @@ pub struct FinalGather {
     joint: bool,
     /// Indices of the points that rays start from.
     chosen: Buffer,
-    /// Where rays end: a [`VisiblePoint`] per ray, in the order of the chosen points. Its weight
+    /// Ends of rays: a [`VisiblePoint`] per ray, in the order of the chosen points. Its weight
     /// includes the camera path. Some slots have no point.
     pub ends: Buffer,
     /// Light that each ray finds, `vec4f`.

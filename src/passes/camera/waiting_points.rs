@@ -59,7 +59,7 @@ impl WaitingPoints {
         }
         gpu.write(&self.waiting, 4, indices);
         let span = gpu.uniform("points to collect", &[count, first, 0, 0]);
-        let buffers = [("span", &span), ("points", points), ("places", &self.waiting), ("collected", &self.collected)];
+        let buffers = [("span", &span), ("points", points), ("indices", &self.waiting), ("collected", &self.collected)];
         let mut encoder = gpu.encoder();
         self.collect.dispatch(&mut encoder, &self.collect.bind(gpu, &buffers), count.into());
         gpu.submit(encoder);

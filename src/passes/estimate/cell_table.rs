@@ -12,17 +12,17 @@ use crate::{
 
 /// Levels of cells. Each is half as wide as the one before.
 const LEVELS: u32 = 8;
-/// Surfaces in one cell that are told apart.
+/// Maximum number of surfaces in one cell with entries of their own.
 const MAX_SURFACES: usize = 8;
-/// Maximum number of entries, so that the table has at most 2^18 places of 64 bytes.
+/// Maximum number of entries, so that the table has at most 2^18 slots of 64 bytes.
 const MAX_ENTRIES: usize = 1 << 17;
-/// Marks from whose radii the width of the first level is taken, and the part of them whose
+/// Marks from whose radii the width of the first level is taken, and the fraction of them whose
 /// estimates are narrower.
 const PILOTS: usize = 1024;
 const PILOT_QUANTILE: f64 = 0.9;
 
-/// Part of the wanted radius that the estimate of a cell must have to speak for parts of it that
-/// have no entry of their own.
+/// Fraction of the wanted radius that the estimate of a cell must have to speak for cells in it
+/// that have no entry of their own.
 const SUBSTITUTE: f32 = 0.5;
 
 /// Computes the irradiance, W/m², and the radius of its estimate, metres, at points.
@@ -32,7 +32,7 @@ pub(super) type Irradiances<'a> = dyn FnMut(&[VisiblePoint]) -> Result<Vec<([f32
 #[derive(Debug, PartialEq)]
 pub(super) struct CellTable {
     /// A power of 2; at least half of them are no entries.
-    pub places: Vec<IrradianceCell>,
+    pub slots: Vec<IrradianceCell>,
     /// Cells of level 0 per metre.
     pub per_metre: f32,
     pub levels: u32,
@@ -41,7 +41,7 @@ pub(super) struct CellTable {
 impl CellTable {
     /// Chooses a point for each surface in each cell that has a mark, and keeps the irradiance
     /// there. A cell is at most `spacing` times as wide as the radius of its estimate; where it is
-    /// wider, cells of the next level take its place. `None` without marks.
+    /// wider, cells of the next level replace it. `None` without marks.
     pub fn build(marks: &[VisiblePoint], spacing: f32, irradiances: &mut Irradiances) -> Result<Option<Self>> {
         let pilots: Vec<_> = marks.iter().step_by(marks.len().div_ceil(PILOTS) | 1).copied().collect();
         let mut radii: Vec<f32> = irradiances(&pilots)?.iter().map(|(_, radius)| *radius).collect();
@@ -64,16 +64,25 @@ impl CellTable {
                 let cells = radius * spacing * per_metre;
                 let split =
                     [WIDE_CELL, SPLIT_CELL, WHOLE_CELL][usize::from(cells >= SUBSTITUTE) + usize::from(cells >= 1.0)];
-                let Surface { place, marks } = surface;
+                let Surface { coordinates, marks } = surface;
                 let VisiblePoint { position, ng: normal, .. } = *marks[0];
                 let level = level + 1;
-                entries.push(IrradianceCell { place, level, position, split, normal, irradiance, pad0: 0, pad1: 0 });
+                entries.push(IrradianceCell {
+                    coordinates,
+                    level,
+                    position,
+                    split,
+                    normal,
+                    irradiance,
+                    pad0: 0,
+                    pad1: 0,
+                });
                 if split != WHOLE_CELL {
                     open.extend(marks);
                 }
             }
         }
-        Ok(Some(Self { places: placed(&entries), per_metre, levels: LEVELS }))
+        Ok(Some(Self { slots: placed(&entries), per_metre, levels: LEVELS }))
     }
 }
 
@@ -84,7 +93,7 @@ fn at_level(per_metre: f32, level: u32) -> f32 {
 
 /// Marks of one cell that lie on one surface. The first of them is nearest to the cell's centre.
 struct Surface<'a> {
-    place: [i32; 3],
+    coordinates: [i32; 3],
     marks: Vec<&'a VisiblePoint>,
 }
 
@@ -93,12 +102,12 @@ fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> Vec<Surface<'a>> 
     let mut cells: BTreeMap<[i32; 3], Vec<(f32, &VisiblePoint)>> = BTreeMap::new();
     for mark in marks {
         let at = Vec3::from(mark.position) * per_metre;
-        let place = at.floor().as_ivec3();
+        let coordinates = at.floor().as_ivec3();
         let from_centre = at.distance_squared(at.floor() + 0.5);
-        cells.entry(place.to_array()).or_default().push((from_centre, mark));
+        cells.entry(coordinates.to_array()).or_default().push((from_centre, mark));
     }
     let mut surfaces = Vec::new();
-    for (place, mut marks) in cells {
+    for (coordinates, mut marks) in cells {
         marks.sort_by(|a, b| a.0.total_cmp(&b.0));
         let first = surfaces.len();
         for (_, mark) in marks {
@@ -106,7 +115,7 @@ fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> Vec<Surface<'a>> 
             if let Some(surface) = found.iter_mut().find(|s| is_flat(s.marks[0], mark, per_metre)) {
                 surface.marks.push(mark);
             } else if found.len() < MAX_SURFACES {
-                surfaces.push(Surface { place, marks: vec![mark] });
+                surfaces.push(Surface { coordinates, marks: vec![mark] });
             }
         }
     }
@@ -120,23 +129,23 @@ fn is_flat(mark: &VisiblePoint, point: &VisiblePoint, per_metre: f32) -> bool {
     height.abs() * per_metre <= CELL_FLATNESS && normal.dot(Vec3::from(point.ng)) >= CELL_COSINE
 }
 
-/// Places entries by their hash, each in the first free place from there on.
+/// Places entries by their hash, each in the first free slot from there on.
 fn placed(entries: &[IrradianceCell]) -> Vec<IrradianceCell> {
-    let mut places = vec![IrradianceCell::default(); (2 * entries.len()).next_power_of_two().max(2)];
-    let mask = places.len() - 1;
+    let mut slots = vec![IrradianceCell::default(); (2 * entries.len()).next_power_of_two().max(2)];
+    let mask = slots.len() - 1;
     for entry in entries {
-        let mut place = hash(entry.place, entry.level - 1) as usize & mask;
-        while places[place].level != 0 {
-            place = (place + 1) & mask;
+        let mut slot = hash(entry.coordinates, entry.level - 1) as usize & mask;
+        while slots[slot].level != 0 {
+            slot = (slot + 1) & mask;
         }
-        places[place] = *entry;
+        slots[slot] = *entry;
     }
-    places
+    slots
 }
 
 /// Hash of a cell. Twin of `cell_hash` in `reuse_irradiance.wesl`.
-fn hash(place: [i32; 3], level: u32) -> u32 {
-    let [x, y, z] = place.map(|c| c as u32);
+fn hash(coordinates: [i32; 3], level: u32) -> u32 {
+    let [x, y, z] = coordinates.map(|c| c as u32);
     let mut h = x.wrapping_mul(0x9e37_79b1)
         ^ y.wrapping_mul(0x85eb_ca77)
         ^ z.wrapping_mul(0xc2b2_ae3d)
@@ -167,7 +176,7 @@ mod tests {
     #[test]
     fn cells_are_as_wide_as_their_estimates_allow() {
         let table = CellTable::build(&marks(), 0.5, &mut found).unwrap().unwrap();
-        let kept: Vec<_> = table.places.iter().filter(|e| e.level > 0 && e.split == WHOLE_CELL).collect();
+        let kept: Vec<_> = table.slots.iter().filter(|e| e.level > 0 && e.split == WHOLE_CELL).collect();
         let width = |e: &IrradianceCell| 1.0 / at_level(table.per_metre, e.level - 1);
         for entry in &kept {
             let most = if entry.position[0] < 50.0 { 0.05 } else { 0.4 };
@@ -175,7 +184,7 @@ mod tests {
         }
         let narrow = kept.iter().filter(|e| e.position[0] < 50.0).count();
         assert!(narrow > 300 && kept.len() - narrow < 40, "{narrow} of {}", kept.len());
-        assert!(table.places.len() >= 2 * kept.len());
+        assert!(table.slots.len() >= 2 * kept.len());
     }
 
     #[test]
@@ -184,7 +193,7 @@ mod tests {
         let marks = [at(0.1, [0.0, 1.0, 0.0]), at(0.1, [0.0, -1.0, 0.0]), at(0.6, [0.0, 1.0, 0.0])];
         let mut found = |points: &[VisiblePoint]| Ok(points.iter().map(|_| ([1.0; 3], 2.0)).collect());
         let table = CellTable::build(&marks, 0.5, &mut found).unwrap().unwrap();
-        assert_eq!(table.places.iter().filter(|e| e.level == 1).count(), 3);
+        assert_eq!(table.slots.iter().filter(|e| e.level == 1).count(), 3);
     }
 
     #[test]

@@ -17,8 +17,8 @@ use crate::{
 
 pub use super::gather_kernels::GatherOptions;
 
-/// Points of one batch, as a part of those that the device is handed at once: an invocation answers
-/// four of them.
+/// Points of one batch, as a fraction of those that the device is handed at once: an invocation
+/// answers four of them.
 const BATCH_PART: u64 = 2;
 /// Packets of a block, which are searched or deferred together.
 const BLOCK: u64 = layout::PACKET_BLOCK as u64;
@@ -49,9 +49,9 @@ pub struct GatherSettings {
 }
 
 impl GatherSettings {
-    /// Kernels for a map of that many windows.
-    fn variant(&self, windows: u32) -> Variant {
-        Variant::new(self.density.softened(self.softness), self.radius.is_some(), windows)
+    /// Kernels for a map of that many segments.
+    fn variant(&self, segments: u32) -> Variant {
+        Variant::new(self.density.softened(self.softness), self.radius.is_some(), segments)
     }
 }
 
@@ -108,7 +108,7 @@ impl<'s> Gather<'s> {
         Self { order: QueryOrder::new(gpu), kernels: GatherKernels::new(scene, options), scratch: None }
     }
 
-    /// Starts to compile the kernels for maps of one window in the background.
+    /// Starts to compile the kernels for maps of one segment in the background.
     pub fn prefetch(&mut self, gpu: &Gpu, settings: &GatherSettings) {
         self.kernels.compile(gpu, settings.variant(1));
     }
@@ -134,8 +134,8 @@ impl<'s> Gather<'s> {
         self.run_waiting(gpu, map, points, (count, u32::MAX), settings, results, progress)
     }
 
-    /// As [`Self::run`], for those of the first `count` points that wait for the estimate of the
-    /// map of that number; see [`crate::layout::VisiblePoint::next_map`].
+    /// Variant of [`Self::run`] for those of the first `count` points that wait for the estimate of
+    /// the map of that number; see [`crate::layout::VisiblePoint::next_map`].
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -151,7 +151,7 @@ impl<'s> Gather<'s> {
         progress: &dyn Progress,
     ) -> Result<GatherStats> {
         let polynomial = settings.density.softened(settings.softness);
-        let compiled = self.kernels.compile(gpu, settings.variant(map.windows()));
+        let compiled = self.kernels.compile(gpu, settings.variant(map.segments()));
         let most = count.min(largest_batch(gpu));
         if self.scratch.as_ref().is_none_or(|s| s.capacity < most) {
             self.scratch = Some(Scratch::new(gpu, most)?);

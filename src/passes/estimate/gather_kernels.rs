@@ -53,8 +53,8 @@ impl Default for GatherOptions {
 /// Constants that one set of kernels is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Variant {
-    /// Windows of the map.
-    windows: u32,
+    /// Segments of the map.
+    segments: u32,
     /// Coefficients of the density kernel's polynomial, and its power of the distance.
     moments: u32,
     power: u32,
@@ -63,8 +63,8 @@ pub(super) struct Variant {
 }
 
 impl Variant {
-    pub(super) fn new(kernel: Polynomial, fixed_radius: bool, windows: u32) -> Self {
-        Self { windows, moments: kernel.moments, power: kernel.power, counts: fixed_radius }
+    pub(super) fn new(kernel: Polynomial, fixed_radius: bool, segments: u32) -> Self {
+        Self { segments, moments: kernel.moments, power: kernel.power, counts: fixed_radius }
     }
 }
 
@@ -97,7 +97,7 @@ impl<'s> GatherKernels<'s> {
             return index;
         }
         let overrides = [
-            ("WINDOWS", f64::from(variant.windows)),
+            ("SEGMENTS", f64::from(variant.segments)),
             ("MOMENTS", f64::from(variant.moments)),
             ("POWER", f64::from(variant.power)),
             ("COUNTS", f64::from(u8::from(variant.counts))),

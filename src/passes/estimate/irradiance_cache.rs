@@ -29,9 +29,9 @@ impl IrradianceCache {
         irradiances: &mut Irradiances,
     ) -> Result<Option<Self>> {
         let Some(table) = CellTable::build(marks, spacing, irradiances)? else { return Ok(None) };
-        let CellTable { places, per_metre, levels } = table;
-        let grid = CellGrid { per_metre, levels, mask: places.len() as u32 - 1, ..CellGrid::default() };
-        let cells = gpu.storage_with("irradiance cells", &places)?;
+        let CellTable { slots, per_metre, levels } = table;
+        let grid = CellGrid { per_metre, levels, mask: slots.len() as u32 - 1, ..CellGrid::default() };
+        let cells = gpu.storage_with("irradiance cells", &slots)?;
         Ok(Some(Self { kernel: Kernel::new(gpu, "reuse_irradiance", &[]), cells, grid }))
     }
 
@@ -49,17 +49,17 @@ impl IrradianceCache {
     /// Adds the light of those of the first `count` points that wait for the first map to
     /// `radiance`, where their cell has one. Those then wait for no map.
     pub fn light(&self, gpu: &Gpu, points: &Buffer, count: u32, radiance: &Buffer) {
-        self.light_asked(gpu, points, (count, 1), radiance);
+        self.light_waiting(gpu, points, (count, 1), radiance);
     }
 
     /// The same for points that are seen blurred, [`BY_CELL`]. Others of these then wait for the
     /// first map.
     pub fn light_blurred(&self, gpu: &Gpu, points: &Buffer, count: u32, radiance: &Buffer) {
-        self.light_asked(gpu, points, (count, BY_CELL), radiance);
+        self.light_waiting(gpu, points, (count, BY_CELL), radiance);
     }
 
-    fn light_asked(&self, gpu: &Gpu, points: &Buffer, (count, asked): (u32, u32), radiance: &Buffer) {
-        let grid = gpu.uniform("cell grid", &CellGrid { points: count, asked, ..self.grid });
+    fn light_waiting(&self, gpu: &Gpu, points: &Buffer, (count, next_map): (u32, u32), radiance: &Buffer) {
+        let grid = gpu.uniform("cell grid", &CellGrid { points: count, next_map, ..self.grid });
         let buffers = [("cell_grid", &grid), ("points", points), ("cells", &self.cells), ("radiance", radiance)];
         let mut encoder = gpu.encoder();
         self.kernel.dispatch(&mut encoder, &self.kernel.bind(gpu, &buffers), count.into());

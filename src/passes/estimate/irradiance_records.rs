@@ -11,13 +11,13 @@ use crate::{
 
 /// Pixels of the record grid on each side of a point among which the filter looks for records at
 /// most.
-const MAX_WINDOW: u32 = 8;
+const MAX_FOOTPRINT: u32 = 8;
 
 /// Pixels of the record grid on each side of a point among which a filter of that radius, in pixels
 /// of the picture, looks for records.
 #[must_use]
-pub fn filter_window(radius: f32, spacing: u32) -> u32 {
-    ((radius / spacing as f32).ceil() as u32).clamp(1, MAX_WINDOW)
+pub fn filter_footprint(radius: f32, spacing: u32) -> u32 {
+    ((radius / spacing as f32).ceil() as u32).clamp(1, MAX_FOOTPRINT)
 }
 
 /// A slot without a point.
@@ -27,8 +27,8 @@ const NO_RECORD: IrradianceRecord =
 /// Slots of records of a picture at most: 128 MiB, which all adapters bind.
 const MAX_RECORDS: u64 = 1 << 22;
 
-/// Part of the distance to what is near over which a record is taken.
-const NEAR_PART: f32 = 1.5;
+/// Fraction of the distance to what is near over which a record is taken.
+const NEAR_FRACTION: f32 = 1.5;
 
 /// Pixels between the points of final gathering: more than asked for where the whole picture would
 /// have too many of them.
@@ -85,16 +85,16 @@ impl Records {
         self.distances[slot] = rays as f32 / arriving.nearness;
     }
 
-    /// All records, with their reach. `radius`: that of the filter at a place, metres.
+    /// All records, with their reach. `radius`: that of the filter at a position, metres.
     #[must_use]
     pub fn finish(mut self, radius: impl Fn(Vec3) -> f32) -> Vec<IrradianceRecord> {
         for slot in 0..self.records.len() {
             let distance = self.distance(slot);
             let record = &mut self.records[slot];
-            let part = NEAR_PART * distance / radius(record.position.into());
-            record.direction_and_reach |= snorm8(part.clamp(1.0 / 127.0, 1.0)) << 24;
+            let reach = NEAR_FRACTION * distance / radius(record.position.into());
+            record.direction_and_reach |= snorm8(reach.clamp(1.0 / 127.0, 1.0)) << 24;
         }
-        // What lies beyond the grid has the slot behind all others.
+        // All that lies beyond the grid has the slot behind all others.
         self.records.push(NO_RECORD);
         self.records
     }

@@ -11,5 +11,5 @@ pub mod share_estimates;
 
 pub use gather::{Gather, GatherOptions, GatherSettings};
 pub use irradiance_cache::IrradianceCache;
-pub use irradiance_records::{IrradianceRecords, Records, filter_window, record_spacing};
+pub use irradiance_records::{IrradianceRecords, Records, filter_footprint, record_spacing};
 pub use share_estimates::{EstimateRequest, EstimateSharing, SharedPoints};

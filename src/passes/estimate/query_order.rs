@@ -49,7 +49,7 @@ impl QueryOrder {
             ("gather_info", &uniform),
             ("points", points),
             ("values", &marks[0]),
-            ("places", &marks[0]),
+            ("offsets", &marks[0]),
             ("keyed", &entries[0]),
         ]);
         let mut encoder = gpu.encoder();

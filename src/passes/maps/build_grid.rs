@@ -17,19 +17,19 @@ impl BuildGrid {
         Self(Kernel::new(gpu, "build_grid", &[]))
     }
 
-    /// Builds the cells of `count` photons, which lie in windows of `window` photons. Returns the
+    /// Builds the cells of `count` photons, which lie in segments of `segment` photons. Returns the
     /// cells and the number of levels.
-    pub(crate) fn build(&self, gpu: &Gpu, places: &[Buffer], window: u32, count: u32) -> Result<(Buffer, u32)> {
+    pub(crate) fn build(&self, gpu: &Gpu, positions: &[Buffer], segment: u32, count: u32) -> Result<(Buffer, u32)> {
         let sizes = level_sizes(count.div_ceil(CELL_PHOTONS));
         let base = |level: usize| sizes.iter().skip(level + 1).sum::<u32>();
         let cells = gpu.storage::<Cell>("cells", sizes.iter().map(|&n| u64::from(n)).sum())?;
         let mut encoder = gpu.encoder();
         for (level, &size) in sizes.iter().enumerate() {
-            // The finest level reads photons, window by window; the others read cells.
-            let windows = if level == 0 { places.len() } else { 1 };
-            let per_window = if level == 0 { window / CELL_PHOTONS } else { size };
-            for (place, w) in places[..windows].iter().zip(0..) {
-                let first_cell = w * per_window;
+            // The finest level reads photons, segment by segment; the others read cells.
+            let segments = if level == 0 { positions.len() } else { 1 };
+            let per_segment = if level == 0 { segment / CELL_PHOTONS } else { size };
+            for (position, w) in positions[..segments].iter().zip(0..) {
+                let first_cell = w * per_segment;
                 let finer = level.checked_sub(1);
                 let step = GridStep {
                     photons: count,
@@ -38,11 +38,11 @@ impl BuildGrid {
                     finer_base: finer.map_or(0, base),
                     finer_count: finer.map_or(0, |l| sizes[l]),
                     first_cell,
-                    cell_count: per_window.min(size - first_cell),
+                    cell_count: per_segment.min(size - first_cell),
                     pad: 0,
                 };
                 let uniform = gpu.uniform("grid step", &step);
-                let buffers = [("places", place), ("grid_cells", &cells), ("grid_step", &uniform)];
+                let buffers = [("positions", position), ("grid_cells", &cells), ("grid_step", &uniform)];
                 self.0.dispatch(&mut encoder, &self.0.bind(gpu, &buffers), step.cell_count.into());
             }
         }

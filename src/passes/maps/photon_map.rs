@@ -1,12 +1,12 @@
 //! A photon map on the device: bind group 1 of every kernel that reads one
 //! (`shaders/bindings/photon_map.wesl`).
 //!
-//! Photons come unsorted in a [`PhotonStore`]: windows of `array<Photon>`, each within one binding
+//! Photons come unsorted in a [`PhotonStore`]: segments of `array<Photon>`, each within one binding
 //! (4,194,304 photons where a binding holds 128 MiB, so that up to that number there is one
-//! window). [`PhotonMap::build`] sorts them along a Hilbert curve of 20 bits per axis. It splits
-//! each photon into the data that a search reads (`places`: position and direction, 16 bytes) and
-//! the data that only an estimate reads (`fluxes`, 16 bytes). Arrays that exceed a binding are
-//! split into two windows.
+//! segment). [`PhotonMap::build`] sorts them along a Hilbert curve of 20 bits per axis. It splits
+//! each photon into the data that a search reads (`positions`: position and direction, 16 bytes)
+//! and the data that only an estimate reads (`fluxes`, 16 bytes). Arrays that exceed a binding are
+//! split into two segments.
 //!
 //! The grid is built over the sorted photons. A cell of the finest level holds 16 consecutive
 //! photons of the curve, a coarser cell eight finer cells. Each has its exact bounds. Cells thus
@@ -15,14 +15,14 @@
 
 use super::{
     build_grid::BuildGrid,
-    photon_store::{MAX_WINDOWS, PhotonStore, too_many, window_elements},
+    photon_store::{MAX_SEGMENTS, PhotonStore, segment_elements, too_many},
     radix_sort::RadixSort,
     sort_photons::SortPhotons,
 };
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu},
-    layout::{MapInfo, PhotonFlux, PhotonPlace},
+    layout::{MapInfo, PhotonFlux, PhotonPosition},
 };
 
 /// The kernels that build a map.
@@ -31,15 +31,15 @@ pub struct MapKernels {
     sort: SortPhotons,
     radix: RadixSort,
     grid: BuildGrid,
-    /// Photons per window of the sorted map.
-    window: u32,
+    /// Photons per segment of the sorted map.
+    segment: u32,
 }
 
 impl MapKernels {
     /// Compiles them.
     #[must_use]
     pub fn new(gpu: &Gpu) -> Self {
-        Self::windowed(gpu, window_elements::<PhotonPlace>(gpu))
+        Self::segmented(gpu, segment_elements::<PhotonPosition>(gpu))
     }
 
     /// Has them compiled ahead of their use.
@@ -47,10 +47,10 @@ impl MapKernels {
         let _ = Self::new(gpu);
     }
 
-    /// Compiles them for sorted maps in windows of `window` photons, a power of two ≥ 64.
+    /// Compiles them for sorted maps in segments of `segment` photons, a power of two ≥ 64.
     #[must_use]
-    pub fn windowed(gpu: &Gpu, window: u32) -> Self {
-        Self { sort: SortPhotons::new(gpu), radix: RadixSort::new(gpu), grid: BuildGrid::new(gpu), window }
+    pub fn segmented(gpu: &Gpu, segment: u32) -> Self {
+        Self { sort: SortPhotons::new(gpu), radix: RadixSort::new(gpu), grid: BuildGrid::new(gpu), segment }
     }
 }
 
@@ -61,7 +61,7 @@ pub struct PhotonMap {
     emitted: u64,
     info: Buffer,
     cells: Buffer,
-    places: Vec<Buffer>,
+    positions: Vec<Buffer>,
     fluxes: Vec<Buffer>,
 }
 
@@ -73,24 +73,24 @@ impl PhotonMap {
     /// [`crate::Error::Limit`] if the map does not fit the device, [`crate::Error::Gpu`] if the
     /// driver fails.
     pub fn build(gpu: &Gpu, kernels: &MapKernels, photons: PhotonStore, count: u32, emitted: u64) -> Result<Self> {
-        let window = kernels.window;
-        if count.div_ceil(window) as usize > MAX_WINDOWS {
+        let segment = kernels.segment;
+        if count.div_ceil(segment) as usize > MAX_SEGMENTS {
             return Err(too_many(gpu, count.into()));
         }
         let entries = kernels.sort.order(gpu, &kernels.radix, &photons, count)?;
-        let (mut places, mut fluxes) = (Vec::new(), Vec::new());
-        for first in (0..count.max(1)).step_by(window as usize) {
-            let size = u64::from(window.min(count - first));
-            places.push(gpu.storage::<PhotonPlace>("photon places", size)?);
+        let (mut positions, mut fluxes) = (Vec::new(), Vec::new());
+        for first in (0..count.max(1)).step_by(segment as usize) {
+            let size = u64::from(segment.min(count - first));
+            positions.push(gpu.storage::<PhotonPosition>("photon places", size)?);
             fluxes.push(gpu.storage::<PhotonFlux>("photon fluxes", size)?);
         }
-        kernels.sort.fetch(gpu, &entries, &photons, count, (&places, &fluxes, window));
+        kernels.sort.fetch(gpu, &entries, &photons, count, (&positions, &fluxes, segment));
         drop(entries);
         drop(photons);
-        let (cells, levels) = kernels.grid.build(gpu, &places, window, count)?;
-        let info = gpu.uniform("map info", &MapInfo { count, levels, split: window, pad: 0 });
+        let (cells, levels) = kernels.grid.build(gpu, &positions, segment, count)?;
+        let info = gpu.uniform("map info", &MapInfo { count, levels, split: segment, pad: 0 });
         gpu.wait()?;
-        Ok(Self { count, emitted, info, cells, places, fluxes })
+        Ok(Self { count, emitted, info, cells, positions, fluxes })
     }
 
     /// Photons in the map.
@@ -105,21 +105,21 @@ impl PhotonMap {
         self.emitted
     }
 
-    /// Windows that the photons lie in, 1 or 2: the kernels' override `WINDOWS`.
+    /// Segments that the photons lie in, 1 or 2: the kernels' override `SEGMENTS`.
     #[must_use]
-    pub fn windows(&self) -> u32 {
-        self.places.len() as u32
+    pub fn segments(&self) -> u32 {
+        self.positions.len() as u32
     }
 
     /// The buffers of bind group 1 by name.
     #[must_use]
     pub fn bindings(&self) -> [(&'static str, &Buffer); 6] {
-        let high = self.places.len() - 1;
+        let high = self.positions.len() - 1;
         [
             ("map_info", &self.info),
             ("cells", &self.cells),
-            ("places_low", &self.places[0]),
-            ("places_high", &self.places[high]),
+            ("positions_low", &self.positions[0]),
+            ("positions_high", &self.positions[high]),
             ("fluxes_low", &self.fluxes[0]),
             ("fluxes_high", &self.fluxes[high]),
         ]
@@ -129,14 +129,14 @@ impl PhotonMap {
     ///
     /// # Errors
     /// [`crate::Error::Gpu`] if the driver fails.
-    pub fn read(&self, gpu: &Gpu) -> Result<(Vec<PhotonPlace>, Vec<PhotonFlux>)> {
-        let (mut places, mut fluxes) = (Vec::new(), Vec::new());
-        for (place, flux) in self.places.iter().zip(&self.fluxes) {
-            let left = u64::from(self.count) - places.len() as u64;
-            let size = left.min(place.size() / size_of::<PhotonPlace>() as u64);
-            places.extend(gpu.read::<PhotonPlace>(place, 0, size)?);
+    pub fn read(&self, gpu: &Gpu) -> Result<(Vec<PhotonPosition>, Vec<PhotonFlux>)> {
+        let (mut positions, mut fluxes) = (Vec::new(), Vec::new());
+        for (position, flux) in self.positions.iter().zip(&self.fluxes) {
+            let left = u64::from(self.count) - positions.len() as u64;
+            let size = left.min(position.size() / size_of::<PhotonPosition>() as u64);
+            positions.extend(gpu.read::<PhotonPosition>(position, 0, size)?);
             fluxes.extend(gpu.read::<PhotonFlux>(flux, 0, size)?);
         }
-        Ok((places, fluxes))
+        Ok((positions, fluxes))
     }
 }

@@ -3,39 +3,42 @@
 use crate::{
     error::{Error, Result},
     gpu::{Buffer, Gpu},
-    layout::{Photon, PhotonPlace},
+    layout::{Photon, PhotonPosition},
 };
 
-/// Maximum number of windows of a sorted map; `shaders/bindings/photon_map.wesl` binds that many.
-pub(super) const MAX_WINDOWS: usize = 2;
+/// Maximum number of segments of a sorted map; `shaders/bindings/photon_map.wesl` binds that many.
+pub(super) const MAX_SEGMENTS: usize = 2;
 
-/// Unsorted photons in windows that one binding can hold.
+/// Unsorted photons in segments that one binding can hold.
 #[derive(Debug)]
 pub struct PhotonStore {
-    windows: Vec<Buffer>,
-    window_photons: u32,
+    segments: Vec<Buffer>,
+    segment_photons: u32,
 }
 
 impl PhotonStore {
     /// Room for `capacity` photons, zeroed.
     ///
     /// # Errors
-    /// [`Error::Limit`] if the device refuses a window.
+    /// [`Error::Limit`] if the device refuses a segment.
     pub fn new(gpu: &Gpu, capacity: u32) -> Result<Self> {
-        Self::windowed(gpu, capacity, window_elements::<Photon>(gpu))
+        Self::segmented(gpu, capacity, segment_elements::<Photon>(gpu))
     }
 
-    /// As [`Self::new`], in windows of `window_photons`, a power of two ≥ 64.
+    /// Variant of [`Self::new`] with segments of `segment_photons`, a power of two ≥ 64.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn windowed(gpu: &Gpu, capacity: u32, window_photons: u32) -> Result<Self> {
-        let windows = (0..capacity.div_ceil(window_photons).max(1))
+    pub fn segmented(gpu: &Gpu, capacity: u32, segment_photons: u32) -> Result<Self> {
+        let segments = (0..capacity.div_ceil(segment_photons).max(1))
             .map(|w| {
-                gpu.storage::<Photon>("unsorted photons", u64::from(window_photons.min(capacity - w * window_photons)))
+                gpu.storage::<Photon>(
+                    "unsorted photons",
+                    u64::from(segment_photons.min(capacity - w * segment_photons)),
+                )
             })
             .collect::<Result<_>>()?;
-        Ok(Self { windows, window_photons })
+        Ok(Self { segments, segment_photons })
     }
 
     /// A store with a copy of `photons`.
@@ -51,43 +54,43 @@ impl PhotonStore {
 
     /// Writes `photons` from index 0 on.
     pub fn write(&self, gpu: &Gpu, photons: &[Photon]) {
-        for (window, part) in self.windows.iter().zip(photons.chunks(self.window_photons as usize)) {
-            gpu.write(window, 0, part);
-            // One submission per window, because the staging memory of a write is freed with its
+        for (segment, part) in self.segments.iter().zip(photons.chunks(self.segment_photons as usize)) {
+            gpu.write(segment, 0, part);
+            // One submission per segment, because the staging memory of a write is freed with its
             // submission.
             gpu.submit(gpu.encoder());
         }
     }
 
-    /// The buffers, `array<Photon>` each; photon `i` lies in window `i / window_photons`.
+    /// The buffers, `array<Photon>` each; photon `i` lies in segment `i / segment_photons`.
     #[must_use]
-    pub fn windows(&self) -> &[Buffer] {
-        &self.windows
+    pub fn segments(&self) -> &[Buffer] {
+        &self.segments
     }
 
-    /// Photons per window, a power of two; the last window may be shorter.
+    /// Photons per segment, a power of two; the last segment may be shorter.
     #[must_use]
-    pub fn window_photons(&self) -> u32 {
-        self.window_photons
+    pub fn segment_photons(&self) -> u32 {
+        self.segment_photons
     }
 
-    /// Windows of the first `count` photons: buffer, index of its first photon, number of its
+    /// Segments of the first `count` photons: buffer, index of its first photon, number of its
     /// photons.
-    pub(crate) fn parts(&self, count: u32) -> impl Iterator<Item = (&Buffer, u32, u32)> {
-        self.windows.iter().zip(0..).filter_map(move |(buffer, w)| {
-            let first = w * self.window_photons;
-            (first < count).then(|| (buffer, first, self.window_photons.min(count - first)))
+    pub(crate) fn filled(&self, count: u32) -> impl Iterator<Item = (&Buffer, u32, u32)> {
+        self.segments.iter().zip(0..).filter_map(move |(buffer, w)| {
+            let first = w * self.segment_photons;
+            (first < count).then(|| (buffer, first, self.segment_photons.min(count - first)))
         })
     }
 }
 
-/// Elements of a window: the largest power of two that one binding holds.
-pub(super) fn window_elements<T>(gpu: &Gpu) -> u32 {
+/// Elements of a segment: the largest power of two that one binding holds.
+pub(super) fn segment_elements<T>(gpu: &Gpu) -> u32 {
     elements_within::<T>(gpu.max_binding())
 }
 
-/// As [`window_elements`], for bindings of that many bytes. Photons are counted in 31 bits, so that
-/// a window has at most 2^29.
+/// Variant of [`segment_elements`] for bindings of that many bytes. Photons are counted in 31 bits,
+/// so that a segment has at most 2^29.
 fn elements_within<T>(binding: u64) -> u32 {
     let most = (binding / size_of::<T>() as u64).clamp(64, 1 << 29);
     1 << most.ilog2()
@@ -95,7 +98,7 @@ fn elements_within<T>(binding: u64) -> u32 {
 
 /// Maximum number of photons of a map, where bindings have that many bytes.
 fn most_photons(binding: u64) -> u64 {
-    MAX_WINDOWS as u64 * u64::from(elements_within::<PhotonPlace>(binding))
+    MAX_SEGMENTS as u64 * u64::from(elements_within::<PhotonPosition>(binding))
 }
 
 /// Fails if a map of so many photons cannot be built. Called before any photon is traced.

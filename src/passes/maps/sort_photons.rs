@@ -46,11 +46,11 @@ impl SortPhotons {
             let mut encoder = gpu.encoder();
             // A buffer may not be dropped before the commands that use it are submitted.
             let mut steps = Vec::new();
-            for (window, first, size) in photons.parts(count) {
+            for (segment, first, size) in photons.filled(count) {
                 let invocations = if fine == 1 { size } else { count };
-                let key_step = KeyStep { count: invocations, window_first: first, window_count: size, fine };
+                let key_step = KeyStep { count: invocations, segment_first: first, segment_count: size, fine };
                 let step = gpu.uniform("key step", &key_step);
-                let buffers = [("photons", window), ("boxes", &bounds), ("entries", &entries[0]), ("key_step", &step)];
+                let buffers = [("photons", segment), ("boxes", &bounds), ("entries", &entries[0]), ("key_step", &step)];
                 self.key.dispatch(&mut encoder, &self.key.bind(gpu, &buffers), invocations.into());
                 steps.push(step);
             }
@@ -65,13 +65,13 @@ impl SortPhotons {
 
     /// Buffer of boxes, the first of which bounds all photons.
     fn bounds(&self, gpu: &Gpu, photons: &PhotonStore, count: u32) -> Result<Buffer> {
-        let windows = photons.parts(count).count() as u32;
-        let boxes = gpu.storage::<Cell>("photon bounds", u64::from((windows * BOUND_LANES).max(1)))?;
+        let segments = photons.filled(count).count() as u32;
+        let boxes = gpu.storage::<Cell>("photon bounds", u64::from((segments * BOUND_LANES).max(1)))?;
         let mut encoder = gpu.encoder();
         let mut steps = Vec::new();
-        for ((window, _, size), w) in photons.parts(count).zip(0..) {
+        for ((segment, _, size), w) in photons.filled(count).zip(0..) {
             let step = gpu.uniform("bound step", &BoundStep { count: size, first_box: w * BOUND_LANES });
-            let buffers = [("photons", window), ("boxes", &boxes), ("bound_step", &step)];
+            let buffers = [("photons", segment), ("boxes", &boxes), ("bound_step", &step)];
             self.bound.dispatch(&mut encoder, &self.bound.bind(gpu, &buffers), BOUND_LANES.into());
             steps.push(step);
         }
@@ -80,27 +80,27 @@ impl SortPhotons {
         Ok(boxes)
     }
 
-    /// Moves the photons to the windows of the sorted map, in the order of `entries`.
+    /// Moves the photons to the segments of the sorted map, in the order of `entries`.
     pub(crate) fn fetch(
         &self,
         gpu: &Gpu,
         entries: &Buffer,
         photons: &PhotonStore,
         count: u32,
-        (places, fluxes, window): (&[Buffer], &[Buffer], u32),
+        (positions, fluxes, segment): (&[Buffer], &[Buffer], u32),
     ) {
         let mut encoder = gpu.encoder();
         let mut steps = Vec::new();
-        for ((place, flux), first) in places.iter().zip(fluxes).zip((0..).step_by(window as usize)) {
-            let size = window.min(count - first);
-            for (unsorted, from, part) in photons.parts(count) {
+        for ((position, flux), first) in positions.iter().zip(fluxes).zip((0..).step_by(segment as usize)) {
+            let size = segment.min(count - first);
+            for (unsorted, from, part) in photons.filled(count) {
                 let move_step =
-                    MoveStep { sorted_first: first, sorted_count: size, window_first: from, window_count: part };
+                    MoveStep { sorted_first: first, sorted_count: size, segment_first: from, segment_count: part };
                 let step = gpu.uniform("move step", &move_step);
                 let buffers = [
                     ("entries", entries),
                     ("photons", unsorted),
-                    ("places", place),
+                    ("positions", position),
                     ("fluxes", flux),
                     ("move_step", &step),
                 ];

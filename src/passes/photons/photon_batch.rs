@@ -4,7 +4,7 @@ use super::raw_map::RawMap;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{Counters, MAP_KINDS, PLACE_MASK, Photon, PhotonBatch, Store},
+    layout::{Counters, MAP_KINDS, PHOTON_INDEX_MASK, Photon, PhotonBatch, Store},
     map_kind::MapKind,
     passes::wavefront::{Step, Wavefront},
     settings::{MAX_BOUNCES, Sampler},
@@ -15,7 +15,7 @@ use crate::{
 /// again in smaller batches.
 const STAGED_PER_PATH: u64 = 2;
 
-const _: () = assert!(MAX_BOUNCES <= PLACE_MASK, "a key has room for the photons of a path");
+const _: () = assert!(MAX_BOUNCES <= PHOTON_INDEX_MASK, "a key has room for the photons of a path");
 
 /// Kernels of the photon pass.
 #[derive(Debug)]
@@ -31,8 +31,8 @@ pub(crate) struct BatchBuffers {
     staged: Buffer,
     staged_keys: Buffer,
     counts: Buffer,
-    places: Buffer,
-    /// Photons stored of each group of lights, `u32`.
+    offsets: Buffer,
+    /// Photons stored of each named light, `u32`.
     pub light_photons: Buffer,
     pub staging_capacity: u64,
 }
@@ -91,9 +91,9 @@ impl PhotonKernels {
         first_path: u64,
     ) -> Result<()> {
         let counts = result.counts.iter().skip(kind as usize).step_by(MAP_KINDS as usize);
-        gpu.write(&buffers.places, 0, &map.place(counts.copied(), first_path));
+        gpu.write(&buffers.offsets, 0, &map.assign_offsets(counts.copied(), first_path));
         let mut encoder = gpu.encoder();
-        for (window, first_photon, photons) in map.photons.parts(map.stored as u32) {
+        for (segment, first_photon, photons) in map.photons.filled(map.stored as u32) {
             let staged = result.counters.staged;
             let uniform = gpu.uniform("store", &Store { staged, first_photon, photons, kind: kind as u32 });
             let bindings = self.store.bind(
@@ -102,10 +102,10 @@ impl PhotonKernels {
                     ("store", &uniform),
                     ("staged", &buffers.staged),
                     ("staged_keys", &buffers.staged_keys),
-                    ("places", &buffers.places),
+                    ("offsets", &buffers.offsets),
                     ("paths", &buffers.wavefront.paths),
                     ("light_photons", &buffers.light_photons),
-                    ("photons", window),
+                    ("photons", segment),
                 ],
             );
             self.store.dispatch(&mut encoder, &bindings, u64::from(staged));
@@ -116,16 +116,16 @@ impl PhotonKernels {
 }
 
 impl BatchBuffers {
-    /// Buffers for batches of up to `paths` paths, from `groups` groups of lights.
-    pub fn new(gpu: &Gpu, paths: u64, groups: usize) -> Result<Self> {
+    /// Buffers for batches of up to `paths` paths, from `named` named lights.
+    pub fn new(gpu: &Gpu, paths: u64, named: usize) -> Result<Self> {
         let staging_capacity = (paths * STAGED_PER_PATH).max(2 * u64::from(MAX_BOUNCES));
         Ok(Self {
             wavefront: Wavefront::new(gpu, "photon", paths)?,
             staged: gpu.storage::<Photon>("staged photons", staging_capacity)?,
             staged_keys: gpu.storage::<u32>("keys of staged photons", staging_capacity)?,
             counts: gpu.storage::<u32>("photon counts", paths * u64::from(MAP_KINDS))?,
-            places: gpu.storage::<u32>("photon places", paths)?,
-            light_photons: gpu.storage::<u32>("photons of lights", groups as u64)?,
+            offsets: gpu.storage::<u32>("photon places", paths)?,
+            light_photons: gpu.storage::<u32>("photons of lights", named as u64)?,
             staging_capacity,
         })
     }

@@ -28,7 +28,7 @@ const MIN_BATCH: u64 = 1 << 16;
 const MAX_BATCH: u64 = layout::PATH_MASK as u64 + 1;
 /// Minimum number of paths over which the growth of a map is measured. The capacity of the map is
 /// used if it is larger.
-const GROWTH_WINDOW: u64 = 1 << 17;
+const GROWTH_PATHS: u64 = 1 << 17;
 /// Paths for each photon that a map has room for, at most and at least.
 const PATHS_PER_PHOTON: u64 = 100;
 const MIN_PATHS_PER_PHOTON: f64 = 4.0;
@@ -50,7 +50,7 @@ pub type PathRanges = ByKind<PathRange>;
 #[derive(Debug)]
 pub struct TracedPhotons {
     pub maps: ByKind<RawMap>,
-    /// Photons stored of each group of lights.
+    /// Photons stored of each named light.
     pub of_lights: Vec<u32>,
     /// Flux that the general paths lost to the bounce limit, W, mean of the channels.
     pub lost: f64,
@@ -111,7 +111,7 @@ impl PhotonTracer {
         self.trace_range(gpu, scene, settings, (caustics, &PathRanges::default()), progress)
     }
 
-    /// As [`Self::trace`], with the paths of the given indices.
+    /// Variant of [`Self::trace`] with the paths of the given indices.
     ///
     /// # Errors
     /// As [`Self::trace`].
@@ -140,15 +140,15 @@ impl PhotonTracer {
         let largest = u64::from(settings.global.max(settings.caustic));
         let max_paths = settings.max_paths.unwrap_or(PATHS_PER_PHOTON * largest);
         let batch_limit = (largest / 4).clamp(MIN_BATCH, MAX_BATCH).min(max_paths.max(1));
-        let groups = scene.lights.table.groups.len();
-        let buffers = BatchBuffers::new(gpu, batch_limit, groups)?;
+        let named = scene.lights.table.named.len();
+        let buffers = BatchBuffers::new(gpu, batch_limit, named)?;
         for plan in plans(scene, settings, caustics, paths) {
             let enough =
                 paths_that_matter(scene.lights.enclosure, largest).filter(|_| plan.is_for_little_light(settings));
             let max_paths = plan.paths.count.or(enough).unwrap_or(max_paths);
             self.run(gpu, scene, &plan, settings, (&buffers, batch_limit, max_paths), &mut traced, progress)?;
         }
-        traced.of_lights = gpu.read(&buffers.light_photons, 0, groups as u64)?;
+        traced.of_lights = gpu.read(&buffers.light_photons, 0, named as u64)?;
         Ok(traced)
     }
 
@@ -165,11 +165,11 @@ impl PhotonTracer {
         progress: &dyn Progress,
     ) -> Result<()> {
         let capacities = plan.fills.iter().map(|kind| traced.maps[*kind].capacity);
-        let growth_window = GROWTH_WINDOW.max(capacities.max().unwrap_or(0));
+        let growth_paths = GROWTH_PATHS.max(capacities.max().unwrap_or(0));
         let (mut first_path, mut lost_units) = (0, 0);
         while first_path < max_paths && plan.fills.iter().any(|kind| traced.maps[*kind].open) {
             progress.check()?;
-            let until_check = growth_window - first_path % growth_window;
+            let until_check = growth_paths - first_path % growth_paths;
             let wanted = match plan.paths.count {
                 Some(count) => count,
                 None => plan.fills.iter().map(|kind| traced.maps[*kind].paths_wanted(first_path)).max().unwrap_or(0),
@@ -196,9 +196,9 @@ impl PhotonTracer {
             traced.unfinished += u64::from(result.counters.unfinished);
             traced.non_finite += u64::from(result.counters.non_finite);
             lost_units += result.counters.all_lost();
-            if plan.paths.count.is_none() && first_path.is_multiple_of(growth_window) {
+            if plan.paths.count.is_none() && first_path.is_multiple_of(growth_paths) {
                 for &kind in plan.fills {
-                    traced.warnings.extend(traced.maps[kind].close_if_idle(kind.name(), growth_window));
+                    traced.warnings.extend(traced.maps[kind].close_if_idle(kind.name(), growth_paths));
                 }
             }
             let ByKind { global, caustic } = &traced.maps;
@@ -212,9 +212,9 @@ impl PhotonTracer {
     }
 }
 
-/// Number of paths of a map of light that other surfaces send, in a scene where a part `enclosure`
-/// of it meets anything. Its noise counts by that part of the light of the picture: its variance by
-/// the square.
+/// Number of paths of a map of light that other surfaces send, in a scene where a fraction
+/// `enclosure` of it meets anything. Its noise counts by that fraction of the light of the picture:
+/// its variance by the square.
 fn paths_that_matter(enclosure: f64, capacity: u64) -> Option<u64> {
     let each = (PATHS_PER_PHOTON as f64 * enclosure * enclosure).max(MIN_PATHS_PER_PHOTON);
     (each < PATHS_PER_PHOTON as f64).then_some((each * capacity as f64) as u64)

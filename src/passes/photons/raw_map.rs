@@ -8,7 +8,7 @@ use crate::{
     passes::maps::photon_store::{PhotonStore, check_capacity},
 };
 
-/// Minimum growth of a map over a window of paths, as a fraction of its capacity. A map that gains
+/// Minimum growth of a map over a number of paths, as a fraction of its capacity. A map that gains
 /// less is idle.
 const MIN_GROWTH: f64 = 1e-4;
 
@@ -42,10 +42,10 @@ impl RawMap {
         })
     }
 
-    /// Assigns each path of a batch the position of its first photon in the map. The first path
+    /// Assigns each path of a batch the index of its first photon in the map. The first path
     /// that does not fit closes the map, which is then normalised by the paths before it.
-    pub(crate) fn place(&mut self, counts: impl Iterator<Item = u32>, first_path: u64) -> Vec<u32> {
-        // A position beyond the end of any map. So are those of the path's further photons.
+    pub(crate) fn assign_offsets(&mut self, counts: impl Iterator<Item = u32>, first_path: u64) -> Vec<u32> {
+        // An index beyond the end of any map. So are those of the path's further photons.
         const DROPPED: u32 = 1 << 31;
         counts
             .zip(first_path..)
@@ -56,10 +56,10 @@ impl RawMap {
                 if !self.open {
                     return DROPPED;
                 }
-                let place = self.stored as u32;
+                let offset = self.stored as u32;
                 self.stored += u64::from(count);
                 self.emitted = path + 1;
-                place
+                offset
             })
             .collect()
     }
@@ -69,9 +69,9 @@ impl RawMap {
     /// # Errors
     /// Faults of the driver.
     pub fn read(&self, gpu: &Gpu) -> Result<Vec<Photon>> {
-        let parts = self.photons.parts(self.stored as u32);
-        parts
-            .map(|(window, _, count)| gpu.read(window, 0, u64::from(count)))
+        let segments = self.photons.filled(self.stored as u32);
+        segments
+            .map(|(segment, _, count)| gpu.read(segment, 0, u64::from(count)))
             .collect::<Result<Vec<_>>>()
             .map(|p| p.concat())
     }
@@ -94,7 +94,7 @@ impl RawMap {
     }
 
     /// Closes the map if it hardly grew since the last call, and then returns a warning.
-    pub(crate) fn close_if_idle(&mut self, name: &str, window: u64) -> Option<String> {
+    pub(crate) fn close_if_idle(&mut self, name: &str, paths: u64) -> Option<String> {
         let gained = self.stored - self.stored_before;
         self.stored_before = self.stored;
         if !self.open || gained as f64 >= MIN_GROWTH * self.capacity as f64 {
@@ -103,7 +103,7 @@ impl RawMap {
         self.open = false;
         let photons = if gained == 1 { "photon" } else { "photons" };
         Some(format!(
-            "the {name} map hardly grows: {gained} {photons} from the last {window} paths; it stays at {} of {} photons",
+            "the {name} map hardly grows: {gained} {photons} from the last {paths} paths; it stays at {} of {} photons",
             self.stored, self.capacity
         ))
     }
@@ -118,11 +118,11 @@ mod tests {
         let gpu = Gpu::open(None).expect("tests need an adapter");
         let mut map = RawMap::new(&gpu, 10, true).expect("fits");
         let first = (1_u64 << 32) - 2;
-        assert_eq!(map.place([1, 2, 3].into_iter(), first), [0, 1, 3]);
+        assert_eq!(map.assign_offsets([1, 2, 3].into_iter(), first), [0, 1, 3]);
         assert_eq!((map.stored, map.emitted), (6, first + 3));
         // There is room for 4 more photons, but not for the second path as a whole.
-        let places = map.place([3, 2, 1].into_iter(), first + 3);
-        assert_eq!((places[0], map.stored, map.emitted, map.open), (6, 9, first + 4, false));
-        assert!(places[1..].iter().all(|&place| place >= 1 << 31));
+        let offsets = map.assign_offsets([3, 2, 1].into_iter(), first + 3);
+        assert_eq!((offsets[0], map.stored, map.emitted, map.open), (6, 9, first + 4, false));
+        assert!(offsets[1..].iter().all(|&offset| offset >= 1 << 31));
     }
 }

@@ -36,7 +36,7 @@ enum Tangents {
 pub(super) struct Triangles<'a> {
     /// Vertices of the file that are in use.
     pub(super) vertices: &'a [u32],
-    /// Of these vertices.
+    /// Positions of these vertices.
     pub(super) positions: &'a [Vec3],
     pub(super) normals: Option<&'a [Vec3]>,
     /// Indices into these vertices.

@@ -14,7 +14,7 @@ pub(super) fn remove(scene: &mut Scene, notes: &mut Notes) {
     let mut known = HashSet::new();
     let mut is_first = |triangle: &Triangle| {
         let corners = triangle.positions.map(vertex_bits);
-        // The smallest corner first: the order of the others tells which way the triangle faces.
+        // The smallest corner first: the order of the others decides which way the triangle faces.
         let start = (0..3).min_by_key(|i| corners[*i]).unwrap_or(0);
         known.insert([0, 1, 2].map(|i| corners[(start + i) % 3]))
     };

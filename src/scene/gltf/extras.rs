@@ -1,4 +1,4 @@
-//! What files say to this renderer alone: `extras.caustica` of materials, lights and nodes.
+//! Data in files for this renderer alone: `extras.caustica` of materials, lights and nodes.
 
 use gltf::json::Extras;
 use serde_json::Value;

@@ -11,7 +11,7 @@ use super::images::ImageList;
 use super::materials;
 use crate::scene::{Material, Texture};
 
-/// What has a material.
+/// Owners of materials.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Owner {
     /// Index into the file's meshes.
@@ -44,9 +44,9 @@ pub(super) struct Slot {
 /// Axes of texture coordinates, along which tangents lie.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Axes {
-    /// Which of the triangles' sets.
+    /// Index among the triangles' sets.
     pub(super) uv_set: u32,
-    /// As in [`Texture`].
+    /// Same as in [`Texture`].
     pub(super) transform: [[f32; 3]; 2],
 }
 
@@ -114,7 +114,7 @@ impl MaterialTable {
         Ok(())
     }
 
-    /// The material of an owner with those TEXCOORD_n, whose use [`Self::read`] was told of.
+    /// The material of an owner with those TEXCOORD_n, whose use was passed to [`Self::read`].
     pub(super) fn slot(&self, material: Option<usize>, sets: &[u32]) -> &Slot {
         &self.slots[&(material, lacking(&self.asked[&material], sets))]
     }

@@ -79,8 +79,8 @@ impl Entry<'_> {
 type MeshKey = (usize, Option<usize>, Option<usize>);
 
 impl<'d> MeshCache<'d> {
-    /// Which meshes the nodes show, none of them read yet. Needs [`meshes::check`], whose `shapes`
-    /// these are, and [`skins::check`].
+    /// Cache of the meshes that the nodes show, none of them read yet. Needs [`meshes::check`],
+    /// whose `shapes` these are, and [`skins::check`].
     pub(super) fn new(
         document: &'d Document<'_>,
         placed: &[PlacedNode],
@@ -173,7 +173,7 @@ impl<'d> MeshCache<'d> {
             meshes::read(document, mesh, &shapes[mesh], deformation, materials)
         };
         let meshes: Vec<Read<Vec<MeshPrimitive>>> = self.keys.par_iter().map(read).collect();
-        // Of several faults the first one counts.
+        // The first of several faults counts.
         self.meshes = meshes.into_iter().collect::<Read<_>>()?;
         for skin in self.entries.iter().filter_map(|entry| entry.skin) {
             if let Vacant(place) = self.poses.entry(skin) {

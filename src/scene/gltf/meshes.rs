@@ -25,7 +25,7 @@ pub(super) struct MeshPrimitive {
     pub(super) claimed: usize,
     /// Index into the scene's materials.
     pub(super) material: u32,
-    /// What textures and colours need of each position.
+    /// Attributes of each position that textures and colours need.
     pub(super) attributes: Option<VertexAttributes>,
     /// Joint influences per position; empty without a skin.
     pub(super) influences: Vec<Vec<Influence>>,

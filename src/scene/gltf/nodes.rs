@@ -53,7 +53,7 @@ pub(super) fn check(root: &json::Root) -> Read<()> {
     }
     known(root.scene.map(|scene| scene.value()), root.scenes.len(), &|| "scene".to_owned())?;
 
-    // As each node has at most one parent, the nodes that no root reaches belong to cycles.
+    // Nodes that no root reaches belong to cycles, as each node has at most one parent.
     let mut reached: Vec<bool> = parents.iter().map(|count| *count == 0).collect();
     let mut open: Vec<usize> = (0..root.nodes.len()).filter(|i| reached[*i]).collect();
     while let Some(node) = open.pop() {

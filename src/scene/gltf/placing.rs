@@ -71,9 +71,9 @@ pub(super) type PlacedMesh = (Range<usize>, usize);
 #[derive(Debug, Default)]
 pub(super) struct Placed {
     pub(super) triangles: Vec<Triangle>,
-    /// What the triangles refer to by index plus one.
+    /// Attributes, to which the triangles refer by index plus one.
     pub(super) attributes: Vec<Attributes>,
-    /// Which copies of meshes the triangles are of, in their order.
+    /// Copies of meshes to which the triangles belong, in their order.
     pub(super) meshes: Vec<PlacedMesh>,
 }
 
@@ -174,7 +174,7 @@ fn total(primitives: &[MeshPrimitive], of: impl Fn(&MeshPrimitive) -> usize) -> 
     primitives.iter().map(of).sum()
 }
 
-/// How a vertex of a primitive moves to the scene.
+/// Motion of the vertices of a primitive to the scene.
 struct Move {
     to_scene: DMat4,
     to_normal: DMat3,

@@ -9,7 +9,7 @@ struct Surface<'a> {
     normals: Option<&'a [Vec3]>,
     uvs: &'a [Vec2],
     corners: &'a [[u32; 3]],
-    /// Of each corner of each triangle; zero where there is none.
+    /// Tangent of each corner of each triangle; zero where there is none.
     tangents: Vec<[Vec4; 3]>,
 }
 

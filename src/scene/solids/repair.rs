@@ -13,7 +13,7 @@ use glam::Vec3;
 
 use crate::scene::{Bounds, Material, Surface, Triangle, vertex_bits};
 
-/// Part of the surface below which a hole of few edges counts as a missing triangle.
+/// Fraction of the surface below which a hole of few edges counts as a missing triangle.
 const SMALL_HOLE: f64 = 0.05;
 /// Edges of the largest hole that counts as missing triangles.
 const HOLE_EDGES: usize = 6;
@@ -31,7 +31,7 @@ pub(crate) struct MeshRange {
     pub name: String,
 }
 
-/// What was found in the shells of a mesh, each with the number of shells or triangles.
+/// Faults found in the shells of a mesh, each with the number of shells or triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct Faults {
     doubled: usize,
@@ -148,7 +148,7 @@ fn distance(point: Vec3, triangle: &Triangle) -> f32 {
     if inside { plane } else { along(a, b).min(along(b, c)).min(along(c, a)) }
 }
 
-/// Which triangles to keep: of glass that lies in one place several times the first, whichever way
+/// Triangles to keep: of glass that lies in one place several times the first, whichever way
 /// its faces look.
 fn without_doubles(triangles: &[Triangle], mesh_of: &[usize], is_glass: &[bool], faults: &mut [Faults]) -> Vec<bool> {
     let corners = |triangle: &Triangle| {

@@ -34,7 +34,7 @@ pub(super) struct Shells {
     triangles: usize,
 }
 
-/// Holes smaller than this part of the surface are cracks of rounding.
+/// Holes smaller than this fraction of the surface are cracks of rounding.
 const CLOSED: f64 = 1e-4;
 
 /// Points at which a shell is probed at most, triangles visited for them in all, and their depth
@@ -54,7 +54,7 @@ impl Shells {
     }
 
     /// Joins open shells that share vertices: halves of a solid that are meshes of their own. Those
-    /// that are closed together replace their parts; `alike` tells which materials may meet.
+    /// that are closed together replace their parts; `alike` decides which materials may meet.
     pub(super) fn join(&mut self, triangles: &[Triangle], alike: impl Fn(u32, u32) -> bool) {
         let (closed, open): (Vec<Shell>, Vec<Shell>) =
             mem::take(&mut self.shells).into_iter().partition(Shell::is_closed);
@@ -135,7 +135,7 @@ impl Shell {
     }
 }
 
-/// How often a shell winds around a point: the solid angle over 4π (van Oosterom and Strackee
+/// Winding number of a shell around a point: the solid angle over 4π (van Oosterom and Strackee
 /// 1983).
 fn winding(triangles: &[Triangle], shell: &Shell, point: DVec3) -> f64 {
     let angle = |i: &u32| {

@@ -14,7 +14,7 @@ use crate::scene::{Bounds, Medium, Scene};
 pub struct Solids {
     /// Slot of each triangle, then of each sphere; empty if there is no solid.
     slots: Vec<u8>,
-    /// What fills the solids of each slot, the highest rank first.
+    /// Medium that fills the solids of each slot, the highest rank first.
     pub media: Vec<Medium>,
     /// Solids that found no slot: there are more kinds that overlap than slots.
     pub without_slot: usize,

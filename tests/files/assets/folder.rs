@@ -137,8 +137,8 @@ fn every_scene_behaves_as_the_readme_of_the_assets_says() {
     let Some((folder, assets)) = assets() else { return };
     let most = std::env::var("CAUSTICA_ASSETS_BYTES").map_or(u64::MAX, |n| n.parse().expect("a number of bytes"));
     let scenes = assets.iter().filter(|asset| text(asset, "group") != "image");
-    let place = |asset| folder.join(text(asset, "file"));
-    let (small, large): (Vec<_>, Vec<_>) = scenes.partition(|asset| size_with_neighbours(&place(asset)) <= most);
+    let path_of = |asset| folder.join(text(asset, "file"));
+    let (small, large): (Vec<_>, Vec<_>) = scenes.partition(|asset| size_with_neighbours(&path_of(asset)) <= most);
     let left_out: Vec<_> = large.into_iter().map(|asset| text(asset, "id")).collect();
     let mut counts = [0; 4];
     small.iter().for_each(|asset| counts[expected(asset) as usize] += 1);
@@ -148,7 +148,7 @@ fn every_scene_behaves_as_the_readme_of_the_assets_says() {
     let other = Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("the adapter opens twice");
     let work = |gpu: &Gpu| {
         while let Some(asset) = small.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let (path, expected, start) = (place(asset), expected(asset), std::time::Instant::now());
+            let (path, expected, start) = (path_of(asset), expected(asset), std::time::Instant::now());
             if let Err(what) = outcome(gpu, &path, expected) {
                 let what = format!("{} is to {expected:?}: {what}", path.display());
                 wrong.lock().expect("no thread has failed").push(what);

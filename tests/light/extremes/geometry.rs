@@ -206,7 +206,7 @@ fn lights_on_surfaces_and_along_walls_are_harmless() {
     let settings = |mode| {
         quick(mode).with(|s| {
             s.estimate.raw = true;
-            // Of the light on the glass most paths are trapped, and take hundreds of rays each.
+            // Most paths of the light on the glass are trapped, and take hundreds of rays each.
             s.photons.caustic = 300;
         })
     };

@@ -7,7 +7,7 @@
 //! | few | 16 have no noise | 17 have |
 //! | parts | a lamp in 800 pieces lights diffuse and rough surfaces like one | some pieces left out |
 //! | agreement | photons and rays have the same mean under many lights of all kinds | without the second bounce |
-//! | dark | a million lights of no power, and one of infinite or undefined place, change nothing | the place in order |
+//! | dark | a million lights of no power, and one of infinite or undefined position, change nothing | the position in order |
 
 use std::time::Instant;
 
@@ -23,15 +23,15 @@ use support::{photons::Random, *};
 
 use super::{closed_forms::irradiance_at, floor, spot};
 
-/// A floor under `count` lights made by `light` from a place above it and a direction downwards.
+/// A floor under `count` lights made by `light` from a position above it and a direction downwards.
 fn hall(count: usize, light: impl Fn(&mut Random, Vec3, Vec3) -> Light) -> Scene {
     let mut random = Random(8);
     let mut scene = floor(8.0);
     for _ in 0..count {
         let mut across = || 12.0 * random.unit() - 6.0;
-        let place = vec3(across(), 0.3 * across().abs() + 0.2, across());
+        let position = vec3(across(), 0.3 * across().abs() + 0.2, across());
         let down = vec3(across(), -6.0, across()).normalize();
-        scene.lights.push(light(&mut random, place, down));
+        scene.lights.push(light(&mut random, position, down));
     }
     scene
 }
@@ -74,22 +74,22 @@ fn check_sum(scene: &Scene) {
 
 #[test]
 fn two_thousand_points_and_spots_light_as_their_sum() {
-    check_sum(&hall(2000, |random, place, _| point_light(place, 0.01 + random.unit().powi(8))));
-    check_sum(&hall(2000, |random, place, down| spot(place, down, 0.1 + random.unit().powi(4), 0.1, 0.7)));
+    check_sum(&hall(2000, |random, position, _| point_light(position, 0.01 + random.unit().powi(8))));
+    check_sum(&hall(2000, |random, position, down| spot(position, down, 0.1 + random.unit().powi(4), 0.1, 0.7)));
 }
 
 #[test]
 fn many_suns_light_as_their_sum() {
-    check_sum(&hall(40, |random, place, direction| {
+    check_sum(&hall(40, |random, position, direction| {
         let kind = LightKind::Directional;
-        Light { kind, direction, ..point_light(place, 0.1 + random.unit().powi(4)) }
+        Light { kind, direction, ..point_light(position, 0.1 + random.unit().powi(4)) }
     }));
 }
 
 #[test]
 fn sixteen_lights_have_no_noise() {
     let spread = |count: usize| {
-        let mut scene = hall(count, |_, place, _| point_light(place, 1.0));
+        let mut scene = hall(count, |_, position, _| point_light(position, 1.0));
         scene.cameras = vec![camera(vec3(0.15, 0.1, 0.21), vec3(0.1, 0.0, 0.2), 0.02)];
         let render = render_scene(&scene, &settings(Mode::DirectRays, 1, 8));
         let values = || render.frame.radiance().iter().map(|pixel| pixel[0]);
@@ -136,8 +136,8 @@ fn a_lamp_in_pieces_lights_like_one() {
 #[test]
 fn photons_and_rays_agree_under_many_lights() {
     let mut random = Random(5);
-    let mut scene = hall(40, |random, place, _| point_light(place + Vec3::Y, 0.1 + random.unit().powi(4)));
-    scene.lights.extend(hall(30, |_, place, down| spot(place + Vec3::Y, down, 1.0, 0.2, 0.5)).lights);
+    let mut scene = hall(40, |random, position, _| point_light(position + Vec3::Y, 0.1 + random.unit().powi(4)));
+    scene.lights.extend(hall(30, |_, position, down| spot(position + Vec3::Y, down, 1.0, 0.2, 0.5)).lights);
     scene.materials.push(emissive("lamps", 0.2, 20.0, true));
     for _ in 0..300 {
         let corner = vec3(10.0 * random.unit() - 5.0, 1.5 + 2.0 * random.unit(), 10.0 * random.unit() - 5.0);
@@ -163,7 +163,7 @@ fn photons_and_rays_agree_under_many_lights() {
 
 #[test]
 fn a_million_dark_lights_change_nothing() {
-    let lit = hall(30, |_, place, _| point_light(place, 1.0));
+    let lit = hall(30, |_, position, _| point_light(position, 1.0));
     let mut dark = lit.clone();
     dark.lights.extend((0..1_000_000).map(|i| point_light(Vec3::splat(i as f32), 0.0)));
     let upload = |scene: &Scene| {
@@ -174,7 +174,7 @@ fn a_million_dark_lights_change_nothing() {
     let ((nodes, _), (among_dark, seconds)) = (upload(&lit), upload(&dark));
     assert_eq!(nodes, among_dark);
     assert!(seconds < 30.0, "{seconds} s");
-    // A light without a place is never chosen.
+    // A light without a position is never chosen.
     let mut nowhere = lit.clone();
     nowhere.lights.push(point_light(vec3(f32::NAN, 1.0, 0.0), 1.0));
     nowhere.lights.push(point_light(vec3(0.0, f32::INFINITY, 0.0), 1.0));

@@ -126,7 +126,7 @@ fn half_covered_lamps_give_half_the_light() {
     assert!(!within(flux(0.55), right, 0.01), "control: {} W", flux(0.55));
 }
 
-/// Irradiance of the floor at a point by small patches of the lamp, with a factor of their place
+/// Irradiance of the floor at a point by small patches of the lamp, with a factor of their position
 /// along x.
 fn by_patches(point: Vec3, factor: impl Fn(f64) -> f64) -> f64 {
     const PATCHES: usize = 400;
@@ -164,7 +164,7 @@ fn a_gradient_lights_as_the_sum_of_its_patches() {
 /// Power of the only light of a table, and of the only emitter of `info`, W in the first channel.
 fn told(scene: &Scene) -> [f64; 2] {
     let buffers = SceneBuffers::new(gpu(), scene, &Bvh::build(scene), &Settings::default().lights).expect("it fits");
-    [buffers.lights.table.groups[0].power.x, scene.describe().emitters[0].power[0]]
+    [buffers.lights.table.named[0].power.x, scene.describe().emitters[0].power[0]]
 }
 
 #[test]
@@ -228,6 +228,6 @@ fn a_black_texture_gives_no_light_and_is_told_of() {
     texels[30 * 64 + 31] = [255; 4];
     let lit = table(texels.clone(), None);
     assert!(lit.has_extent() && lit.warnings.is_empty() && seen(texels) > 0.0, "control: a bright texel");
-    let power = lit.groups[0].power.x;
+    let power = lit.named[0].power.x;
     assert!(within(power, 2.0 * PI / 4096.0, 0.05), "{power} W of one texel in 4096");
 }

@@ -53,13 +53,13 @@ pub fn uniform_box(random: &mut Random, count: usize) -> Vec<Photon> {
 }
 
 /// Photons on the walls of the unit box, a fraction of them in a spot on its floor, `width` wide.
-pub fn caustic_box(random: &mut Random, count: usize, share: f32, width: f32) -> Vec<Photon> {
-    let place = |random: &mut Random| {
-        if random.unit() < share { in_caustic(random, width) } else { on_walls(random) }
+pub fn caustic_box(random: &mut Random, count: usize, fraction: f32, width: f32) -> Vec<Photon> {
+    let sampled = |random: &mut Random| {
+        if random.unit() < fraction { in_caustic(random, width) } else { on_walls(random) }
     };
     (0..count)
         .map(|_| {
-            let position = place(random);
+            let position = sampled(random);
             photon(random, position)
         })
         .collect()

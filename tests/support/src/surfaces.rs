@@ -19,7 +19,7 @@ use glam::{Vec3, vec3};
 use crate::photons::Random;
 
 /// A surface, and the query points on it.
-pub struct Place {
+pub struct Case {
     pub name: &'static str,
     pub scene: Scene,
     pub photons: u32,
@@ -43,7 +43,7 @@ pub fn ways() -> [(&'static str, GatherOptions); 4] {
 }
 
 /// All surfaces, with `count` points each.
-pub fn places(count: usize) -> Vec<Place> {
+pub fn cases(count: usize) -> Vec<Case> {
     let mut random = Random(21);
     vec![
         corner(&mut random, count),
@@ -56,24 +56,23 @@ pub fn places(count: usize) -> Vec<Place> {
 
 /// Irradiance estimates at the points by each method over the same photons, with one map per seed.
 /// Returns the mean over the seeds.
-pub fn estimates(gpu: &Gpu, place: &Place, seeds: u32) -> [Vec<f64>; 4] {
-    let mut sums = ways().map(|_| vec![0.0; place.points.len()]);
+pub fn estimates(gpu: &Gpu, case: &Case, seeds: u32) -> [Vec<f64>; 4] {
+    let mut sums = ways().map(|_| vec![0.0; case.points.len()]);
     for seed in 0..seeds {
         let settings = Settings::default().with(|s| {
             s.photons.mode = Mode::Photons;
-            s.photons.global = place.photons;
+            s.photons.global = case.photons;
             s.photons.max_bounces = 1;
-            s.estimate.neighbors = place.neighbors;
+            s.estimate.neighbors = case.neighbors;
             s.photons.seed = seed;
         });
-        let buffers =
-            SceneBuffers::new(gpu, &place.scene, &Bvh::build(&place.scene), &settings.lights).expect("it fits");
+        let buffers = SceneBuffers::new(gpu, &case.scene, &Bvh::build(&case.scene), &settings.lights).expect("it fits");
         let tracer = PhotonTracer::new(gpu, &buffers, settings.photons.sampler);
         let traced = tracer.trace(gpu, &buffers, &settings.photons, false, &Silent).expect("photons").maps.global;
         let kernels = MapKernels::new(gpu);
         let map = PhotonMap::build(gpu, &kernels, traced.photons, traced.stored as u32, traced.emitted).expect("a map");
-        let count = place.points.len() as u32;
-        let points = gpu.storage_with("points", &place.points).expect("it fits");
+        let count = case.points.len() as u32;
+        let points = gpu.storage_with("points", &case.points).expect("it fits");
         for ((_, options), sums) in ways().into_iter().zip(&mut sums) {
             let mut gather = Gather::over(gpu, &buffers, options);
             let gathered = gathered_buffer(gpu, count).expect("it fits");
@@ -88,9 +87,9 @@ pub fn estimates(gpu: &Gpu, place: &Place, seeds: u32) -> [Vec<f64>; 4] {
 }
 
 /// Mean over the points of estimate minus truth, relative to the scale.
-pub fn bias(place: &Place, estimates: &[f64]) -> f64 {
-    let sum: f64 = estimates.iter().zip(&place.expected).map(|(a, b)| a - b).sum();
-    sum / estimates.len() as f64 / place.scale
+pub fn bias(case: &Case, estimates: &[f64]) -> f64 {
+    let sum: f64 = estimates.iter().zip(&case.expected).map(|(a, b)| a - b).sum();
+    sum / estimates.len() as f64 / case.scale
 }
 
 fn room(light: Vec3) -> Scene {
@@ -151,14 +150,14 @@ fn irradiance(scene: &Scene, point: &VisiblePoint) -> f64 {
     f64::from(scene.lights[0].intensity.x) * cosine / way.length_squared()
 }
 
-fn place(name: &'static str, scene: Scene, (photons, neighbors): (u32, u32), points: Vec<VisiblePoint>) -> Place {
+fn case(name: &'static str, scene: Scene, (photons, neighbors): (u32, u32), points: Vec<VisiblePoint>) -> Case {
     let expected: Vec<f64> = points.iter().map(|p| irradiance(&scene, p)).collect();
     let scale = expected.iter().sum::<f64>() / expected.len() as f64;
-    Place { name, scene, photons, neighbors, points, expected, scale }
+    Case { name, scene, photons, neighbors, points, expected, scale }
 }
 
 /// The floor of a closed box along a wall, from a corner on.
-fn corner(random: &mut Random, count: usize) -> Place {
+fn corner(random: &mut Random, count: usize) -> Case {
     let mut scene = room(vec3(-0.7, 1.5, -0.6));
     let (x, y, z) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 2.0);
     let (low, high) = (vec3(-1.0, 0.0, -1.0), vec3(1.0, 2.0, 1.0));
@@ -170,11 +169,11 @@ fn corner(random: &mut Random, count: usize) -> Place {
         at(vec3(-1.0 + near, 0.0, -1.0 + along), Vec3::Y)
     };
     let points = (0..count).map(|_| point(random)).collect();
-    place("box corner", scene, (150_000, 150), points)
+    case("box corner", scene, (150_000, 150), points)
 }
 
 /// The top of a table along its edges, the floor far below.
-fn edge(random: &mut Random, count: usize) -> Place {
+fn edge(random: &mut Random, count: usize) -> Case {
     let mut scene = room(vec3(0.4, 1.8, 0.0));
     floor(&mut scene, 0.0, 2.0);
     floor(&mut scene, 0.8, 0.4);
@@ -183,27 +182,27 @@ fn edge(random: &mut Random, count: usize) -> Place {
         at(vec3(0.4 - in_, 0.8, along), Vec3::Y)
     };
     let points = (0..count).map(|_| point(random)).collect();
-    place("table edge", scene, (40_000, 60), points)
+    case("table edge", scene, (40_000, 60), points)
 }
 
 /// The floor at the foot of a thin wall that keeps the light from one side.
-fn wall(random: &mut Random, count: usize, lit: bool) -> Place {
+fn wall(random: &mut Random, count: usize, lit: bool) -> Case {
     let mut scene = room(vec3(-0.1, 0.8, 0.0));
     floor(&mut scene, 0.0, 1.0);
     quad(&mut scene, vec3(0.0, 0.0, -1.5), vec3(0.0, 2.0, 0.0), vec3(0.0, 0.0, 3.0));
     let point =
         |random: &mut Random, side: f32| at(vec3(side * 0.05 * random.unit(), 0.0, random.unit() - 0.5), Vec3::Y);
     let bright = (0..count).map(|_| point(random, -1.0)).collect();
-    let bright = place("lit side of a thin wall", scene, (40_000, 60), bright);
+    let bright = case("lit side of a thin wall", scene, (40_000, 60), bright);
     if lit {
         return bright;
     }
     let points = (0..count).map(|_| point(random, 1.0)).collect();
-    Place { name: "dark side of a thin wall", points, expected: vec![0.0; count], ..bright }
+    Case { name: "dark side of a thin wall", points, expected: vec![0.0; count], ..bright }
 }
 
 /// Spheres smaller than the radius of the estimate, a floor below them.
-fn spheres(random: &mut Random, count: usize) -> Place {
+fn spheres(random: &mut Random, count: usize) -> Case {
     const RADIUS: f32 = 0.04;
     let mut scene = room(vec3(0.0, 2.0, 0.0));
     floor(&mut scene, 0.0, 1.0);
@@ -218,5 +217,5 @@ fn spheres(random: &mut Random, count: usize) -> Place {
             points.push(at(position, normal));
         }
     }
-    place("small spheres", scene, (60_000, 400), points)
+    case("small spheres", scene, (60_000, 400), points)
 }

@@ -32,7 +32,7 @@ pub(super) struct Encoded<'d> {
 }
 
 impl<'d> Encoded<'d> {
-    /// Reads the header. The format is told by the first bytes, not by a name or MIME type.
+    /// Reads the header. The first bytes give the format, not by a name or MIME type.
     pub(super) fn new(bytes: Cow<'d, [u8]>, said: &str, place: String) -> Read<Self> {
         let format = match &*bytes {
             [0x89, b'P', b'N', b'G', ..] => ImageFormat::Png,

@@ -22,7 +22,7 @@ use shrink::Curve;
 /// Largest image file, bytes.
 const MAX_FILE: u64 = 1 << 30;
 
-/// What an image of the scene shows.
+/// Content of an image of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Content {
     /// An image of the file.

@@ -2,7 +2,7 @@
 
 use crate::scene::Image;
 
-/// How the RGB of an image stand for light.
+/// Encodings of light in the RGB of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Curve {
     Linear,

@@ -170,7 +170,7 @@ pub(super) fn normal_reflectance(ior: f32) -> f32 {
     ((ior - 1.0) / (ior + 1.0)).powi(2) as f32
 }
 
-/// How much of the surface is there.
+/// Reads how much of the surface is there.
 pub(super) fn alpha(reader: &mut Reader<'_>) -> Read<Alpha> {
     let cutoff = reader.material.alpha_cutoff.unwrap_or_default().0;
     match reader.material.alpha_mode {

@@ -120,7 +120,7 @@ impl Reader<'_> {
         Ok(Some(Texture { image: self.images.index(content, is_color), uv_set, ..texture }))
     }
 
-    /// Which of the triangles' sets of texture coordinates TEXCOORD_n is; `None` where the mesh
+    /// Index of TEXCOORD_n among the triangles' sets of texture coordinates; `None` where the mesh
     /// lacks it or there are too many.
     pub(super) fn uv_set(&mut self, set: u32) -> Option<u32> {
         if !self.asked.contains(&set) {

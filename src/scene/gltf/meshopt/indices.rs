@@ -74,7 +74,7 @@ impl Triangles<'_> {
     }
 }
 
-/// Where a vertex comes from.
+/// Source of a vertex.
 #[derive(Clone, Copy)]
 enum Corner {
     New(u32),

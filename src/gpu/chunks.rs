@@ -1,22 +1,22 @@
-//! The bind group that tells a kernel with which invocation a part of its dispatch begins
+//! Bind group that says with which invocation a chunk of its dispatch begins
 //! (`shaders/bindings/dispatch.wesl`).
 
 /// The group of these bind groups. [`super::Kernel`] fills it for each dispatch.
-pub(super) const PART_GROUP: u32 = 3;
+pub(super) const CHUNK_GROUP: u32 = 3;
 
-/// Bind groups of the parts of dispatches.
+/// Bind groups of the chunks of dispatches.
 #[derive(Debug)]
-pub(super) struct Parts {
+pub(super) struct Chunks {
     device: wgpu::Device,
     pub layout: wgpu::BindGroupLayout,
-    /// The bind group of all parts that begin with invocation 0.
+    /// The bind group of all chunks that begin with invocation 0.
     first: wgpu::BindGroup,
 }
 
-impl Parts {
+impl Chunks {
     pub fn new(device: &wgpu::Device) -> Self {
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("part of a dispatch"),
+            label: Some("chunk of a dispatch"),
             entries: &[wgpu::BindGroupLayoutEntry {
                 binding: 0,
                 visibility: wgpu::ShaderStages::COMPUTE,
@@ -31,7 +31,7 @@ impl Parts {
         Self { device: device.clone(), first: bind_group(device, &layout, 0), layout }
     }
 
-    /// The bind group of a part that begins with that invocation.
+    /// The bind group of a chunk that begins with that invocation.
     pub fn starting_at(&self, invocation: u64) -> wgpu::BindGroup {
         if invocation == 0 { self.first.clone() } else { bind_group(&self.device, &self.layout, invocation) }
     }
@@ -51,7 +51,7 @@ fn bind_group(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, first: u64)
     }
     buffer.unmap();
     device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("part of a dispatch"),
+        label: Some("chunk of a dispatch"),
         layout,
         entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
     })
