@@ -12,6 +12,7 @@ mod layers;
 mod light_sampling;
 mod light_tree;
 mod limits;
+mod lobe_mixture;
 mod losses;
 mod microfacets;
 mod nearest;
