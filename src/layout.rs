@@ -16,6 +16,8 @@ pub const MAX_WORKGROUPS: u32 = 65_535;
 /// Maximum number of deferred children in a BVH traversal; [`crate::bvh`] builds no tree that needs
 /// more.
 pub const BVH_STACK: usize = 48;
+// The stacks of a workgroup's traversals fit the workgroup memory that every adapter has, 16 KiB.
+const _: () = assert!((BVH_STACK + 1) * WORKGROUP_SIZE as usize * 4 <= 16 << 10);
 /// Maximum of the weight by which an interpolated normal changes flux; it grows without bound
 /// towards grazing angles to the geometric surface.
 pub const MAX_NORMAL_WEIGHT: f32 = 8.0;
