@@ -10,14 +10,21 @@ mod fault;
 mod kernel;
 mod pace;
 mod program;
+#[doc(hidden)]
 pub mod shaders;
 mod table;
 mod timer;
 
 pub use adapter::{AdapterReport, NO_ADAPTER, adapters};
-pub use buffer::{Buffer, MemoryCount};
-pub use commands::Commands;
+pub use buffer::MemoryCount;
 pub use device::Gpu;
-pub use kernel::{Bindings, Kernel};
 pub use pace::{MAX_PER_DISPATCH, Pacing};
-pub use table::Table;
+
+// For the passes, tests and benches; their types are those of the graphics library.
+#[doc(hidden)]
+pub use self::{
+    buffer::Buffer,
+    commands::Commands,
+    kernel::{Bindings, Kernel},
+    table::Table,
+};

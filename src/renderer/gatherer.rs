@@ -151,15 +151,15 @@ impl<'a> MapGatherer<'a> {
 }
 
 impl Gatherer for MapGatherer<'_> {
-    /// Fills the cache of irradiance about the ends of the scout's final-gather rays.
-    fn prepare(&mut self, scout: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
-        let marks = ends_of_rays(scout, stats, progress)?;
+    /// Fills the cache of irradiance about the ends of the preview's final-gather rays.
+    fn prepare(&mut self, preview: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
+        let marks = ends_of_rays(preview, stats, progress)?;
         let Self { maps, search, estimate, .. } = self;
         let mut irradiances = |points: &[VisiblePoint]| {
             let points: Vec<_> = points.iter().map(bare).collect();
-            search.estimates(scout, maps, estimate, &points, progress)
+            search.estimates(preview, maps, estimate, &points, progress)
         };
-        let fill = || IrradianceCache::build(scout.gpu, &marks, estimate.irradiance_cells, &mut irradiances);
+        let fill = || IrradianceCache::build(preview.gpu, &marks, estimate.irradiance_cells, &mut irradiances);
         self.cache = timed(&mut stats.seconds.gather, fill)?;
         Ok(())
     }

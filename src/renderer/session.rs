@@ -27,8 +27,8 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Rays of final gathering that the scout of a picture traces at most.
-const SCOUT_RAYS: f64 = (1 << 17) as f64;
+/// Rays of final gathering that the preview of a picture traces at most.
+const PREVIEW_RAYS: f64 = (1 << 17) as f64;
 
 /// A finished render.
 #[derive(Clone, Debug)]
@@ -235,13 +235,13 @@ impl<'a> Session<'a> {
         let pass = pass.of_pass(picture, maps.first_sample)?;
         let mut stats = maps.stats().clone();
         if estimate.keeps_irradiance() && pass.final_rays() > 0 && !maps.maps().is_empty() {
-            let scouted = scouting(picture, pass.size, maps.settings().final_gather);
-            let scout = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &scouted)?;
-            // The scout of each pass looks at points of its own; that of the first is a single
+            let small = preview_of(picture, pass.size, maps.settings().final_gather);
+            let preview = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &small)?;
+            // The preview of each pass looks at points of its own; that of the first is a single
             // picture's.
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
-            let scout = scout.of_pass(&scouted, index)?;
-            gatherer.prepare(&scout, &mut stats, progress)?;
+            let preview = preview.of_pass(&small, index)?;
+            gatherer.prepare(&preview, &mut stats, progress)?;
         }
         if estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty() {
             let coarse = coarser(picture, pass.size, estimate, pass.tracer.branches());
@@ -280,11 +280,11 @@ fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSetti
     }
 }
 
-/// Settings of a small version of the whole picture, with about `SCOUT_RAYS` rays of final
+/// Settings of a small version of the whole picture, with about `PREVIEW_RAYS` rays of final
 /// gathering. It does not depend on the data window.
-fn scouting(picture: &PictureSettings, size: (u32, u32), rays: u32) -> PictureSettings {
+fn preview_of(picture: &PictureSettings, size: (u32, u32), rays: u32) -> PictureSettings {
     let pixels = f64::from(size.0) * f64::from(size.1);
-    let scale = (SCOUT_RAYS / f64::from(rays) / pixels).min(0.25).sqrt();
+    let scale = (PREVIEW_RAYS / f64::from(rays) / pixels).min(0.25).sqrt();
     let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(1);
     PictureSettings { size: Some((side(size.0), side(size.1))), spp: 1, crop: None, ..picture.clone() }
 }

@@ -37,7 +37,7 @@ pub(crate) trait Gatherer {
 
     /// Receives a pass over a small version of the whole picture, before the picture. The default
     /// does nothing with it.
-    fn prepare(&mut self, _scout: &CameraPass, _stats: &mut Stats, _progress: &dyn Progress) -> Result<()> {
+    fn prepare(&mut self, _preview: &CameraPass, _stats: &mut Stats, _progress: &dyn Progress) -> Result<()> {
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! Structs shared with the GPU have the same fields at the same offsets on both sides, and shared
-//! constants the same values. The shaders are reflected with naga and compared with `layout.rs`.
+//! constants the same values. The shaders are reflected with naga and compared with `src/layout/`.
 
-use std::{any::type_name, mem::offset_of};
+use std::{any::type_name, fs, io, mem::offset_of};
 
 use caustica::{gpu::shaders::SHADERS, layout};
 use naga::{AddressSpace, ArraySize, Expression, Handle, Literal, Module, ScalarKind, Type, TypeInner};
@@ -9,14 +9,14 @@ use naga::{AddressSpace, ArraySize, Expression, Handle, Literal, Module, ScalarK
 /// Name, byte offset and Rust type of a field.
 type Field = (String, u32, String);
 
-/// A struct of `layout.rs`.
+/// A struct of `src/layout/`.
 struct Twin {
     name: &'static str,
     size: u32,
     fields: Vec<Field>,
 }
 
-/// Describes structs of `layout.rs`. A missing field is a compile error.
+/// Describes structs of `src/layout/`. A missing field is a compile error.
 macro_rules! twins {
     ($($name:ident { $($field:ident),+ $(,)? })+) => {
         vec![$({
@@ -198,7 +198,7 @@ fn opaque_bytes(name: Option<&str>) -> Option<u32> {
     OPAQUE.iter().find(|(n, _)| Some(*n) == name).map(|(_, bytes)| *bytes as u32)
 }
 
-/// Differences of a kernel from `layout.rs`, one line each.
+/// Differences of a kernel from `src/layout/`, one line each.
 fn disagreements(wgsl: &str) -> Vec<String> {
     let module = naga::front::wgsl::parse_str(wgsl).expect("composed shaders are valid");
     let mut found = Vec::new();
@@ -209,7 +209,7 @@ fn disagreements(wgsl: &str) -> Vec<String> {
         if let Some((_, expected)) = constants().iter().find(|(n, _)| *n == name)
             && value != Some(*expected)
         {
-            found.push(format!("{name} is {value:?} in the shader and {expected} in layout.rs"));
+            found.push(format!("{name} is {value:?} in the shader and {expected} in src/layout"));
         }
     }
     for entry in &module.entry_points {
@@ -253,7 +253,7 @@ fn bound_structs(module: &Module) -> Vec<Handle<Type>> {
 fn compare_struct(module: &Module, handle: Handle<Type>) -> Vec<String> {
     let Type { name, inner: TypeInner::Struct { members, span } } = &module.types[handle] else { return Vec::new() };
     if let Some(bytes) = opaque_bytes(name.as_deref()) {
-        let line = format!("{name:?} takes {span} bytes in the shader and {bytes} in layout.rs");
+        let line = format!("{name:?} takes {span} bytes in the shader and {bytes} in src/layout");
         return if bytes == *span { Vec::new() } else { vec![line] };
     }
     let name = name.as_deref().unwrap_or("a nameless struct");
@@ -264,10 +264,10 @@ fn compare_struct(module: &Module, handle: Handle<Type>) -> Vec<String> {
     let fields: Vec<Field> = members.iter().map(field).collect();
     let mut found = Vec::new();
     if fields != twin.fields {
-        found.push(format!("{name} is {fields:?} in the shader and {:?} in layout.rs", twin.fields));
+        found.push(format!("{name} is {fields:?} in the shader and {:?} in src/layout", twin.fields));
     }
     if *span != twin.size {
-        found.push(format!("{name} takes {span} bytes in the shader and {} in layout.rs", twin.size));
+        found.push(format!("{name} takes {span} bytes in the shader and {} in src/layout", twin.size));
     }
     found
 }
@@ -319,7 +319,9 @@ fn shaders_and_host_agree() {
 
 #[test]
 fn this_test_knows_every_struct_and_constant_of_the_host() {
-    let source = include_str!("../../src/layout.rs");
+    let files = fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/src/layout")).expect("the folder is there");
+    let read = |file: io::Result<fs::DirEntry>| fs::read_to_string(file.expect("listed").path()).expect("it reads");
+    let source: String = files.map(read).collect();
     let named = |prefix: &str, end: char| -> Vec<&str> {
         source.lines().filter_map(|l| l.strip_prefix(prefix)?.split_once(end)).map(|(name, _)| name.trim()).collect()
     };

@@ -6,16 +6,14 @@ use glam::Vec3;
 
 use super::{
     direct_light::DirectLighting,
-    tile::{StepCount, Tile},
+    tile::{PIXEL_SAMPLES, StepCount, Tile, margin_cells, room_for, tile_sides},
     view::{UNCLIPPED, view},
 };
 use crate::{
     bvh::Media,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{
-        self, CameraTile, Counters, FirstHit, Gathered, LobePoint, MARGIN_CELL, MARGIN_SAMPLES, PixelSums, VisiblePoint,
-    },
+    layout::{self, CameraTile, Counters, FirstHit, Gathered, LobePoint, MARGIN_SAMPLES, PixelSums, VisiblePoint},
     passes::{
         estimate::SharedPoints,
         wavefront::{Step, Wavefront},
@@ -25,22 +23,14 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Rays of final gathering of each visible point of a small picture for which a tile has room.
-const RAYS_AT_ONCE: u64 = 16;
-/// Visible points for which a tile has room at least, without its margin.
-const MIN_ROOM: u64 = 1 << 16;
 /// Path slots per sample if the scene has dielectrics: reflection and refraction are both followed
 /// at the first two interfaces.
 const BRANCHES: u32 = 4;
-/// Maximum number of samples of one pixel in a tile.
-const PIXEL_SAMPLES: u32 = 256;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
 /// Surfaces before the near plane that a ray passes at most.
 const MAX_UNSEEN: u32 = 1 << 12;
-/// Minimum number of pixels of a tile.
-const MIN_TILE_PIXELS: u32 = 64;
 
 /// Kernels of the camera pass.
 #[derive(Debug)]
@@ -123,15 +113,15 @@ impl CameraTracer {
         let room = room_for(&view, gpu.batch, photons.final_gather);
         let margin = if shares { margin_cells(tile_sides(&view, room)) * MARGIN_SAMPLES } else { 0 };
         let samples = room / u64::from(branches) + u64::from(margin);
-        let places = samples * u64::from(branches);
+        let slots = samples * u64::from(branches);
         Ok(Self {
             kernels: CameraKernels::new(gpu, scene, photons, picture.light_samples),
-            wavefront: Wavefront::new(gpu, "camera", places)?,
-            points: gpu.storage::<VisiblePoint>("visible points", places)?,
-            radiance: gpu.storage::<[f32; 4]>("radiance", places)?,
+            wavefront: Wavefront::new(gpu, "camera", slots)?,
+            points: gpu.storage::<VisiblePoint>("visible points", slots)?,
+            radiance: gpu.storage::<[f32; 4]>("radiance", slots)?,
             gathered: gpu.storage::<Gathered>("gathered", room)?,
             first_hits: gpu.storage::<FirstHit>("first hits", samples)?,
-            lobe_points: gpu.storage::<LobePoint>("lit lobes", if scene.materials.has_rough { places } else { 1 })?,
+            lobe_points: gpu.storage::<LobePoint>("lit lobes", if scene.materials.has_rough { slots } else { 1 })?,
             pixel_rows: gpu.storage::<PixelSums>("sums of pixels", room / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
             view: CameraTile { margin, ..view },
@@ -374,28 +364,4 @@ impl CameraTracer {
             ..self.view
         }
     }
-}
-
-/// Visible points for which a tile has room: those of a batch of the device, with final gathering
-/// twice as many since each step of its rays waits for the device; or those of the whole picture
-/// and some of their rays.
-fn room_for(view: &CameraTile, batch: u64, final_rays: u32) -> u64 {
-    let points = u64::from(view.width) * u64::from(view.height) * u64::from(view.branches) * u64::from(view.spp);
-    let rays = u64::from(final_rays).clamp(1, RAYS_AT_ONCE);
-    let most = if final_rays > 0 { 2 * batch } else { batch };
-    (points * rays).next_power_of_two().clamp(MIN_ROOM.min(most), most)
-}
-
-/// Pixels along the sides of each tile, powers of 2.
-fn tile_sides(view: &CameraTile, room: u64) -> (u32, u32) {
-    let pixels = (room as u32 / (view.branches * view.spp.min(PIXEL_SAMPLES))).max(MIN_TILE_PIXELS);
-    let side_bits = |side: u32| side.next_power_of_two().ilog2();
-    let needed = 2 * side_bits(view.width.max(view.height)).max(MIN_TILE_PIXELS.ilog2() / 2);
-    let bits = pixels.ilog2().min(needed);
-    (1 << bits.div_ceil(2), 1 << (bits / 2))
-}
-
-/// Number of cells in the margin of a tile of that size.
-fn margin_cells((width, height): (u32, u32)) -> u32 {
-    2 * (width / MARGIN_CELL + 2) + 2 * (height / MARGIN_CELL)
 }

@@ -1,6 +1,15 @@
-//! Tiles: parts of a picture's samples, and counts of one step over a tile.
+//! Tiles: parts of a picture's samples, their sizes, and counts of one step over a tile.
 
-use crate::layout::{Counters, LOST_SCALE};
+use crate::layout::{CameraTile, Counters, LOST_SCALE, MARGIN_CELL};
+
+/// Rays of final gathering of each visible point of a small picture for which a tile has room.
+const RAYS_AT_ONCE: u64 = 16;
+/// Visible points for which a tile has room at least, without its margin.
+const MIN_ROOM: u64 = 1 << 16;
+/// Maximum number of samples of one pixel in a tile.
+pub(super) const PIXEL_SAMPLES: u32 = 256;
+/// Minimum number of pixels of a tile.
+const MIN_TILE_PIXELS: u32 = 64;
 
 /// A part of the picture's samples.
 #[derive(Clone, Copy, Debug)]
@@ -46,4 +55,28 @@ impl From<Counters> for StepCount {
             lost: counters.all_lost() as f64 / f64::from(LOST_SCALE),
         }
     }
+}
+
+/// Visible points for which a tile has room: those of a batch of the device, with final gathering
+/// twice as many since each step of its rays waits for the device; or those of the whole picture
+/// and some of their rays.
+pub(super) fn room_for(view: &CameraTile, batch: u64, final_rays: u32) -> u64 {
+    let points = u64::from(view.width) * u64::from(view.height) * u64::from(view.branches) * u64::from(view.spp);
+    let rays = u64::from(final_rays).clamp(1, RAYS_AT_ONCE);
+    let most = if final_rays > 0 { 2 * batch } else { batch };
+    (points * rays).next_power_of_two().clamp(MIN_ROOM.min(most), most)
+}
+
+/// Pixels along the sides of each tile, powers of 2.
+pub(super) fn tile_sides(view: &CameraTile, room: u64) -> (u32, u32) {
+    let pixels = (room as u32 / (view.branches * view.spp.min(PIXEL_SAMPLES))).max(MIN_TILE_PIXELS);
+    let side_bits = |side: u32| side.next_power_of_two().ilog2();
+    let needed = 2 * side_bits(view.width.max(view.height)).max(MIN_TILE_PIXELS.ilog2() / 2);
+    let bits = pixels.ilog2().min(needed);
+    (1 << bits.div_ceil(2), 1 << (bits / 2))
+}
+
+/// Number of cells in the margin of a tile of that size.
+pub(super) fn margin_cells((width, height): (u32, u32)) -> u32 {
+    2 * (width / MARGIN_CELL + 2) + 2 * (height / MARGIN_CELL)
 }

@@ -1,0 +1,184 @@
+//! The camera pass: tiles, visible points, lobes, first hits, rays of final gathering.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::limits::MEDIA_WORDS;
+
+/// [`VisiblePoint::next_map`] of a point for which irradiance kept in cells will do.
+pub const BY_CELL: u32 = 1 << 16;
+
+/// A visible point: where a camera path hit a diffuse surface, and the outgoing light is sought.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct VisiblePoint {
+    /// Metres.
+    pub position: [f32; 3],
+    /// 0: no point. Otherwise the first map, from 1, that is not gathered here yet, or [`BY_CELL`].
+    pub next_map: u32,
+    /// Weight of the camera path times the BRDF, albedo/π: multiplies irradiance.
+    pub weight: [f32; 3],
+    /// Distance along `ng` by which the origin of a ray must be moved off the surface, metres.
+    pub offset: f32,
+    /// Geometric normal, unit, on the viewer's side.
+    pub ng: [f32; 3],
+    /// Media around the point: up to eight slots plus one, 8 bits each; 0 and 0 for none. All bits
+    /// are set where there are more.
+    pub media_low: u32,
+    /// Interpolated normal, unit, on the viewer's side of the geometric one.
+    pub ns: [f32; 3],
+    pub media_high: u32,
+    /// Unit, to the viewer.
+    pub view: [f32; 3],
+    /// Layers above the diffuse lobe, eight bits each: roots of the reflectances of a coat along
+    /// the normal and at grazing angles, strongest colour of the sheen and its roughness. 0 for
+    /// nothing.
+    pub above: u32,
+}
+
+/// Vertex of a camera path at which rough lobes are lit. Unit vectors are octahedral, see
+/// [`octahedral`](super::octahedral()); `ng` and `ns` as in [`VisiblePoint`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LobePoint {
+    /// Metres.
+    pub position: [f32; 3],
+    /// Same as in [`VisiblePoint`].
+    pub offset: f32,
+    /// Weight of the path before the lobe.
+    pub beta: [f32; 3],
+    /// n_b/n_a of rough glass, negative for a sheet of it; 0 for lobes that only reflect.
+    pub eta: f32,
+    pub ng: u32,
+    pub ns: u32,
+    /// Direction to the viewer.
+    pub view: u32,
+    pub tangent: u32,
+    /// Halves, as all that follow: reflectance along the normal; of rough glass the tint of what is
+    /// transmitted.
+    pub f0: [u32; 2],
+    /// Reflectance at grazing angles.
+    pub f90: [u32; 2],
+    /// Factor of light that is reflected more than once.
+    pub compensation: [u32; 2],
+    /// Colour and roughness of the sheen.
+    pub sheen: [u32; 2],
+    /// Widths of GGX along the tangent and across it.
+    pub alpha: u32,
+    /// Strength of the clear coat and its width.
+    pub clearcoat: u32,
+    /// Octahedral, as the others.
+    pub clearcoat_normal: u32,
+    pub pad: u32,
+}
+
+/// A camera, and the samples of one tile; see `shaders/lib/camera/camera_tile.wesl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct CameraTile {
+    pub position: [f32; 3],
+    pub seed: u32,
+    /// Vector from the centre of the picture, at distance 1, to its right edge.
+    pub right: [f32; 3],
+    pub width: u32,
+    /// Vector from the centre of the picture, at distance 1, to its upper edge.
+    pub up: [f32; 3],
+    pub height: u32,
+    /// Unit direction of view.
+    pub forward: [f32; 3],
+    /// Samples per pixel of the whole picture.
+    pub spp: u32,
+    /// Pixel of the tile's upper left corner.
+    pub first_column: u32,
+    pub first_row: u32,
+    /// First sample of each pixel, and samples of each pixel, in this tile.
+    pub first_sample: u32,
+    pub samples: u32,
+    pub pad0: u32,
+    /// Path slots per sample: reflection and refraction are both followed at its first
+    /// log2(branches) dielectric interfaces.
+    pub branches: u32,
+    /// Pixels of the tile, in Morton order.
+    pub pixels: u32,
+    /// 1: rays are parallel and `right`, `up` are in metres; 0: they start from `position`.
+    pub parallel: u32,
+    /// Radius of the lens, metres; 0 for a pinhole.
+    pub lens_radius: f32,
+    /// Distance of the plane of focus along the camera's axis, metres.
+    pub focus: f32,
+    /// Entries of the pixel filter's table, less 1.
+    pub filter_steps: u32,
+    /// Samples in the tile's margin. They follow those of its pixels.
+    pub margin: u32,
+    /// Media around the start of the rays, as in [`Light::media`](super::Light::media).
+    pub media: [u32; MEDIA_WORDS],
+    /// Depths along the axis between which the camera sees, metres.
+    pub near_depth: f32,
+    pub far_depth: f32,
+    /// Depth at which parallel rays start, metres, at most 0.
+    pub start_depth: f32,
+    /// Width of what a sample sees by rough lobes, metres, from which on irradiance kept in cells
+    /// will do; 0: nowhere.
+    pub cells_from: f32,
+}
+
+/// First hit of a camera sample.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FirstHit {
+    /// Interpolated normal towards the viewer; 0 if nothing was hit.
+    pub normal: [f32; 3],
+    /// Distance along the camera's axis, metres.
+    pub depth: f32,
+    pub albedo: [f32; 3],
+    /// 1 if something was hit.
+    pub alpha: f32,
+    /// Relative to the scene's centre, metres.
+    pub position: [f32; 3],
+    /// Index of the primitive in the scene; no number to add up.
+    pub id: u32,
+    /// First set of texture coordinates; 0 without textures.
+    pub uv: [f32; 2],
+    pub pad0: u32,
+    pub pad1: u32,
+}
+
+/// Rows of four numbers that a camera sample writes for the output layers: those of [`FirstHit`].
+pub const LAYER_ROWS: usize = 4;
+
+/// Arguments of `start_final_gather` and `sum_final_gather`: some rays of the chosen points.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct FinalStep {
+    /// Index of the first ray of each point, how many follow each other in this step, and how many
+    /// each point has in all.
+    pub first_ray: u32,
+    pub rays_now: u32,
+    pub rays: u32,
+    /// Chosen points.
+    pub chosen: u32,
+    /// 1: the rays of all points of the picture are one set of numbers, those of neighbours follow
+    /// each other. 0: the rays of a pixel are a set.
+    pub joint: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
+}
+
+/// Sums over the rays of final gathering of a point, by the directions from which light arrives.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ArrivingLight {
+    /// Directions weighted by radiance, and 1 by irradiance.
+    pub direction: [f32; 3],
+    pub light: f32,
+    /// Inverse distances to what was hit, 1/m.
+    pub nearness: f32,
+    pub pad0: f32,
+    pub pad1: f32,
+    pub pad2: f32,
+}
+
+/// Sums over a tile's samples of one pixel, by rows. The first row is the radiance, and the number
+/// of samples left out of it because the sum would not be finite with them. The others are the rows
+/// of the samples.
+pub type PixelSums = [[f32; 4]; LAYER_ROWS + 1];
