@@ -9,8 +9,11 @@
 //! | discs | 1/π, polar and concentric (the lens) | a uniform hemisphere seen from above |
 //! | linear | from a to b | from b to a |
 //! | sampler | one number of a set is uniform over the seeds, alone and with another dimension | a whole set is too even; a dimension with itself |
+//! | cells | host and kernels have the same hash | that of the next cell |
 
+use caustica::passes::estimate::cell_hash;
 use glam::{Vec3, vec3};
+use support::photons::Random;
 
 use super::{
     chi_square::{Deviate, SAMPLES, height_and_azimuth, of_unit_square},
@@ -122,4 +125,23 @@ fn scrambled_sobol_numbers_are_uniform_over_the_seeds() {
     // Control: the numbers of one set are far too uniform for independent ones.
     let set = of_unit_square(sampler((0..1 << 16).map(|index| [0, index, 0, 0])).iter().map(|n| [n[0], n[1]]));
     assert!(!set.fits(), "control: a whole set: {set:?}");
+}
+
+#[test]
+fn cells_have_one_hash_on_both_sides() {
+    let mut random = Random(9);
+    let mut coordinate = || (2e6 * random.unit() - 1e6).floor();
+    let rows: Vec<Row> =
+        (0..1000).map(|i| [[coordinate(), coordinate(), coordinate(), (i % 8) as f32], [0.0; 4]]).collect();
+    let found = Probe::new("probe_cell_hash").run(&rows);
+    let agree = |shift: i32| {
+        let right = |(row, hash): (&Row, &[f32; 4])| {
+            let [x, y, z, level] = row[0];
+            let own = cell_hash([x as i32 + shift, y as i32, z as i32], level as u32);
+            own == (hash[0] as u32) << 16 | hash[1] as u32
+        };
+        rows.iter().zip(&found).filter(|(row, hash)| right((row, hash))).count()
+    };
+    assert_eq!(agree(0), rows.len());
+    assert_eq!(agree(1), 0, "control: the next cell");
 }

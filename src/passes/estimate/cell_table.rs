@@ -134,7 +134,7 @@ fn placed(entries: &[IrradianceCell]) -> Vec<IrradianceCell> {
     let mut slots = vec![IrradianceCell::default(); (2 * entries.len()).next_power_of_two().max(2)];
     let mask = slots.len() - 1;
     for entry in entries {
-        let mut slot = hash(entry.coordinates, entry.level - 1) as usize & mask;
+        let mut slot = cell_hash(entry.coordinates, entry.level - 1) as usize & mask;
         while slots[slot].level != 0 {
             slot = (slot + 1) & mask;
         }
@@ -143,8 +143,9 @@ fn placed(entries: &[IrradianceCell]) -> Vec<IrradianceCell> {
     slots
 }
 
-/// Hash of a cell. Twin of `cell_hash` in `reuse_irradiance.wesl`.
-fn hash(coordinates: [i32; 3], level: u32) -> u32 {
+/// Hash of a cell. Twin of the function in `shaders/lib/core/cell_hash.wesl`.
+#[must_use]
+pub fn cell_hash(coordinates: [i32; 3], level: u32) -> u32 {
     let [x, y, z] = coordinates.map(|c| c as u32);
     let mut h = x.wrapping_mul(0x9e37_79b1)
         ^ y.wrapping_mul(0x85eb_ca77)

@@ -9,6 +9,8 @@ pub mod irradiance_records;
 mod query_order;
 pub mod share_estimates;
 
+#[doc(hidden)]
+pub use cell_table::cell_hash;
 pub use gather::{Gather, GatherOptions, GatherSettings};
 pub use irradiance_cache::IrradianceCache;
 pub use irradiance_records::{IrradianceRecords, Records, filter_footprint, record_spacing};
