@@ -12,6 +12,7 @@ mod pace;
 mod program;
 #[doc(hidden)]
 pub mod shaders;
+mod specialize;
 mod table;
 mod timer;
 

@@ -1,10 +1,11 @@
 //! A kernel's program: shader and constants, compiled once.
 
-use std::sync::OnceLock;
+use std::{borrow::Cow, sync::OnceLock};
 
 use super::{
     chunks::CHUNK_GROUP,
     shaders::{BindingKind, Shader},
+    specialize::specialized,
 };
 
 /// A kernel with its constants, compiled by the first thread that comes: one of the compiler's, or
@@ -40,9 +41,15 @@ impl Program {
     pub fn compiled(&self) -> &Compiled {
         self.compiled.get_or_init(|| {
             let (device, shader) = (&self.device, self.shader);
+            let specialized = specialized(shader.wgsl, &self.constants);
+            // Without constants that the module no longer has.
+            let constants = if specialized.is_some() { &[][..] } else { &self.constants };
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(shader.stem),
-                source: wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
+                source: match specialized {
+                    Some(module) => wgpu::ShaderSource::Naga(Cow::Owned(module)),
+                    None => wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
+                },
             });
             let layouts: Vec<_> = (0..CHUNK_GROUP).map(|g| group_layout(device, shader, g)).collect();
             let chunk = self.can_be_cut().then_some(&self.chunk_layout);
@@ -57,7 +64,7 @@ impl Program {
                 module: &module,
                 entry_point: Some(shader.stem),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: &self.constants,
+                    constants,
                     zero_initialize_workgroup_memory: false,
                 },
                 cache: None,
