@@ -14,9 +14,17 @@ use wgpu::naga::{
 pub(super) fn specialized(wgsl: &str, constants: &[(&str, f64)]) -> Option<Module> {
     let mut module = parse_str(&with_constants(wgsl, constants)?).ok()?;
     let global = |constant: &Constant| literal_bool(&module.global_expressions[constant.init]);
-    let flags: HashMap<_, _> = module.constants.iter().filter_map(|(h, c)| Some((h, global(c)?))).collect();
-    module.functions.iter_mut().for_each(|(_, function)| prune(function, &flags));
-    module.entry_points.iter_mut().for_each(|entry| prune(&mut entry.function, &flags));
+    let constants = module.constants.iter().filter_map(|(h, c)| Some((h, global(c)?))).collect();
+    let mut fixed = Fixed { constants, functions: HashMap::new() };
+    // Functions come before those that call them.
+    for (handle, function) in module.functions.iter_mut() {
+        if let Some(value) = prune(function, &fixed) {
+            fixed.functions.insert(handle, value);
+        }
+    }
+    for entry in &mut module.entry_points {
+        prune(&mut entry.function, &fixed);
+    }
     compact(&mut module, KeepUnused::No);
     Some(module)
 }
@@ -40,6 +48,12 @@ fn with_constants(wgsl: &str, constants: &[(&str, f64)]) -> Option<String> {
     Some(wgsl.lines().map(fixed).collect::<Option<Vec<_>>>()?.join("\n"))
 }
 
+/// Conditions of one value: constants, and results of functions.
+struct Fixed {
+    constants: HashMap<Handle<Constant>, bool>,
+    functions: HashMap<Handle<Function>, bool>,
+}
+
 fn literal_bool(expression: &Expression) -> Option<bool> {
     match expression {
         Expression::Literal(Literal::Bool(value)) => Some(*value),
@@ -48,29 +62,32 @@ fn literal_bool(expression: &Expression) -> Option<bool> {
 }
 
 /// Leaves out branches that are never taken, and those that a variable decides that they fix.
-fn prune(function: &mut Function, flags: &HashMap<Handle<Constant>, bool>) {
+/// Returns the result of the function, if it has one alone.
+fn prune(function: &mut Function, fixed: &Fixed) -> Option<bool> {
     // Names would keep alive what they stand for.
     function.named_expressions.clear();
     let mut variables = HashMap::new();
     loop {
         let body = std::mem::take(&mut function.body);
-        function.body = Pruning { function, flags, variables: &variables }.block(body);
-        let found = fixed_variables(function, flags, &variables);
+        function.body = Pruning { function, fixed, variables: &variables }.block(body);
+        let (found, result) = fixed_variables(&Pruning { function, fixed, variables: &variables });
         if found.len() == variables.len() {
-            return;
+            return result;
         }
         variables = found;
     }
 }
 
-/// Variables of the language's front end that hold `a && b` or `a || b`, of one value. They are
-/// the ones without a name that are stored once.
-fn fixed_variables(
-    function: &Function,
-    flags: &HashMap<Handle<Constant>, bool>,
-    known: &HashMap<Handle<LocalVariable>, bool>,
-) -> HashMap<Handle<LocalVariable>, bool> {
-    let pruning = Pruning { function, flags, variables: known };
+/// The value that all have, if they have one.
+fn common(values: &[Option<bool>]) -> Option<bool> {
+    let (first, rest) = values.split_first()?;
+    first.filter(|_| rest.iter().all(|value| value == first))
+}
+
+/// Variables of the language's front end that hold `a && b` or `a || b`, those without a name,
+/// where all that is stored has one value; and what the function returns, if that has.
+fn fixed_variables(pruning: &Pruning) -> (HashMap<Handle<LocalVariable>, bool>, Option<bool>) {
+    let (function, mut results) = (pruning.function, Vec::new());
     let mut stores: HashMap<Handle<LocalVariable>, Vec<Option<bool>>> = HashMap::new();
     let mut waiting = vec![&function.body];
     while let Some(block) = waiting.pop() {
@@ -85,6 +102,7 @@ fn fixed_variables(
                         stores.entry(variable).or_default().push(pruning.value(*value));
                     }
                 }
+                Statement::Return { value } => results.push(value.and_then(|value| pruning.value(value))),
                 _ => {}
             }
         }
@@ -93,16 +111,13 @@ fn fixed_variables(
         let variable = &function.local_variables[variable];
         variable.name.is_none() && variable.init.is_none()
     };
-    let fixed = stores.into_iter().filter_map(|(variable, values)| match values[..] {
-        [Some(value)] if is_of_front_end(variable) => Some((variable, value)),
-        _ => None,
-    });
-    fixed.collect()
+    let ours = stores.into_iter().filter(|(variable, _)| is_of_front_end(*variable));
+    (ours.filter_map(|(variable, values)| Some((variable, common(&values)?))).collect(), common(&results))
 }
 
 struct Pruning<'a> {
     function: &'a Function,
-    flags: &'a HashMap<Handle<Constant>, bool>,
+    fixed: &'a Fixed,
     variables: &'a HashMap<Handle<LocalVariable>, bool>,
 }
 
@@ -111,7 +126,8 @@ impl Pruning<'_> {
     fn value(&self, condition: Handle<Expression>) -> Option<bool> {
         match self.function.expressions[condition] {
             Expression::Literal(Literal::Bool(value)) => Some(value),
-            Expression::Constant(constant) => self.flags.get(&constant).copied(),
+            Expression::Constant(constant) => self.fixed.constants.get(&constant).copied(),
+            Expression::CallResult(function) => self.fixed.functions.get(&function).copied(),
             Expression::Unary { op: UnaryOperator::LogicalNot, expr } => Some(!self.value(expr)?),
             Expression::Load { pointer } => match self.function.expressions[pointer] {
                 Expression::LocalVariable(variable) => self.variables.get(&variable).copied(),
@@ -199,17 +215,19 @@ mod tests {
             @group(0) @binding(1) var<storage, read> far: array<f32>;
             fn costly(x: f32) -> f32 { return far[u32(x)] + 1.0; }
             fn early(x: f32) -> f32 { if (!ON) { return x; } return costly(costly(x)); }
+            fn is_large(x: f32) -> bool { return x > 3.0 && ON; }
             @compute @workgroup_size(1) fn main() {
                 let big = ON && out[0] > 1.0 || COUNT == 7u;
                 if (big && out[1] > 2.0) { out[2] = costly(out[1]); }
+                if (is_large(out[5])) { out[5] = costly(1.0); }
                 for (var i = 0u; i < COUNT; i++) { out[3] += early(out[4]); }
             }";
         let text = text.replace("\n            ", "\n");
         let [off, on, seven] = [vec![], vec![("ON", 1.0)], vec![("COUNT", 7.0)]]
             .map(|constants| specialized(&text, &constants).expect("it is read"));
-        assert_eq!((off.functions.len(), off.global_variables.len()), (1, 1), "{off:#?}");
-        assert_eq!((on.functions.len(), on.global_variables.len()), (2, 2), "control: all of it is used");
-        assert_eq!((seven.functions.len(), seven.global_variables.len()), (2, 2), "control: by a number");
+        assert_eq!((off.functions.len(), off.global_variables.len()), (2, 1), "{off:#?}");
+        assert_eq!((on.functions.len(), on.global_variables.len()), (3, 2), "control: all of it is used");
+        assert_eq!((seven.functions.len(), seven.global_variables.len()), (3, 2), "control: by a number");
         assert!(size(&off) < size(&seven) && size(&seven) < size(&on));
         assert!(specialized("override A: vec2f = 1;", &[("A", 1.0)]).is_none() && specialized("fn", &[]).is_none());
     }
