@@ -44,6 +44,8 @@ pub struct Gpu {
     pub(super) several_groups: bool,
     /// Whether searches run some queries ahead of the others: the kernels' override `HAS_PILOTS`.
     pub(crate) has_pilots: bool,
+    /// Maximum number of nodes and primitives that a ray visits, at least [`SHORT_LOOPS`].
+    pub(crate) trace_budget: u32,
     faults: Faults,
 }
 
@@ -52,6 +54,12 @@ pub struct Gpu {
 const MAX_LANES: u32 = crate::layout::CELL_FAN;
 /// Minimum number of lanes of a group.
 const MIN_LANES: u32 = super::adapter::NEEDED_SUBGROUP;
+
+/// [`Gpu::trace_budget`] of software: Lavapipe ends loops silently after 65,535 iterations of the 8
+/// invocations of a subgroup.
+pub const SHORT_LOOPS: u32 = 8000;
+/// That of others: a third of a second, where each visit waits for memory.
+const LONG_LOOPS: u32 = 1 << 20;
 
 /// [`Gpu::batch`] of an adapter of that kind. A tile takes about half a kilobyte a point, and a
 /// search as much. Software is busy with few points, but each wait for it leaves cores idle.
@@ -101,6 +109,7 @@ impl Gpu {
         let several_groups = most > lanes;
         let batch = batch_of(chosen.kind);
         let has_pilots = chosen.kind == "software";
+        let trace_budget = if chosen.kind == "software" { SHORT_LOOPS } else { LONG_LOOPS };
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);
         let memory = Arc::<MemoryCount>::default();
         // Memory of software is the host's, which gives more than it has and then ends the process.
@@ -121,6 +130,7 @@ impl Gpu {
             lanes,
             several_groups,
             has_pilots,
+            trace_budget,
             faults,
         })
     }

@@ -18,7 +18,7 @@ mod timer;
 
 pub use adapter::{AdapterReport, NO_ADAPTER, adapters};
 pub use buffer::MemoryCount;
-pub use device::Gpu;
+pub use device::{Gpu, SHORT_LOOPS};
 pub use pace::{MAX_PER_DISPATCH, Pacing};
 
 // For the passes, tests and benches; their types are those of the graphics library.

@@ -11,7 +11,7 @@ use crate::{
     emitters::light_table::LightTable,
     error::Result,
     gpu::{
-        Buffer, Gpu, Kernel, Table,
+        Buffer, Gpu, Kernel, SHORT_LOOPS, Table,
         shaders::{Shader, shader},
     },
     layout::{self, ALPHA_BIT, CONTACT_BIT, Primitive, RANK_SHIFT, SLOT_SHIFT, SPHERE_BIT, TRANSMITS_BIT},
@@ -30,6 +30,8 @@ pub struct SceneBuffers {
     has_spheres: bool,
     /// Maximum number of deferred children in a traversal.
     stack: usize,
+    /// Nodes and primitives: no ray visits more.
+    visits: u32,
     /// Ranks of primitives that lie in each other.
     contacts: Arc<[Option<u32>]>,
     /// Some solid absorbs light.
@@ -97,6 +99,7 @@ impl SceneBuffers {
             single_scattering: scene.options.single_scattering,
             has_dispersion: solids.media.iter().any(|m| m.dispersion > 0.0),
             media: Table::new(gpu, "media", &media)?,
+            visits: (bvh.nodes.len() + bvh.primitives.len()) as u32,
             contacts,
             has_lobes: scene.has_lobes(),
             splits: scene
@@ -165,6 +168,9 @@ impl SceneBuffers {
             ("PRIMITIVE_SPLIT", split_or_none(self.primitives.split)),
         ];
         overrides.extend_from_slice(others);
+        // After those of the caller, which has the say. Few values, so that few kernels are compiled.
+        let budget = self.visits.next_power_of_two().clamp(SHORT_LOOPS, gpu.trace_budget);
+        overrides.push(("TRACE_BUDGET", f64::from(budget)));
         let [light_nodes, pixels, cells, rows] = self.lights.tables();
         let own = [("normals", &self.normals), ("media_table", &self.media), light_nodes, pixels, cells, rows];
         let tables = [&own[..], &self.materials.tables()].concat();

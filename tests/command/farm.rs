@@ -2,6 +2,7 @@
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
+//! | manifest | `kubernetes-validate --strict` accepts the manifest | a member of another name |
 //! | engines | GNU parallel, Open Job Description and Slurm give the bytes of one run, whatever is killed or requeued meanwhile | fewer passes |
 
 use std::{
@@ -122,6 +123,25 @@ fn open_job_description_renders_what_one_machine_does() {
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success() && said.contains("openjd_progress: 100.0"), "{said}");
     assert_same(folder.path(), "out.exr");
+}
+
+#[test]
+fn the_kubernetes_manifest_is_valid() {
+    if left_out() {
+        return;
+    }
+    let manifest = fs::read_to_string(format!("{ROOT}/deploy/kubernetes/job.yaml")).expect("it is there");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("job.yaml");
+    let is_valid = |text: &str| {
+        fs::write(&path, text).expect("it can be written");
+        let mut run = Command::new(format!("{ROOT}/target/openjd/bin/kubernetes-validate"));
+        let output = run.arg("--strict").arg(&path).output();
+        output.expect("scripts/install-farm-tools installs kubernetes-validate").status.success()
+    };
+    assert!(is_valid(&manifest));
+    let wrong = manifest.replace("backoffLimitPerIndex", "backoffLimitPerTask");
+    assert!(wrong != manifest && !is_valid(&wrong), "control");
 }
 
 #[test]
