@@ -168,7 +168,8 @@ impl SceneBuffers {
             ("PRIMITIVE_SPLIT", split_or_none(self.primitives.split)),
         ];
         overrides.extend_from_slice(others);
-        // After those of the caller, which has the say. Few values, so that few kernels are compiled.
+        // After those of the caller, which has the say. Few values, so that few kernels are
+        // compiled.
         let budget = self.visits.next_power_of_two().clamp(SHORT_LOOPS, gpu.trace_budget);
         overrides.push(("TRACE_BUDGET", f64::from(budget)));
         let [light_nodes, pixels, cells, rows] = self.lights.tables();
