@@ -12,7 +12,7 @@ use caustica::{
     gpu::Gpu,
     image::read_exr,
     scene::{LoadOptions, Scene},
-    settings::{Mode, Settings},
+    settings::{Mode, Quality, Settings},
     study::{self, Finer, Look, Plan, Reference, Results, Subject},
 };
 
@@ -89,7 +89,9 @@ fn verdict(results: &Results, folder: &Path) -> Result<()> {
 fn plan(args: &StudyArgs) -> Result<Plan> {
     let options = &args.options;
     let look = Look { exposure: options.exposure.of_all(), tonemap: options.tonemap.into() };
-    let settings = options.settings(Settings::default());
+    // Final gathering is studied as pictures have it.
+    let base = if args.gather.is_empty() { Settings::default() } else { Quality::Normal.settings() };
+    let settings = options.settings(base);
     if args.preset == Some(PresetArg::Report) {
         if options.loading.options() != LoadOptions::default() {
             let problem = "has scenes of its own, which --scene, --variant, --texture-size, --allow-outside and \
@@ -123,6 +125,13 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
     let settings = settings.with(|s| s.picture.size = size);
     let subject = Subject { scene, reference };
     let repeats = args.repeat.unwrap_or(1);
+    if !args.gather.is_empty() {
+        if let Some(mode) = modes.iter().find(|mode| !mode.gathers_finally()) {
+            let problem = "has no final gathering; hybrid and indirect-photons have".to_owned();
+            return Err(Error::Setting { name: "--modes", value: mode.name().to_owned(), problem });
+        }
+        return Ok(study::gather_grid(subject, &settings, &modes, &args.photons, &args.gather, repeats, look));
+    }
     Ok(study::grid(subject, &settings, &modes, &args.photons, &args.neighbors, repeats, look))
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use caustica::settings::{EstimateSettings, Range};
+use caustica::settings::{EstimateSettings, PhotonSettings, Range};
 use clap::ValueEnum;
 
 use super::{
@@ -21,6 +21,7 @@ interrupted study goes on where it stopped. Exits with 1 when a cell fails; the 
 Examples:
   caustica study scene.glb -o study --photons 1k,10k,100k -k 1,10,100 --size 256x256
   caustica study scene.glb -o study --photons 100k -k 10,50 --modes 0,1 --repeat 4 --reference auto
+  caustica study scene.glb -o study --photons 20k,200k --gather 0,16,64,256 --reference scene.exr
   caustica study --preset report -o report";
 
 #[derive(Debug, clap::Args)]
@@ -42,8 +43,17 @@ pub struct StudyArgs {
     #[arg(help = format!("Neighbours in the radiance estimate, {}: several, as 1,10,100", EstimateSettings::NEIGHBORS))]
     #[arg(short = 'k', long, value_name = "K,K…", value_delimiter = ',', help_heading = "Study")]
     #[arg(value_parser = whole(EstimateSettings::NEIGHBORS))]
-    #[arg(allow_hyphen_values = true, required_unless_present = "preset", conflicts_with = "preset")]
+    #[arg(allow_hyphen_values = true, required_unless_present_any = ["preset", "gather"])]
+    #[arg(conflicts_with_all = ["preset", "gather"])]
     pub neighbors: Vec<u32>,
+
+    #[arg(help = format!(
+        "Rays of final gathering in place of neighbours, {}: several, as 16,64,256; 0 is the estimate at each point",
+        PhotonSettings::FINAL_GATHER
+    ))]
+    #[arg(long, value_name = "R,R…", value_delimiter = ',', value_parser = whole(PhotonSettings::FINAL_GATHER))]
+    #[arg(allow_hyphen_values = true, conflicts_with = "preset", help_heading = "Study")]
+    pub gather: Vec<u32>,
 
     /// Modes by name or number: several, as 0,1 or hybrid,photons
     #[arg(long, value_name = "MODE,MODE…", value_delimiter = ',', value_parser = ModeParser, default_value = "hybrid")]

@@ -13,6 +13,7 @@ fn row(photons: u32, neighbors: u32) -> Row {
         mode: Mode::Hybrid,
         photons,
         neighbors,
+        final_gather: 0,
         seed: 0,
         repeats: 2,
         width: 8,

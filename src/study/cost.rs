@@ -50,6 +50,9 @@ pub(super) fn work(settings: &Settings) -> f64 {
     let samples = f64::from(width) * f64::from(height) * f64::from(settings.picture.spp);
     let gather =
         if settings.photons.mode.traces_photons() { 30.0 + f64::from(settings.estimate.neighbors) } else { 0.0 };
+    // Records at spaced points, or rays that the samples of a pixel share.
+    let spacing = f64::from(settings.estimate.gather_spacing.max(1)).powi(2);
+    let gather = gather + f64::from(settings.photons.final_gather) / spacing;
     1e5 + samples * (10.0 + gather) + f64::from(settings.photons.global)
 }
 

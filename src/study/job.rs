@@ -32,6 +32,7 @@ pub(super) fn finer_settings(settings: &Settings, finer: Finer, mode: Mode) -> V
             s.photons.mode = mode;
             s.photons.global = finer.photons;
             s.photons.caustic = finer.photons;
+            s.photons.final_gather = 0;
             s.estimate.neighbors = finer.neighbors;
             s.picture.spp = finer.spp;
             s.photons.seed = seed(pass);

@@ -34,6 +34,8 @@ pub struct Row {
     pub photons: u32,
     /// Photons per radiance estimate, k.
     pub neighbors: u32,
+    /// Rays of final gathering at each point; 0: estimates at the points themselves.
+    pub final_gather: u32,
     /// Seed of the first repeat.
     pub seed: u32,
     /// Number of repeats, each with its own seed.
@@ -99,20 +101,26 @@ impl Row {
     pub fn name(&self) -> String {
         let mode = self.mode.name();
         if self.mode.traces_photons() {
-            format!("{}, {mode}, n = {}, k = {}", self.scene, short(self.photons), self.neighbors)
+            let rays = rays(self.final_gather);
+            format!("{}, {mode}, n = {}, k = {}{rays}", self.scene, short(self.photons), self.neighbors)
         } else {
             format!("{}, {mode}", self.scene)
         }
     }
 }
 
+fn rays(count: u32) -> String {
+    if count > 0 { format!(", {count} rays") } else { String::new() }
+}
+
 /// Description of a render.
 pub(super) fn name(scene: &str, s: &Settings) -> String {
     format!(
-        "{scene}, {}, n = {}, k = {}, seed {}",
+        "{scene}, {}, n = {}, k = {}{}, seed {}",
         s.photons.mode.name(),
         short(s.photons.global),
         s.estimate.neighbors,
+        rays(s.photons.final_gather),
         s.photons.seed
     )
 }
@@ -132,6 +140,7 @@ pub(super) fn measure(
         mode: settings.photons.mode,
         photons: settings.photons.global,
         neighbors: settings.estimate.neighbors,
+        final_gather: settings.photons.final_gather,
         seed: settings.photons.seed,
         repeats: combination.repeats,
         width: 0,

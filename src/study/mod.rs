@@ -34,7 +34,7 @@ mod write;
 
 pub use claims::{Claim, Verdict};
 pub use cost::{State, Watch};
-pub use grid::grid;
+pub use grid::{gather_grid, grid};
 pub use measure::{MapRow, Row};
 pub use plan::{Combination, Figure, Finer, Look, Plan, Reference, Subject};
 pub use preset::report;

@@ -20,11 +20,12 @@ const TEMPLATE: &str = include_str!("page.html");
 type Column = (&'static str, fn(&Row) -> Value);
 
 /// The columns, in order.
-const COLUMNS: [Column; 14] = [
+const COLUMNS: [Column; 15] = [
     ("scene", |r| Value::text(&r.scene)),
     ("mode", |r| Value::text(r.mode.name())),
     ("n", |r| Value::of_photons(r, short(r.photons), r.photons)),
     ("k", |r| Value::of_photons(r, r.neighbors.to_string(), r.neighbors)),
+    ("rays", |r| Value::of_photons(r, r.final_gather.to_string(), r.final_gather)),
     ("gather", |r| Value::number(Some(r.seconds.gather).filter(|_| r.error.is_none()))),
     ("total", |r| Value::number(Some(r.seconds.total).filter(|_| r.error.is_none()))),
     ("stored", |r| Value::text(&r.global.stored.to_string())),

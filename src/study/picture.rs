@@ -2,7 +2,7 @@
 
 use super::{cells::Measured, radii::Counts};
 use crate::{
-    error::{Error, Result},
+    error::Result,
     image::Frame,
     layout::Gathered,
     map_kind::{ByKind, MapKind},
@@ -21,18 +21,14 @@ impl Observer for Radii {
     }
 }
 
-/// Renders one picture of the maps and counts the radii of its estimates. No two visible points
-/// share an estimate.
+/// Renders one picture of the maps and counts the radii of the estimates at its visible points. No
+/// two of them share an estimate.
 pub(super) fn picture(
     session: &Session,
     maps: &PhotonMaps,
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<(Frame, Measured)> {
-    if maps.settings().final_gather > 0 {
-        let (name, value) = ("photons.final_gather", maps.settings().final_gather.to_string());
-        return Err(Error::Setting { name, value, problem: "is not studied".to_string() });
-    }
     let mut radii = Radii::default();
     let (estimate, picture) = (&settings.estimate, &settings.picture);
     let (film, stats) = session.observed_film(maps, estimate, picture, Some(&mut radii), progress)?;

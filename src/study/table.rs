@@ -9,11 +9,12 @@ use crate::stats::DeviceStats;
 type Column = (&'static str, fn(&Row) -> String);
 
 /// The columns of the CSV file, in order. Seconds, metres and W/(m² sr).
-pub(super) const COLUMNS: [Column; 38] = [
+pub(super) const COLUMNS: [Column; 39] = [
     ("scene", |r| r.scene.clone()),
     ("mode", |r| r.mode.name().to_string()),
     ("photons", |r| of_photons(r, r.photons)),
     ("neighbors", |r| of_photons(r, r.neighbors)),
+    ("final_gather", |r| of_photons(r, r.final_gather)),
     ("seed", |r| r.seed.to_string()),
     ("repeats", |r| r.repeats.to_string()),
     ("width", |r| r.width.to_string()),

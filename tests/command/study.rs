@@ -6,7 +6,7 @@ use caustica::{
     image::{Frame, difference, flip, read_exr},
     progress::Silent,
     scene::{Environment, Scene},
-    settings::{Mode, Settings},
+    settings::{Mode, Quality, Settings},
     study::{self, Combination, Finer, Look, Plan, Reference, Results, Subject},
 };
 use glam::Vec3;
@@ -48,6 +48,33 @@ fn run(plan: &Plan, folder: &Path) -> Results {
 /// Numbers of cells rendered now and reused.
 fn counts(results: &Results) -> (usize, usize) {
     (results.rendered, results.kept)
+}
+
+#[test]
+fn rays_of_final_gathering_are_studied_against_photons() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let finer = Reference::Finer(Finer { photons: 50_000, neighbors: 20, spp: 16, passes: 4 });
+    let subject = Subject { scene: room(), reference: finer };
+    let settings = Quality::Normal.settings().with(|s| s.picture.size = Some((24, 16)));
+    let modes = [Mode::Hybrid];
+    let plan = study::gather_grid(subject, &settings, &modes, &[2000, 10_000], &[0, 1, 64], 1, Look::default());
+    let results = run(&plan, folder.path());
+    assert_eq!((counts(&results), results.rows.len()), ((10, 0), 6));
+    let error = |n, rays| {
+        let row = results.rows.iter().find(|row| (row.photons, row.final_gather) == (n, rays)).expect("a row");
+        assert!(row.error.is_none() && row.seconds.gather > 0.0, "{row:?}");
+        row.rel_mse.expect("measured")
+    };
+    for n in [2000, 10_000] {
+        assert!(error(n, 64) < 0.7 * error(n, 0), "{n} photons: {} of {}", error(n, 64), error(n, 0));
+        assert!(error(n, 1) > 1.5 * error(n, 64), "control: one ray: {}", error(n, 1));
+    }
+    let written = study::write(&plan, &results, folder.path()).expect("it can be written");
+    for name in ["cost-against-rays.svg", "error-over-n-and-rays.svg", "report.html"] {
+        assert!(written.iter().any(|path| path.ends_with(name)), "{name} of {written:?}");
+    }
+    let csv = fs::read_to_string(folder.path().join("study.csv")).expect("it is there");
+    assert!(csv.lines().next().is_some_and(|line| line.contains(",final_gather,")), "{csv}");
 }
 
 /// Files of the cells with that extension, sorted.
