@@ -23,8 +23,21 @@ const MAX_SINE: f64 = 1e-3;
 /// Fraction of the size of the smaller triangle by which two must overlap.
 const MIN_OVERLAP: f64 = 1e-4;
 
+/// Surfaces that lie in each other.
+#[derive(Clone, Debug)]
+pub struct Contacts {
+    /// The rank of each primitive of the hierarchy that is in contact with another one; `None` for
+    /// others. Of opaque surfaces in one place the one of the lowest rank is seen, 0 to
+    /// [`MAX_RANK`]: one with holes before one without, then that of the smaller object, as a
+    /// picture on a wall, then the first of the scene.
+    pub ranks: Vec<Option<u32>>,
+    /// Warning for lamps that lie in each other.
+    pub warning: Option<String>,
+}
+
 /// The triangles of one material in one object, or its spheres.
 struct Patch {
+    object: u32,
     material: u32,
     area: f64,
 }
@@ -43,7 +56,7 @@ impl Patches {
         let number = |(key, area): ((u32, u32), f64)| {
             let number = *known.entry(key).or_insert(all.len());
             if number == all.len() {
-                all.push(Patch { material: key.1, area: 0.0 });
+                all.push(Patch { object: key.0, material: key.1, area: 0.0 });
             }
             all[number].area += area;
             number as u32
@@ -72,6 +85,26 @@ impl Patches {
         below
     }
 
+    /// Warning for the first pair of lamps that lie in each other: one is seen there, but both send
+    /// out light.
+    fn warning(&self, scene: &Scene, pairs: &BTreeSet<(u32, u32)>) -> Option<String> {
+        let material = |patch: u32| &scene.materials[self.all[patch as usize].material as usize];
+        let shines = |patch: u32| material(patch).emission != Vec3::ZERO;
+        let mut lamps = pairs.iter().filter(|(a, b)| a <= b && shines(*a) && shines(*b));
+        let (a, b) = lamps.next()?;
+        let name = |patch: &u32| {
+            let object = scene.objects.get(self.all[*patch as usize].object as usize);
+            object.map_or_else(|| material(*patch).name.clone(), Clone::clone)
+        };
+        let others = lamps.count();
+        let more = if others > 0 { format!(", and {others} more such pairs") } else { String::new() };
+        Some(format!(
+            "{} and {}{more}: their emissive surfaces lie in each other in part; there one is seen, but both send out light",
+            name(a),
+            name(b)
+        ))
+    }
+
     /// Ranks of patches that lie in each other, given in both orders: one more than the highest
     /// rank among those that come before.
     fn ranks(&self, scene: &Scene, pairs: &BTreeSet<(u32, u32)>) -> BTreeMap<u32, u32> {
@@ -93,12 +126,9 @@ impl Patches {
     }
 }
 
-/// The rank of each primitive of the hierarchy that is in contact with another one; `None` for
-/// others. Of opaque surfaces in one place the one of the lowest rank is seen, 0 to [`MAX_RANK`]:
-/// one with holes before one without, then that of the smaller object, as a picture on a wall, then
-/// the first of the scene.
+/// Finds the contacts of a scene's surfaces.
 #[must_use]
-pub fn contacts(scene: &Scene, bvh: &Bvh) -> Vec<Option<u32>> {
+pub fn contacts(scene: &Scene, bvh: &Bvh) -> Contacts {
     let patches = Patches::new(scene);
     let search = Search { bvh, patches: &patches, of_nodes: patches.of_nodes(bvh) };
     // A patch that neither shines nor lets light through may be met in any of its parts.
@@ -120,10 +150,12 @@ pub fn contacts(scene: &Scene, bvh: &Bvh) -> Vec<Option<u32>> {
         .collect();
     let patch_of = |id: u32| patches.of_ids[id as usize];
     let pair = |(id, touched): &(u32, Vec<u32>)| touched.iter().map(|t| (patch_of(*id), *t)).collect::<Vec<_>>();
-    let ranks = patches.ranks(scene, &found.iter().flat_map(pair).collect());
+    let pairs: BTreeSet<(u32, u32)> = found.iter().flat_map(pair).collect();
+    let ranks = patches.ranks(scene, &pairs);
     let mut of_ids = vec![None; patches.of_ids.len()];
     found.iter().for_each(|(id, _)| of_ids[*id as usize] = ranks.get(&patch_of(*id)).copied());
-    bvh.primitives.iter().map(|p| of_ids.get(p.id as usize).copied().flatten()).collect()
+    let ranks = bvh.primitives.iter().map(|p| of_ids.get(p.id as usize).copied().flatten()).collect();
+    Contacts { ranks, warning: patches.warning(scene, &pairs) }
 }
 
 /// The hierarchy as it is searched for contacts.
@@ -310,7 +342,7 @@ mod tests {
             ..Scene::default()
         };
         let bvh = Bvh::build(&scene);
-        let marks = contacts(&scene, &bvh);
+        let marks = contacts(&scene, &bvh).ranks;
         let mut by_id = vec![false; triangles.len() + spheres.len()];
         let listed = bvh.primitives.iter().zip(marks).filter(|(p, _)| p.id != FILLER);
         listed.for_each(|(p, rank)| by_id[p.id as usize] = rank.is_some());
@@ -350,7 +382,7 @@ mod tests {
         let scene = Scene { materials, triangles: triangles.iter().map(triangle).collect(), ..Scene::default() };
         let bvh = Bvh::build(&scene);
         let mut by_id = vec![None; triangles.len()];
-        let listed = bvh.primitives.iter().zip(contacts(&scene, &bvh)).filter(|(p, _)| p.id != FILLER);
+        let listed = bvh.primitives.iter().zip(contacts(&scene, &bvh).ranks).filter(|(p, _)| p.id != FILLER);
         listed.for_each(|(p, rank)| by_id[p.id as usize] = rank);
         by_id
     }

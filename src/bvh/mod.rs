@@ -18,7 +18,7 @@ mod tests;
 mod widen;
 
 pub use build::{Bvh, FILLER};
-pub use contacts::contacts;
+pub use contacts::{Contacts, contacts};
 pub use media::{Media, MediaProbe};
 pub use node::{BvhChild, MAX_LEAF, WIDTH};
 pub use ray::RayHit;

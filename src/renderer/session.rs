@@ -107,6 +107,7 @@ impl<'a> Session<'a> {
         };
         let solids = &buffers[0].solids;
         stats.warnings.extend(solids.warning());
+        stats.warnings.extend(buffers[0].contact_warning());
         let probe = MediaProbe::new(scene, &bvh, solids);
         let camera_media: Vec<Media> =
             scene.cameras.iter().map(|camera| probe.at(camera.position.as_dvec3())).collect();

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::{light_buffers::LightBuffers, material_buffers::MaterialBuffers};
 use crate::{
-    bvh::{Bvh, MediaProbe, contacts},
+    bvh::{Bvh, Contacts, MediaProbe, contacts},
     emitters::light_table::LightTable,
     error::Result,
     gpu::{
@@ -33,7 +33,7 @@ pub struct SceneBuffers {
     /// Nodes and primitives: no ray visits more.
     visits: u32,
     /// Ranks of primitives that lie in each other.
-    contacts: Arc<[Option<u32>]>,
+    contacts: Arc<Contacts>,
     /// Some solid absorbs light.
     has_absorption: bool,
     has_dispersion: bool,
@@ -84,13 +84,13 @@ impl SceneBuffers {
         };
         let media: Vec<_> = solids.media.iter().map(row).collect();
         let lights = LightBuffers::new(gpu, (scene, bvh), &MediaProbe::new(scene, bvh, &solids), settings)?;
-        let contacts: Arc<[_]> = contacts(scene, bvh).into();
+        let contacts = Arc::new(contacts(scene, bvh));
         Ok(Self {
             nodes: Arc::new(gpu.storage_with("bvh nodes", &bvh.nodes)?),
             primitives: Halves::new::<Primitive>(
                 gpu,
                 "primitives",
-                &marked(&bvh.primitives, scene, &solids, &contacts, &lights.table),
+                &marked(&bvh.primitives, scene, &solids, &contacts.ranks, &lights.table),
             )?,
             normals: Table::new(gpu, "normals", &bvh.normals)?,
             materials: MaterialBuffers::new(gpu, scene, settings.unit)?,
@@ -120,7 +120,7 @@ impl SceneBuffers {
     /// As [`Self::new`].
     pub fn relit(&self, gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         let lights = LightBuffers::new(gpu, (scene, bvh), &MediaProbe::new(scene, bvh, &self.solids), settings)?;
-        let primitives = marked(&bvh.primitives, scene, &self.solids, &self.contacts, &lights.table);
+        let primitives = marked(&bvh.primitives, scene, &self.solids, &self.contacts.ranks, &lights.table);
         Ok(Self {
             nodes: Arc::clone(&self.nodes),
             primitives: Halves::new::<Primitive>(gpu, "primitives", &primitives)?,
@@ -152,7 +152,7 @@ impl SceneBuffers {
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
-            ("HAS_CONTACTS", f64::from(u8::from(self.contacts.iter().any(Option::is_some)))),
+            ("HAS_CONTACTS", f64::from(u8::from(self.contacts.ranks.iter().any(Option::is_some)))),
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_LAYERS", f64::from(u8::from(self.materials.has_layers))),
             ("HAS_FINISHES", f64::from(u8::from(self.materials.has_finishes))),
@@ -176,6 +176,12 @@ impl SceneBuffers {
         let own = [("normals", &self.normals), ("media_table", &self.media), light_nodes, pixels, cells, rows];
         let tables = [&own[..], &self.materials.tables()].concat();
         Kernel::of(gpu, shader, &overrides).with_tables(&tables)
+    }
+
+    /// Warning for surfaces that lie in each other.
+    #[must_use]
+    pub fn contact_warning(&self) -> Option<String> {
+        self.contacts.warning.clone()
     }
 
     /// The scene's variables, followed by others.

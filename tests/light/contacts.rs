@@ -120,6 +120,17 @@ fn a_lamp_twice_in_one_place_shines_once() {
         "{:?}",
         twice.warnings
     );
+    // Overlapping in part, each shines, and it is said.
+    let warned = |scene: &Scene| {
+        let stats = render_scene(scene, &settings(Mode::DirectRays, 1000, 6)).stats;
+        stats.warnings.iter().any(|line| line.contains("emissive surfaces lie in each other in part"))
+    };
+    let mut part = lamps(Some(([1, 2, 0], 1.0)));
+    assert!(!warned(&part), "control: exactly in each other");
+    let aside = part.triangles[1];
+    let moved = |t: &Triangle| Triangle { positions: t.positions.map(|p| p + vec3(0.3, 0.0, 0.0)), material: 2, ..*t };
+    part.triangles.push(moved(&aside));
+    assert!(warned(&part));
     let apart = power(&lamps(Some(([1, 2, 0], 0.9))));
     assert!(apart[0] > 1.5 * right[0], "control: a lamp below it adds light: {apart:?}");
 }
