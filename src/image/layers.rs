@@ -75,10 +75,14 @@ pub struct Layer {
     pub missing: Option<f32>,
 }
 
+/// Start of the sums of hits, and of those of their positions, in [`crate::layout::PixelSums`].
+pub const HITS: (usize, usize) = (2, 3);
+pub const POSITIONS: (usize, usize) = (3, 0);
+
 /// All layers.
 pub const LAYERS: [Layer; 5] = [
     Layer { name: "radiance", channels: &["R", "G", "B"], source: (0, 0), rule: Rule::PerSample, missing: None },
-    Layer { name: "alpha", channels: &["A"], source: (2, 3), rule: Rule::PerSample, missing: Some(1.0) },
+    Layer { name: "alpha", channels: &["A"], source: HITS, rule: Rule::PerSample, missing: Some(1.0) },
     Layer { name: "depth", channels: &["Z"], source: (1, 3), rule: Rule::PerHit, missing: Some(0.0) },
     Layer { name: "normal", channels: &["N.X", "N.Y", "N.Z"], source: (1, 0), rule: Rule::PerHit, missing: Some(0.0) },
     Layer {
@@ -134,7 +138,7 @@ pub const EXTRA_LAYERS: [ExtraLayer; 9] = [
         Source::Estimate(MapKind::Caustic),
         Rule::PerCount,
     ),
-    extra(ExtraLayers::Position, &["position.X", "position.Y", "position.Z"], Source::Rows((3, 0)), Rule::PerHit),
+    extra(ExtraLayers::Position, &["position.X", "position.Y", "position.Z"], Source::Rows(POSITIONS), Rule::PerHit),
     extra(ExtraLayers::Uv, &["UV.U", "UV.V"], Source::Rows((4, 0)), Rule::PerHit),
     extra(ExtraLayers::Motion, &["motion.X", "motion.Y"], Source::Nothing, Rule::PerHit),
 ];

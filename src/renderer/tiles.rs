@@ -10,7 +10,7 @@ use crate::{
     image::{
         Film,
         cryptomatte::hash,
-        layers::{LightComponent, Source},
+        layers::{HITS, LightComponent, POSITIONS, Source},
     },
     layout::{ArrivingLight, Gathered, VisiblePoint},
     map_kind::MapKind,
@@ -261,8 +261,8 @@ impl<'a> CameraPass<'a> {
         for (i, mut sums) in (0..).zip(self.tracer.resolve(self.gpu, tile)?) {
             if let Some(pixel) = self.tracer.pixel(tile, i) {
                 // Positions are relative to the centre on the device.
-                let center = self.geometry.center.as_vec3() * sums[2][3];
-                (0..3).for_each(|c| sums[3][c] += center[c]);
+                let center = self.geometry.center.as_vec3() * sums[HITS.0][HITS.1];
+                (0..3).for_each(|c| sums[POSITIONS.0][POSITIONS.1 + c] += center[c]);
                 film.add(pixel, &sums, tile.samples);
             }
         }
