@@ -75,8 +75,9 @@ pub struct Layer {
     pub missing: Option<f32>,
 }
 
-/// Start of the sums of hits, and of those of their positions, in [`crate::layout::PixelSums`].
+/// Sums of hits in [`crate::layout::PixelSums`]: row, and number in the row.
 pub const HITS: (usize, usize) = (2, 3);
+/// Start of the sums of their positions.
 pub const POSITIONS: (usize, usize) = (3, 0);
 
 /// All layers.
