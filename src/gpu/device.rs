@@ -55,8 +55,8 @@ const MAX_LANES: u32 = crate::layout::CELL_FAN;
 /// Minimum number of lanes of a group.
 const MIN_LANES: u32 = super::adapter::NEEDED_SUBGROUP;
 
-/// [`Gpu::trace_budget`] of software: Lavapipe ends loops silently after 65,535 iterations of the 8
-/// invocations of a subgroup.
+/// Maximum number of nodes and primitives that a ray visits on software: Lavapipe ends loops
+/// silently after 65,535 iterations of the 8 invocations of a subgroup.
 pub const SHORT_LOOPS: u32 = 8000;
 /// That of others: a third of a second, where each visit waits for memory.
 const LONG_LOOPS: u32 = 1 << 20;
