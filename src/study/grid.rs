@@ -1,4 +1,4 @@
-//! Grid plan: every mode with every n and every k.
+//! Grid plans: every mode with every n, and every k or number of rays of final gathering.
 
 use super::{Combination, Figure, Look, Plan, Question, Subject, numbers::short};
 use crate::settings::{Mode, Settings};
@@ -14,8 +14,7 @@ pub fn grid(
     repeats: u32,
     look: Look,
 ) -> Plan {
-    let title = format!("Study of {}", subject.scene.file_name);
-    let mut plan = Plan { title, subjects: vec![subject], combinations: Vec::new(), figures: Vec::new(), look };
+    let mut plan = empty("Study of", subject, look);
     for &mode in modes {
         let base = settings.clone().with(|s| s.photons.mode = mode);
         let title = format!("Mode {}", mode.name());
@@ -36,33 +35,21 @@ pub fn gather_grid(
     repeats: u32,
     look: Look,
 ) -> Plan {
-    let title = format!("Final gathering of {}", subject.scene.file_name);
-    let mut plan = Plan { title, subjects: vec![subject], combinations: Vec::new(), figures: Vec::new(), look };
+    let mut plan = empty("Final gathering of", subject, look);
     for &mode in modes {
         let base = settings.clone().with(|s| s.photons.mode = mode);
-        let rows = photons.iter().map(|&n| {
-            let cells = rays.iter().map(|&rays| {
-                let settings = base.clone().with(|s| {
-                    s.photons.global = n;
-                    s.photons.caustic = n;
-                    s.photons.final_gather = rays;
-                });
-                Some(plan.add(Combination { subject: 0, settings, repeats, measured: true }))
-            });
-            (format!("n = {}", short(n)), cells.collect())
-        });
-        let rows = rows.collect();
+        let set = |s: &mut Settings, rays| s.photons.final_gather = rays;
+        let rows = rows(&mut plan, (0, &base), photons, (rays, &set), repeats);
         let columns = rays.iter().map(|rays| format!("{rays} rays")).collect();
-        let plane = mode.gathers_finally();
-        plan.figures.push(Figure {
-            title: format!("Mode {}", mode.name()),
-            columns,
-            rows,
-            questions: Vec::new(),
-            plane,
-        });
+        let (title, plane) = (format!("Mode {}", mode.name()), mode.gathers_finally());
+        plan.figures.push(Figure { title, columns, rows, questions: Vec::new(), plane });
     }
     plan
+}
+
+fn empty(title: &str, subject: Subject, look: Look) -> Plan {
+    let title = format!("{title} {}", subject.scene.file_name);
+    Plan { title, subjects: vec![subject], combinations: Vec::new(), figures: Vec::new(), look }
 }
 
 /// Adds a figure with n in rows and k in columns, and its combinations.
@@ -75,19 +62,31 @@ pub(super) fn add_plane(
     repeats: u32,
     title: String,
 ) {
-    let rows = photons.iter().map(|&n| {
-        let cells = neighbors.iter().map(|&k| {
+    let set = |s: &mut Settings, k| s.estimate.neighbors = k;
+    let rows = rows(plan, (subject, base), photons, (neighbors, &set), repeats);
+    let columns = neighbors.iter().map(|k| format!("k = {k}")).collect();
+    let questions = if base.photons.mode.traces_photons() { Question::OF_A_PLANE.to_vec() } else { Vec::new() };
+    plan.figures.push(Figure { title, columns, rows, questions, plane: base.photons.mode.traces_photons() });
+}
+
+/// Rows of n, with a column for each value that `set` sets; adds their combinations.
+fn rows(
+    plan: &mut Plan,
+    (subject, base): (usize, &Settings),
+    photons: &[u32],
+    (values, set): (&[u32], &dyn Fn(&mut Settings, u32)),
+    repeats: u32,
+) -> Vec<(String, Vec<Option<usize>>)> {
+    let row = |&n: &u32| {
+        let cells = values.iter().map(|&value| {
             let settings = base.clone().with(|s| {
                 s.photons.global = n;
                 s.photons.caustic = n;
-                s.estimate.neighbors = k;
+                set(s, value);
             });
             Some(plan.add(Combination { subject, settings, repeats, measured: true }))
         });
         (format!("n = {}", short(n)), cells.collect())
-    });
-    let rows = rows.collect();
-    let columns = neighbors.iter().map(|k| format!("k = {k}")).collect();
-    let questions = if base.photons.mode.traces_photons() { Question::OF_A_PLANE.to_vec() } else { Vec::new() };
-    plan.figures.push(Figure { title, columns, rows, questions, plane: base.photons.mode.traces_photons() });
+    };
+    photons.iter().map(row).collect()
 }
