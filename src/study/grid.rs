@@ -69,12 +69,15 @@ pub(super) fn add_plane(
     plan.figures.push(Figure { title, columns, rows, questions, plane: base.photons.mode.traces_photons() });
 }
 
+/// Sets the value of a column.
+type Set<'a> = &'a dyn Fn(&mut Settings, u32);
+
 /// Rows of n, with a column for each value that `set` sets; adds their combinations.
 fn rows(
     plan: &mut Plan,
     (subject, base): (usize, &Settings),
     photons: &[u32],
-    (values, set): (&[u32], &dyn Fn(&mut Settings, u32)),
+    (values, set): (&[u32], Set),
     repeats: u32,
 ) -> Vec<(String, Vec<Option<usize>>)> {
     let row = |&n: &u32| {
