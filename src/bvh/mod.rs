@@ -11,6 +11,7 @@ mod contacts;
 mod convert;
 mod media;
 mod node;
+mod overlap;
 mod ray;
 mod split;
 #[cfg(test)]

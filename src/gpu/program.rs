@@ -41,15 +41,10 @@ impl Program {
     pub fn compiled(&self) -> &Compiled {
         self.compiled.get_or_init(|| {
             let (device, shader) = (&self.device, self.shader);
-            let specialized = specialized(shader.wgsl, &self.constants);
-            // Without constants that the module no longer has.
-            let constants = if specialized.is_some() { &[][..] } else { &self.constants };
+            let specialized = specialized(shader.wgsl, &self.constants).expect("a text that build.rs composed");
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(shader.stem),
-                source: match specialized {
-                    Some(module) => wgpu::ShaderSource::Naga(Cow::Owned(module)),
-                    None => wgpu::ShaderSource::Wgsl(shader.wgsl.into()),
-                },
+                source: wgpu::ShaderSource::Naga(Cow::Owned(specialized)),
             });
             let layouts: Vec<_> = (0..CHUNK_GROUP).map(|g| group_layout(device, shader, g)).collect();
             let chunk = self.can_be_cut().then_some(&self.chunk_layout);
@@ -64,7 +59,7 @@ impl Program {
                 module: &module,
                 entry_point: Some(shader.stem),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    constants,
+                    constants: &[],
                     zero_initialize_workgroup_memory: false,
                 },
                 cache: None,

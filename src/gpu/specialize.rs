@@ -195,9 +195,10 @@ mod tests {
     #[test]
     fn every_kernel_is_specialized_and_valid() {
         for shader in SHADERS {
-            for value in [0.0, 1.0] {
-                let flags: Vec<_> = shader.overrides.iter().filter(|name| name.starts_with("HAS_")).collect();
-                let constants: Vec<_> = flags.iter().map(|name| (**name, value)).collect();
+            for value in [0.0, 0.35, 1.0] {
+                let names =
+                    shader.overrides.iter().filter(|name| name.starts_with("HAS_") || name.ends_with("ROUGHNESS"));
+                let constants: Vec<_> = names.map(|name| (*name, value)).collect();
                 let module = specialized(shader.wgsl, &constants).unwrap_or_else(|| panic!("{}", shader.stem));
                 assert!(module.overrides.is_empty());
                 let checked = Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module);

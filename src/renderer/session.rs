@@ -1,6 +1,9 @@
 //! A scene on the device, and the single stages of a render.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{
+    Arc,
+    atomic::{AtomicU64, Ordering},
+};
 
 use super::{
     gatherer::{MapGatherer, Observer, gather_for},
@@ -9,7 +12,7 @@ use super::{
     tiles::{CameraPass, Gatherer},
 };
 use crate::{
-    bvh::{Bvh, Media, MediaProbe},
+    bvh::{Bvh, Media, MediaProbe, contacts},
     error::{Error, Result},
     gpu::Gpu,
     image::{Film, Frame},
@@ -95,11 +98,13 @@ impl<'a> Session<'a> {
         gpu.memory.restart_peak();
         progress.report(Stage::Bvh, 0, 1);
         let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
+        // They are those of the whole light in each of its groups.
+        let contacts = Arc::new(timed(&mut stats.seconds.bvh, || contacts(scene, &bvh)));
         let lit = |group: &String| scene.lit_by(group);
         let buffers = match groups {
-            None => vec![SceneBuffers::new(gpu, scene, &bvh, lights)?],
+            None => vec![SceneBuffers::with_contacts(gpu, (scene, &bvh), Arc::clone(&contacts), lights)?],
             Some(groups) => {
-                let first = SceneBuffers::new(gpu, &lit(&groups[0]), &bvh, lights)?;
+                let first = SceneBuffers::with_contacts(gpu, (&lit(&groups[0]), &bvh), Arc::clone(&contacts), lights)?;
                 let others = groups[1..].iter().map(|group| first.relit(gpu, &lit(group), &bvh, lights));
                 let others = others.collect::<Result<Vec<_>>>()?;
                 std::iter::once(first).chain(others).collect()
@@ -107,7 +112,7 @@ impl<'a> Session<'a> {
         };
         let solids = &buffers[0].solids;
         stats.warnings.extend(solids.warning());
-        stats.warnings.extend(buffers[0].contact_warning());
+        stats.warnings.extend(contacts.warning.clone());
         let probe = MediaProbe::new(scene, &bvh, solids);
         let camera_media: Vec<Media> =
             scene.cameras.iter().map(|camera| probe.at(camera.position.as_dvec3())).collect();

@@ -75,6 +75,20 @@ impl SceneBuffers {
     /// [`crate::Error::Limit`] if the primitives exceed two bindings, the nodes one, or normals,
     /// materials or media a table; as [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
+        Self::with_contacts(gpu, (scene, bvh), Arc::new(contacts(scene, bvh)), settings)
+    }
+
+    /// As [`Self::new`], with contacts that were found before: those of the scene in its whole
+    /// light.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_contacts(
+        gpu: &Gpu,
+        (scene, bvh): (&Scene, &Bvh),
+        contacts: Arc<Contacts>,
+        settings: &LightSettings,
+    ) -> Result<Self> {
         let solids = Solids::new(scene);
         let row = |m: &Medium| layout::Medium {
             tint: m.tint.to_array(),
@@ -84,7 +98,6 @@ impl SceneBuffers {
         };
         let media: Vec<_> = solids.media.iter().map(row).collect();
         let lights = LightBuffers::new(gpu, (scene, bvh), &MediaProbe::new(scene, bvh, &solids), settings)?;
-        let contacts = Arc::new(contacts(scene, bvh));
         Ok(Self {
             nodes: Arc::new(gpu.storage_with("bvh nodes", &bvh.nodes)?),
             primitives: Halves::new::<Primitive>(
@@ -176,12 +189,6 @@ impl SceneBuffers {
         let own = [("normals", &self.normals), ("media_table", &self.media), light_nodes, pixels, cells, rows];
         let tables = [&own[..], &self.materials.tables()].concat();
         Kernel::of(gpu, shader, &overrides).with_tables(&tables)
-    }
-
-    /// Warning for surfaces that lie in each other.
-    #[must_use]
-    pub fn contact_warning(&self) -> Option<String> {
-        self.contacts.warning.clone()
     }
 
     /// The scene's variables, followed by others.

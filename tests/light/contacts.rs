@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use caustica::{
     scene::{Scene, Triangle},
-    settings::Mode,
+    settings::{ExtraLayers, Mode},
 };
 use glam::{Quat, Vec3, vec3};
 use serde_json::json;
@@ -131,6 +131,10 @@ fn a_lamp_twice_in_one_place_shines_once() {
     let moved = |t: &Triangle| Triangle { positions: t.positions.map(|p| p + vec3(0.3, 0.0, 0.0)), material: 2, ..*t };
     part.triangles.push(moved(&aside));
     assert!(warned(&part));
+    // In light groups of their own as well.
+    let apart = settings(Mode::DirectRays, 1000, 6).with(|s| s.picture.layers = vec![ExtraLayers::Lights]);
+    let warnings = render_scene(&part, &apart).stats.warnings;
+    assert!(warnings.iter().any(|line| line.contains("emissive surfaces lie in each other in part")), "{warnings:?}");
     let apart = power(&lamps(Some(([1, 2, 0], 0.9))));
     assert!(apart[0] > 1.5 * right[0], "control: a lamp below it adds light: {apart:?}");
 }

@@ -1,0 +1,132 @@
+//! Overlap of primitives: whether one reaches into a box, and whether two lie in each other.
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::build::bounds;
+use crate::{
+    layout::{Primitive, SPHERE_BIT},
+    scene::Bounds,
+};
+
+/// Distance below which two surfaces are one, over their largest coordinate: 2^-21, four steps of
+/// 32-bit numbers.
+const TOLERANCE: f64 = 1.0 / (1 << 21) as f64;
+/// Largest sine of the angle between the planes of two surfaces that are one.
+const MAX_SINE: f64 = 1e-3;
+/// Fraction of the size of the smaller triangle by which two must overlap.
+const MIN_OVERLAP: f64 = 1e-4;
+
+/// A primitive as boxes are tested against it.
+pub(super) struct Shape {
+    bounds: Bounds,
+    /// Corners and directions of a triangle: normal and edges; `None` for a sphere.
+    triangle: Option<([DVec3; 3], [DVec3; 4])>,
+}
+
+impl Shape {
+    pub fn new(primitive: &Primitive) -> Self {
+        let triangle = (primitive.material & SPHERE_BIT == 0).then(|| {
+            let [a, b, c] = corners(primitive);
+            ([a, b, c], [(b - a).cross(c - a), b - a, c - b, a - c])
+        });
+        Self { bounds: bounds(primitive), triangle }
+    }
+
+    /// Whether the planes of two triangles are parallel, so that they may be one; true for spheres.
+    pub fn is_parallel(&self, other: &Primitive) -> bool {
+        let Some((_, [normal, ..])) = &self.triangle else { return true };
+        let [e1, e2] = [other.e1, other.e2].map(|edge| Vec3::from_array(edge).as_dvec3());
+        let its = e1.cross(e2);
+        normal.cross(its).length_squared() <= MAX_SINE * MAX_SINE * normal.length_squared() * its.length_squared()
+    }
+
+    /// Whether it reaches into a box, up to the tolerance (Akenine-Möller 2001, "Fast 3D
+    /// Triangle-Box Overlap Testing"); for a sphere, whether its own box does.
+    pub fn meets(&self, other: &Bounds) -> bool {
+        let largest = |bounds: &Bounds| f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
+        let slack = 2.0 * TOLERANCE * largest(&self.bounds).max(largest(other));
+        let [low, high] = [other.min.as_dvec3() - slack, other.max.as_dvec3() + slack];
+        if !(self.bounds.min.as_dvec3().cmple(high).all() && low.cmple(self.bounds.max.as_dvec3()).all()) {
+            return false;
+        }
+        let Some((corners, [normal, edges @ ..])) = &self.triangle else { return true };
+        let (center, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let reaches = |axis: DVec3| {
+            let radius = half.dot(axis.abs());
+            let [a, b, c] = corners.map(|corner| (corner - center).dot(axis));
+            a.min(b).min(c) <= radius && a.max(b).max(c) >= -radius
+        };
+        let across = |edge: &DVec3| DVec3::AXES.iter().all(|axis| reaches(edge.cross(*axis)));
+        reaches(*normal) && edges.iter().all(across)
+    }
+}
+
+/// Largest coordinate that a primitive is computed from, metres.
+fn reach(primitive: &Primitive) -> f64 {
+    let [v0, e1, e2] =
+        [primitive.v0, primitive.e1, primitive.e2].map(|v| f64::from(Vec3::from_array(v).abs().max_element()));
+    v0.max(e1).max(e2)
+}
+
+/// Whether two primitives, which are parallel, lie in each other over more than an edge.
+pub(super) fn coincide(a: &Primitive, b: &Primitive) -> bool {
+    if b.id == a.id || (a.material ^ b.material) & SPHERE_BIT != 0 {
+        return false;
+    }
+    let tolerance = reach(a).max(reach(b)) * TOLERANCE;
+    let [a0, b0] = [a, b].map(|p| Vec3::from_array(p.v0).as_dvec3());
+    if a.material & SPHERE_BIT != 0 {
+        let radii = [a, b].map(|p| f64::from(p.e1[0]));
+        return a0.distance(b0) <= tolerance && (radii[0] - radii[1]).abs() <= tolerance;
+    }
+    let [ca, cb] = [a, b].map(corners);
+    let [na, nb] = [ca, cb].map(|[p, q, r]| (q - p).cross(r - p).normalize_or_zero());
+    if na == DVec3::ZERO || nb == DVec3::ZERO {
+        return false;
+    }
+    // In the plane of the first, up to the tolerance where they overlap.
+    let tangent = na.any_orthonormal_vector();
+    let flat = |corner: DVec3| DVec2::new((corner - a0).dot(tangent), (corner - a0).dot(na.cross(tangent)));
+    let overlap = clipped(&ca.map(flat), &cb.map(flat));
+    let size = area(&ca.map(flat)).abs().min(area(&cb.map(flat)).abs());
+    let height = |p: DVec2| {
+        let on_a = a0 + p.x * tangent + p.y * na.cross(tangent);
+        ((on_a - b0).dot(nb) / na.dot(nb)).abs()
+    };
+    area(&overlap).abs() > MIN_OVERLAP * size && overlap.iter().all(|p| height(*p) <= tolerance)
+}
+
+fn corners(primitive: &Primitive) -> [DVec3; 3] {
+    let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(|v| Vec3::from_array(v).as_dvec3());
+    [v0, v0 + e1, v0 + e2]
+}
+
+/// The part of one triangle that lies in another one, corner by corner (Sutherland and Hodgman
+/// 1974).
+fn clipped(subject: &[DVec2; 3], clip: &[DVec2; 3]) -> Vec<DVec2> {
+    let turn = area(clip).signum();
+    let mut polygon = subject.to_vec();
+    for edge in 0..3 {
+        let (from, to) = (clip[edge], clip[(edge + 1) % 3]);
+        let side = |p: DVec2| turn * (to - from).perp_dot(p - from);
+        let mut kept = Vec::with_capacity(polygon.len() + 1);
+        for (i, &p) in polygon.iter().enumerate() {
+            let q = polygon[(i + 1) % polygon.len()];
+            let (here, next) = (side(p), side(q));
+            if here >= 0.0 {
+                kept.push(p);
+            }
+            if (here >= 0.0) != (next >= 0.0) {
+                kept.push(p.lerp(q, here / (here - next)));
+            }
+        }
+        polygon = kept;
+    }
+    polygon
+}
+
+/// Signed area of a polygon.
+fn area(polygon: &[DVec2]) -> f64 {
+    let edges = (0..polygon.len()).map(|i| polygon[i].perp_dot(polygon[(i + 1) % polygon.len()]));
+    0.5 * edges.sum::<f64>()
+}
