@@ -6,13 +6,17 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
+use rayon::prelude::*;
 
 use super::node::MAX_LEAF;
 use super::{convert, split, widen};
-use crate::layout::{BVH_STACK, BvhNode, Normals, Primitive, SPHERE_BIT, octahedral};
-use crate::scene::{Bounds, Scene, Sphere, Triangle};
+use crate::layout::{
+    BVH_STACK, BvhNode, INSTANCE, INSTANCED_STACK, Instance, NOTHING_LEFT, Normals, Primitive, SPHERE_BIT,
+    TREE_HEIGHTS, even_height, octahedral,
+};
+use crate::scene::{self, Bounds, Scene, SharedMesh, Sphere, Triangle, instance_bounds};
 
-/// [`Primitive::id`] of a padding triangle.
+/// [`Primitive::id`] of a padding triangle, and of the box of an instance.
 pub const FILLER: u32 = u32::MAX;
 
 /// Nodes and primitives in device layout.
@@ -24,6 +28,8 @@ pub struct Bvh {
     pub primitives: Vec<Primitive>,
     /// Normals of each primitive, parallel to `primitives`.
     pub normals: Vec<Normals>,
+    /// Instances, behind one that holds what concerns all; empty in a scene without.
+    pub instances: Vec<Instance>,
 }
 
 impl Bvh {
@@ -31,25 +37,84 @@ impl Bvh {
     /// 2018, 2021). Large primitives among many that cross are listed several times, in smaller
     /// boxes. Equal scenes give equal trees on any number of threads.
     ///
+    /// A mesh that instances share has a tree of its own, in its own coordinates, and instances are
+    /// boxes in the tree of the scene (Wald et al. 2003, "Distributed Interactive Ray Tracing of
+    /// Dynamic Scenes"): see [`INSTANCE`].
+    ///
     /// # Panics
     /// If there are 2^28 triangles and spheres or more. The loader refuses such files earlier.
     #[must_use]
     pub fn build(scene: &Scene) -> Self {
-        let mut primitives: Vec<Primitive> = Vec::with_capacity(scene.triangles.len() + scene.spheres.len());
+        let mut primitives: Vec<Primitive> =
+            Vec::with_capacity(scene.triangles.len() + scene.spheres.len() + scene.instances.len());
         primitives.extend(scene.triangles.iter().map(triangle_primitive));
         primitives.extend(scene.spheres.iter().map(sphere_primitive));
         for (id, primitive) in primitives.iter_mut().enumerate() {
             primitive.id = id as u32;
         }
+        let boxes = instance_bounds(&scene.meshes, &scene.instances);
+        primitives.extend(boxes.iter().zip(1..).map(|(bounds, number)| instance_primitive(bounds, number)));
+        let heights = Heights::new(primitives.len(), scene);
+        let mut bvh = Self::of(primitives, scene.triangles.iter(), heights.scene);
+        let mut first_of_mesh = (scene.triangles.len() + scene.spheres.len()) as u32;
+        let firsts = scene.meshes.iter().map(|mesh| {
+            first_of_mesh += mesh.triangles.len() as u32;
+            first_of_mesh - mesh.triangles.len() as u32
+        });
+        let firsts: Vec<u32> = firsts.collect();
+        let of_mesh = |(mesh, first): (&SharedMesh, &u32)| {
+            let numbered = mesh.triangles.iter().zip(*first..);
+            let primitives = numbered.map(|(triangle, id)| Primitive { id, ..triangle_primitive(triangle) });
+            Self::of(primitives.collect(), mesh.triangles.iter(), heights.mesh)
+        };
+        let meshes: Vec<Self> = scene.meshes.par_iter().zip(&firsts).map(of_mesh).collect();
+        let places: Vec<Place> = meshes.into_iter().map(|mesh| bvh.append(mesh)).collect();
+        bvh.instances = instances(&scene.instances, &places, bvh.primitives.len());
+        bvh
+    }
+
+    /// A tree over primitives, whose triangles are those, the first of which is the first primitive.
+    fn of<'t>(
+        mut primitives: Vec<Primitive>,
+        triangles: impl ExactSizeIterator<Item = &'t Triangle>,
+        max_height: u32,
+    ) -> Self {
+        let first = primitives.first().map_or(0, |primitive| primitive.id);
         primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
-        let (bounds, of_bounds) = split::pieces(&primitives, primitives.iter().map(bounds).collect());
-        let binary = convert::convert(&build_binary(&bounds), &bounds);
-        let (nodes, order) = widen::widen(&binary);
+        let whole: Vec<Bounds> = primitives.iter().map(bounds).collect();
+        let (bounds, of_bounds) = match split::pieces(&primitives, whole.clone()) {
+            pieces if even_height(pieces.0.len()) <= max_height => pieces,
+            _ => (whole, (0..primitives.len() as u32).collect()),
+        };
+        let binary = convert::convert(&build_binary(&bounds), &bounds, max_height);
+        let (nodes, order) = widen::widen(&binary, max_height);
+        let of_triangles: Vec<Normals> = triangles.map(corner_normals).collect();
         let normals = |primitive: &Primitive| {
-            scene.triangles.get(primitive.id as usize).map_or(Normals::default(), corner_normals)
+            of_triangles.get(primitive.id.wrapping_sub(first) as usize).copied().unwrap_or_default()
         };
         let primitives: Vec<Primitive> = order.iter().map(|i| primitives[of_bounds[*i as usize] as usize]).collect();
-        Self { normals: primitives.iter().map(normals).collect(), nodes, primitives }
+        Self { normals: primitives.iter().map(normals).collect(), nodes, primitives, instances: Vec::new() }
+    }
+
+    /// Appends the tree of a shared mesh.
+    fn append(&mut self, mesh: Self) -> Place {
+        let place = Place {
+            root: self.nodes.len() as u32,
+            stored: self.primitives.len() as u32,
+            primitives: mesh.primitives.len() as u32,
+        };
+        self.nodes.extend(mesh.nodes.iter().map(|node| node.moved(place.root, place.stored)));
+        self.primitives.extend(mesh.primitives);
+        self.normals.extend(mesh.normals);
+        place
+    }
+
+    /// Number of nodes and of primitives of the tree of the scene, before those of shared meshes.
+    #[must_use]
+    pub fn scene_part(&self) -> (usize, usize) {
+        let of_instances = self.instances.iter().skip(1);
+        let firsts = of_instances.map(|instance| (instance.root as usize, instance.stored as usize));
+        firsts.min().unwrap_or((self.nodes.len(), self.primitives.len()))
     }
 
     /// Maximum number of children that a traversal holds on its stack.
@@ -58,13 +123,85 @@ impl Bvh {
         // Deferred children on the stack when the traversal enters each node.
         let mut deferred = vec![0_usize; self.nodes.len()];
         let mut most = 0;
+        let (scene, _) = self.scene_part();
         for (i, node) in self.nodes.iter().enumerate() {
+            if i == scene {
+                // Up to all boxes of a leaf are deferred, and the way back.
+                let below = most + MAX_LEAF as usize + 1;
+                self.instances.iter().skip(1).for_each(|instance| deferred[instance.root as usize] = below);
+            }
             let here = deferred[i] + node.children().count() - 1;
             node.children().filter(|child| child.count == 0).for_each(|child| deferred[child.first as usize] = here);
             most = most.max(here);
         }
-        debug_assert!(most <= BVH_STACK);
+        debug_assert!(most <= if self.instances.is_empty() { BVH_STACK } else { INSTANCED_STACK });
         most
+    }
+}
+
+/// Maximum heights of the binary trees of a scene and of the meshes in it that instances share.
+struct Heights {
+    scene: u32,
+    mesh: u32,
+}
+
+impl Heights {
+    fn new(primitives: usize, scene: &Scene) -> Self {
+        let Some(largest) = scene.meshes.iter().map(|mesh| mesh.triangles.len()).max() else {
+            return Self { scene: convert::MAX_HEIGHT, mesh: 0 };
+        };
+        let [top, mesh] = [primitives, largest].map(|count| even_height(count).max(1).next_multiple_of(2));
+        let spare = TREE_HEIGHTS.checked_sub(top + mesh).expect("the loader shares no mesh of a tree that is too high");
+        let mesh = (mesh + (spare / 2).next_multiple_of(2)).min(convert::MAX_HEIGHT);
+        Self { scene: (TREE_HEIGHTS - mesh).min(convert::MAX_HEIGHT), mesh }
+    }
+}
+
+/// Where the tree of a shared mesh lies among all, and the number of its primitives.
+struct Place {
+    root: u32,
+    stored: u32,
+    primitives: u32,
+}
+
+/// Instances in device layout, whose primitives are numbered after the `stored` ones.
+fn instances(instances: &[scene::Instance], places: &[Place], stored: usize) -> Vec<Instance> {
+    if instances.is_empty() {
+        return Vec::new();
+    }
+    let mut next = u32::try_from(stored).expect("fewer than 2^28 primitives");
+    let head = Instance { first: next, stored: instances.len() as u32, ..Instance::default() };
+    let instance = |instance: &scene::Instance| {
+        let Place { root, stored, primitives } = places[instance.mesh as usize];
+        let first = next;
+        next += primitives;
+        assert!(next < NOTHING_LEFT, "2^28 primitives or more with those of all instances");
+        let (rows, inverse) = (instance.linear.transpose(), instance.linear.inverse().transpose());
+        let row = |axis: usize| rows.col(axis).extend(instance.offset[axis]).to_array();
+        let [from_scene_x, from_scene_y, from_scene_z] = [0, 1, 2].map(|axis| inverse.col(axis).to_array());
+        Instance {
+            to_scene: [row(0), row(1), row(2)],
+            from_scene_x,
+            first,
+            from_scene_y,
+            stored,
+            from_scene_z,
+            root,
+        }
+    };
+    let of_all: Vec<Instance> = instances.iter().map(instance).collect();
+    [vec![head], of_all].concat()
+}
+
+/// Stands in a tree for instance `number`, counted from 1.
+fn instance_primitive(bounds: &Bounds, number: u32) -> Primitive {
+    Primitive {
+        v0: bounds.min.to_array(),
+        material: number,
+        e1: (bounds.max - bounds.min).to_array(),
+        id: FILLER,
+        emitter: INSTANCE,
+        ..Primitive::default()
     }
 }
 

@@ -11,12 +11,16 @@ use rayon::prelude::*;
 
 use super::{
     Bvh, FILLER,
-    overlap::{Shape, coincide},
+    contact_search::{Search, Touched},
 };
 use crate::{
     layout::{MAX_RANK, Primitive},
-    scene::{Alpha, Scene},
+    scene::{Alpha, Scene, SharedMesh},
 };
+
+/// Warning where instances are not compared.
+const TOO_MANY: &str = "there are too many instances in each other's boxes to compare: where surfaces of two of them \
+                        lie in each other, either is seen";
 
 /// Surfaces that lie in each other.
 #[derive(Clone, Debug)]
@@ -56,7 +60,12 @@ impl Patches {
             all[number].area += area;
             number as u32
         };
-        let of_ids = triangles.chain(spheres).map(number).collect();
+        // Those of a mesh that instances share belong to no object.
+        let of_mesh = |(mesh, first): (&SharedMesh, u32)| {
+            mesh.triangles.iter().map(move |t| ((u32::MAX - first, t.material), t.area())).collect::<Vec<_>>()
+        };
+        let shared = scene.meshes.iter().zip(0..).flat_map(of_mesh);
+        let of_ids = triangles.chain(spheres).chain(shared).map(number).collect();
         Self { all, of_ids }
     }
 
@@ -125,7 +134,7 @@ impl Patches {
 #[must_use]
 pub fn contacts(scene: &Scene, bvh: &Bvh) -> Contacts {
     let patches = Patches::new(scene);
-    let search = Search { bvh, patches: &patches, of_nodes: patches.of_nodes(bvh) };
+    let search = Search { bvh, patches: &patches.of_ids, of_nodes: patches.of_nodes(bvh) };
     // A patch that neither shines nor lets light through may be met in any of its parts.
     let is_plain = |patch: u32| {
         let material = &scene.materials[patches.all[patch as usize].material as usize];
@@ -134,8 +143,9 @@ pub fn contacts(scene: &Scene, bvh: &Bvh) -> Contacts {
     // Primitives in several leaves are asked once.
     let mut listed = vec![false; patches.of_ids.len()];
     let is_first = |p: &&Primitive| p.id != FILLER && !std::mem::replace(&mut listed[p.id as usize], true);
-    let firsts: Vec<&Primitive> = bvh.primitives.iter().filter(is_first).collect();
-    let found: Vec<(u32, Vec<u32>)> = firsts
+    let listed_in_scene = &bvh.primitives[..bvh.scene_part().1];
+    let firsts: Vec<&Primitive> = listed_in_scene.iter().filter(is_first).collect();
+    let mut found: Vec<(u32, Vec<Touched>)> = firsts
         .into_par_iter()
         .filter_map(|primitive| {
             let own = patches.of(primitive).filter(|patch| is_plain(*patch));
@@ -143,57 +153,23 @@ pub fn contacts(scene: &Scene, bvh: &Bvh) -> Contacts {
             (!touched.is_empty()).then_some((primitive.id, touched))
         })
         .collect();
+    let among_instances = search.among_instances();
+    let unasked = among_instances.is_none().then(|| TOO_MANY.to_owned());
+    found.extend(among_instances.unwrap_or_default());
     let patch_of = |id: u32| patches.of_ids[id as usize];
-    let pair = |(id, touched): &(u32, Vec<u32>)| touched.iter().map(|t| (patch_of(*id), *t)).collect::<Vec<_>>();
+    // The primitives of instances are not asked themselves: both orders.
+    let pair = |(id, touched): &(u32, Vec<Touched>)| {
+        let own = patch_of(*id);
+        touched.iter().flat_map(|t| [(own, t.patch), (t.patch, own)]).collect::<Vec<_>>()
+    };
     let pairs: BTreeSet<(u32, u32)> = found.iter().flat_map(pair).collect();
     let ranks = patches.ranks(scene, &pairs);
     let mut of_ids = vec![None; patches.of_ids.len()];
-    found.iter().for_each(|(id, _)| of_ids[*id as usize] = ranks.get(&patch_of(*id)).copied());
+    let touched = found.iter().flat_map(|(_, touched)| touched.iter().filter_map(|t| t.of_instance));
+    let in_contact = found.iter().map(|(id, _)| *id).chain(touched);
+    in_contact.for_each(|id| of_ids[id as usize] = ranks.get(&patch_of(id)).copied());
     let ranks = bvh.primitives.iter().map(|p| of_ids.get(p.id as usize).copied().flatten()).collect();
-    Contacts { ranks, warning: patches.warning(scene, &pairs) }
-}
-
-/// The hierarchy as it is searched for contacts.
-struct Search<'a> {
-    bvh: &'a Bvh,
-    patches: &'a Patches,
-    of_nodes: Vec<Option<u32>>,
-}
-
-impl Search<'_> {
-    /// Patches of which a primitive lies in the surface of `primitive`, but for the patch `apart`.
-    fn touching(&self, primitive: &Primitive, apart: Option<u32>) -> Vec<u32> {
-        let shape = Shape::new(primitive);
-        let is_apart = |patch: Option<u32>| patch.is_some() && patch == apart;
-        let (mut found, mut waiting) = (Vec::new(), vec![0]);
-        while let Some(node) = waiting.pop() {
-            for child in self.bvh.nodes[node as usize].children() {
-                if child.count == 0 {
-                    if !is_apart(self.of_nodes[child.first as usize]) && shape.meets(&child.bounds) {
-                        waiting.push(child.first);
-                    }
-                    continue;
-                }
-                let leaf = &self.bvh.primitives[child.first as usize..(child.first + child.count) as usize];
-                // The box is only asked for those that pass a cheaper test.
-                let others = leaf.iter().filter(|other| {
-                    let patch = self.patches.of(other);
-                    patch.is_some() && !is_apart(patch) && shape.is_parallel(other)
-                });
-                let mut others = others.peekable();
-                if others.peek().is_none() || !shape.meets(&child.bounds) {
-                    continue;
-                }
-                for other in others {
-                    let Some(patch) = self.patches.of(other) else { continue };
-                    if !found.contains(&patch) && coincide(primitive, other) {
-                        found.push(patch);
-                    }
-                }
-            }
-        }
-        found
-    }
+    Contacts { ranks, warning: patches.warning(scene, &pairs).or(unasked) }
 }
 
 #[cfg(test)]

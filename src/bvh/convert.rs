@@ -1,12 +1,13 @@
-//! Conversion of a binary tree of any depth to one of at most [`MAX_HEIGHT`] levels, whose nodes
-//! store the boxes of both children.
+//! Conversion of a binary tree of any depth to one of few levels, whose nodes store the boxes of
+//! both children.
 
 use obvhs::bvh2::Bvh2;
 
 use super::{BvhChild, MAX_LEAF};
+use crate::layout::even_height;
 use crate::scene::Bounds;
 
-/// Maximum height of the converted tree: interior nodes on the longest path from the root.
+/// Maximum height of a converted tree: interior nodes on the longest path from the root.
 pub(super) const MAX_HEIGHT: u32 = 32;
 
 /// A binary tree. [`BvhChild::first`] of a leaf is an index into `order`.
@@ -17,10 +18,11 @@ pub(super) struct Binary {
     pub order: Vec<u32>,
 }
 
-/// Converts `tree`, which holds at least two primitives with the given bounds.
-pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds]) -> Binary {
+/// Converts `tree`, which holds at least two primitives with the given bounds, to one of at most
+/// `max_height` levels.
+pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds], max_height: u32) -> Binary {
     let made = Binary { nodes: Vec::new(), order: Vec::with_capacity(bounds.len()) };
-    let mut converter = Converter { tree, bounds, subtrees: measure(tree), made };
+    let mut converter = Converter { tree, bounds, max_height, subtrees: measure(tree), made };
     let root = converter.tree_node(0, 0);
     if root.count > 0 {
         // All primitives fit in one leaf, but the root needs two children.
@@ -62,22 +64,17 @@ fn measure(tree: &Bvh2) -> Vec<Subtree> {
     subtrees
 }
 
-/// Height of an evenly split tree over `primitives` primitives.
-fn even_height(primitives: u32) -> u32 {
-    primitives.div_ceil(MAX_LEAF).next_power_of_two().trailing_zeros()
-}
-
 struct Converter<'a> {
     tree: &'a Bvh2,
     bounds: &'a [Bounds],
+    max_height: u32,
     subtrees: Vec<Subtree>,
     made: Binary,
 }
 
 impl Converter<'_> {
     /// Converts the subtree of a node that lies below `depth` interior nodes. A subtree that is too
-    /// deep keeps its upper nodes as long as an even split of the children still fits into
-    /// [`MAX_HEIGHT`].
+    /// deep keeps its upper nodes as long as an even split of the children still fits.
     fn tree_node(&mut self, index: u32, depth: u32) -> BvhChild {
         let node = &self.tree.nodes[index as usize];
         if node.is_leaf() {
@@ -86,8 +83,9 @@ impl Converter<'_> {
             return self.leaf(&leaf);
         }
         let children = [node.first_index, node.first_index + 1];
-        let fits = depth + self.subtrees[index as usize].height <= MAX_HEIGHT;
-        let fits_later = |child: u32| depth + 1 + even_height(self.subtrees[child as usize].primitives) <= MAX_HEIGHT;
+        let fits = depth + self.subtrees[index as usize].height <= self.max_height;
+        let least = |child: u32| even_height(self.subtrees[child as usize].primitives as usize);
+        let fits_later = |child: u32| depth + 1 + least(child) <= self.max_height;
         if !fits && !children.into_iter().all(fits_later) {
             let mut below = self.primitives_below(index);
             return self.even_node(&mut below, depth);

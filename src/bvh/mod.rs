@@ -7,6 +7,7 @@
 //! farther children and keeps at most [`BVH_STACK`](crate::layout::BVH_STACK) of them on its stack.
 
 mod build;
+mod contact_search;
 mod contacts;
 mod convert;
 mod media;

@@ -70,6 +70,24 @@ impl BvhNode {
         node
     }
 
+    /// The node of a tree that is appended to others: its indices of nodes and primitives are
+    /// higher by so many.
+    ///
+    /// # Panics
+    /// If an index is then 2^28 or more.
+    #[must_use]
+    pub fn moved(&self, nodes: u32, primitives: u32) -> Self {
+        let mask = (1 << BVH_INDEX_BITS) - 1;
+        let moved = |word: u32, by: u32| {
+            assert!((word & mask) + by <= mask, "trees of more than 2^28 nodes or primitives");
+            word + by
+        };
+        let mut node = *self;
+        node.low[3] = moved(self.low[3], nodes);
+        node.high[3] = moved(self.high[3], primitives);
+        node
+    }
+
     /// Unpacks the children, in the order in which they were packed.
     pub fn children(&self) -> impl Iterator<Item = BvhChild> + use<> {
         let Self { grid: [x, y, z, shape], low, high } = *self;

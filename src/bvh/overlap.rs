@@ -21,6 +21,8 @@ pub(super) struct Shape {
     bounds: Bounds,
     /// Corners and directions of a triangle: normal and edges; `None` for a sphere.
     triangle: Option<([DVec3; 3], [DVec3; 4])>,
+    /// Largest coordinate that the tolerance follows, beside those of the primitive.
+    reach: f64,
 }
 
 impl Shape {
@@ -29,7 +31,12 @@ impl Shape {
             let [a, b, c] = corners(primitive);
             ([a, b, c], [(b - a).cross(c - a), b - a, c - b, a - c])
         });
-        Self { bounds: bounds(primitive), triangle }
+        Self { bounds: bounds(primitive), triangle, reach: 0.0 }
+    }
+
+    /// The same with the tolerance of coordinates up to `reach`.
+    pub fn widened(self, reach: f64) -> Self {
+        Self { reach, ..self }
     }
 
     /// Whether the planes of two triangles are parallel, so that they may be one; true for spheres.
@@ -44,7 +51,7 @@ impl Shape {
     /// Triangle-Box Overlap Testing"); for a sphere, whether its own box does.
     pub fn meets(&self, other: &Bounds) -> bool {
         let largest = |bounds: &Bounds| f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
-        let slack = 2.0 * TOLERANCE * largest(&self.bounds).max(largest(other));
+        let slack = 2.0 * TOLERANCE * largest(&self.bounds).max(largest(other)).max(self.reach);
         let [low, high] = [other.min.as_dvec3() - slack, other.max.as_dvec3() + slack];
         if !(self.bounds.min.as_dvec3().cmple(high).all() && low.cmple(self.bounds.max.as_dvec3()).all()) {
             return false;
@@ -62,7 +69,7 @@ impl Shape {
 }
 
 /// Largest coordinate that a primitive is computed from, metres.
-fn reach(primitive: &Primitive) -> f64 {
+pub(super) fn reach(primitive: &Primitive) -> f64 {
     let [v0, e1, e2] =
         [primitive.v0, primitive.e1, primitive.e2].map(|v| f64::from(Vec3::from_array(v).abs().max_element()));
     v0.max(e1).max(e2)

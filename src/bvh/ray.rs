@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{Bvh, FILLER};
 use crate::{
-    layout::{MATERIAL_MASK, Primitive, SPHERE_BIT},
+    layout::{INSTANCE, Instance, MATERIAL_MASK, Primitive, SPHERE_BIT},
     scene::Bounds,
 };
 
@@ -27,11 +27,36 @@ impl Bvh {
     #[must_use]
     pub fn nearest_hit(&self, origin: Vec3, direction: Vec3) -> Option<RayHit> {
         let least = LEAST * origin.abs().max_element();
-        let mut nearest: Option<(f32, &Primitive)> = None;
-        let mut waiting = vec![0];
+        let mut nearest = None;
+        self.search((0, None), (origin, direction), least, &mut nearest);
+        nearest.map(|Nearest { distance, primitive, instance }| {
+            let position = origin + distance * direction;
+            let normal = match instance {
+                None => normal_at(primitive, position),
+                Some(instance) => {
+                    let [x, y, z] = normal_at(primitive, position).to_array();
+                    let rows = [instance.from_scene_x, instance.from_scene_y, instance.from_scene_z].map(Vec3::from);
+                    (x * rows[0] + y * rows[1] + z * rows[2]).normalize_or(Vec3::Y)
+                }
+            };
+            let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
+            RayHit { position, normal, material: primitive.material & MATERIAL_MASK }
+        })
+    }
+
+    /// Looks for a nearer hit below a node, which belongs to the scene's tree or to that of an
+    /// instance. The ray is in the coordinates of that tree, distances are the same in all.
+    fn search<'b>(
+        &'b self,
+        (root, instance): (u32, Option<&'b Instance>),
+        (origin, direction): (Vec3, Vec3),
+        least: f32,
+        nearest: &mut Option<Nearest<'b>>,
+    ) {
+        let mut waiting = vec![root];
         while let Some(node) = waiting.pop() {
             for child in self.nodes[node as usize].children() {
-                let reach = nearest.map_or(f32::INFINITY, |(distance, _)| distance);
+                let reach = nearest.as_ref().map_or(f32::INFINITY, |nearest| nearest.distance);
                 if !is_met(&child.bounds, origin, direction, reach) {
                     continue;
                 }
@@ -39,19 +64,35 @@ impl Bvh {
                     waiting.push(child.first);
                 }
                 for primitive in &self.primitives[child.first as usize..(child.first + child.count) as usize] {
-                    let reach = nearest.map_or(f32::INFINITY, |(distance, _)| distance);
-                    let distance = distance_to(primitive, origin, direction, least);
-                    nearest = distance.filter(|d| *d < reach).map(|d| (d, primitive)).or(nearest);
+                    if primitive.emitter == INSTANCE {
+                        let instance = &self.instances[primitive.material as usize];
+                        let ray = ray_of_instance(instance, origin, direction);
+                        self.search((instance.root, Some(instance)), ray, least, nearest);
+                        continue;
+                    }
+                    let reach = nearest.as_ref().map_or(f32::INFINITY, |nearest| nearest.distance);
+                    let distance = distance_to(primitive, origin, direction, least).filter(|d| *d < reach);
+                    if let Some(distance) = distance {
+                        *nearest = Some(Nearest { distance, primitive, instance });
+                    }
                 }
             }
         }
-        nearest.map(|(distance, primitive)| {
-            let position = origin + distance * direction;
-            let normal = normal_at(primitive, position);
-            let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
-            RayHit { position, normal, material: primitive.material & MATERIAL_MASK }
-        })
     }
+}
+
+struct Nearest<'b> {
+    distance: f32,
+    primitive: &'b Primitive,
+    instance: Option<&'b Instance>,
+}
+
+/// A ray in the coordinates of an instance's mesh.
+fn ray_of_instance(instance: &Instance, origin: Vec3, direction: Vec3) -> (Vec3, Vec3) {
+    let rows = [instance.from_scene_x, instance.from_scene_y, instance.from_scene_z].map(Vec3::from);
+    let linear = |v: Vec3| Vec3::from(rows.map(|row| row.dot(v)));
+    let offset = Vec3::from(instance.to_scene.map(|row| row[3]));
+    (linear(origin - offset), linear(direction))
 }
 
 fn is_met(bounds: &Bounds, origin: Vec3, direction: Vec3, reach: f32) -> bool {

@@ -10,7 +10,7 @@ use glam::Vec3;
 use obvhs::splits::split_triangle;
 
 use crate::{
-    layout::{Primitive, SPHERE_BIT},
+    layout::{INSTANCE, Primitive, SPHERE_BIT},
     scene::Bounds,
 };
 
@@ -85,7 +85,7 @@ pub(super) fn pieces(primitives: &[Primitive], whole: Vec<Bounds>) -> (Vec<Bound
 /// The boxes of the parts of a triangle on both sides of the middle of its box; `None` where that
 /// gains nothing.
 fn halves(piece: &Piece, primitive: &Primitive) -> Option<[Piece; 2]> {
-    if primitive.material & SPHERE_BIT != 0 {
+    if primitive.material & SPHERE_BIT != 0 || primitive.emitter == INSTANCE {
         return None;
     }
     let size = piece.bounds.max - piece.bounds.min;

@@ -7,15 +7,16 @@ use crate::scene::Bounds;
 // Two levels of the binary tree make one wide node, which defers all children but one.
 const _: () = assert!(max_deferred(MAX_HEIGHT) <= BVH_STACK as u32 && WIDTH == 4);
 
-/// Returns the nodes, parents before children, and the primitive indices in leaf order.
-pub(super) fn widen(binary: &Binary) -> (Vec<BvhNode>, Vec<u32>) {
+/// Returns the nodes, parents before children, and the primitive indices in leaf order. The binary
+/// tree has at most `max_height` levels.
+pub(super) fn widen(binary: &Binary, max_height: u32) -> (Vec<BvhNode>, Vec<u32>) {
     let mut widener = Widener {
         binary,
         heights: heights(binary),
         nodes: vec![BvhNode::default()],
         order: Vec::with_capacity(binary.order.len()),
     };
-    widener.node(0, 0, BVH_STACK as u32);
+    widener.node(0, 0, max_deferred(max_height));
     (widener.nodes, widener.order)
 }
 

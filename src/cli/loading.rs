@@ -48,6 +48,7 @@ impl LoadingOptions {
             caustic_roughness: self.caustic_roughness,
             single_scattering: self.single_scattering,
             allow_outside: self.allow_outside,
+            share_from: LoadOptions::default().share_from,
             ignore_required: self.ignore_required.clone(),
         }
     }

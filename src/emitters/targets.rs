@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use crate::{
     layout::{self, MAX_TARGETS},
-    scene::{Bounds, Scene},
+    scene::{Bounds, Scene, SharedMesh, instance_bounds},
 };
 
 /// A bounding sphere.
@@ -139,7 +139,14 @@ fn sphere_around(items: &[Item]) -> Target {
 fn items(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Item> {
     let triangles = scene.triangles.iter().filter(|t| wanted(t.material)).map(|t| Item::Triangle(t.positions));
     let spheres = scene.spheres.iter().filter(|s| wanted(s.material)).map(|s| Item::Sphere(s.center, s.radius));
-    triangles.chain(spheres).collect()
+    let has = |mesh: &SharedMesh| mesh.triangles.iter().any(|t| wanted(t.material));
+    let meshes: Vec<bool> = scene.meshes.iter().map(has).collect();
+    // A sphere around each instance: listing all their triangles would take the memory that they
+    // spare.
+    let around = |bounds: Bounds| Item::Sphere(0.5 * (bounds.min + bounds.max), 0.5 * bounds.diagonal());
+    let boxes = scene.instances.iter().zip(instance_bounds(&scene.meshes, &scene.instances));
+    let instances = boxes.filter(|(instance, _)| meshes[instance.mesh as usize]).map(|(_, bounds)| around(bounds));
+    triangles.chain(spheres).chain(instances).collect()
 }
 
 /// Approximate fraction of a light's power that goes towards the targets; above 0 if any light can

@@ -134,12 +134,14 @@ pub struct FirstHit {
     pub alpha: f32,
     /// Relative to the scene's centre, metres.
     pub position: [f32; 3],
-    /// Index of the primitive in the scene; no number to add up.
+    /// Index of the primitive in the scene, unless `instance` is above 0; no number to add up, as
+    /// those below `uv`.
     pub id: u32,
     /// First set of texture coordinates; 0 without textures.
     pub uv: [f32; 2],
-    pub pad0: u32,
-    pub pad1: u32,
+    /// Index of its instance plus one; 0 for none.
+    pub instance: u32,
+    pub material: u32,
 }
 
 /// Rows of four numbers that a camera sample writes for the output layers: those of [`FirstHit`].

@@ -9,8 +9,19 @@ pub const MAX_WORKGROUPS: u32 = 65_535;
 /// Maximum number of deferred children in a BVH traversal; [`crate::bvh`] builds no tree that needs
 /// more.
 pub const BVH_STACK: usize = 48;
+/// The same through a scene's tree and those of the meshes in it that instances share.
+pub const INSTANCED_STACK: usize = 63;
+/// Levels of such two binary trees together, of the scene and of a mesh: two levels defer three
+/// children, a leaf of the scene up to four instances, and the way back takes one entry.
+pub const TREE_HEIGHTS: u32 = 38;
+const _: () = assert!(3 * (TREE_HEIGHTS as usize / 2) + 4 + 1 <= INSTANCED_STACK);
+/// Levels of an evenly split tree over so many primitives, at least 1, four in a leaf.
+#[must_use]
+pub const fn even_height(primitives: usize) -> u32 {
+    primitives.div_ceil(4).next_power_of_two().trailing_zeros()
+}
 // The stacks of a workgroup's traversals fit the workgroup memory that every adapter has, 16 KiB.
-const _: () = assert!((BVH_STACK + 1) * WORKGROUP_SIZE as usize * 4 <= 16 << 10);
+const _: () = assert!((INSTANCED_STACK + 1) * WORKGROUP_SIZE as usize * 4 <= 16 << 10 && BVH_STACK < INSTANCED_STACK);
 /// Maximum of the weight by which an interpolated normal changes flux; it grows without bound
 /// towards grazing angles to the geometric surface.
 pub const MAX_NORMAL_WEIGHT: f32 = 8.0;

@@ -76,6 +76,32 @@ pub struct Primitive {
     pub emitter: u32,
 }
 
+/// In place of [`Primitive::emitter`]: the primitive is the box around an instance, with its lower
+/// corner `v0` and its diagonal `e1`. Its material is the index of the [`Instance`].
+pub const INSTANCE: u32 = u32::MAX;
+
+/// A shared mesh in one place. Its primitives are numbered as if they were stored for themselves,
+/// after all that are. The first of the table is none: its numbers are those of the whole table.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Instance {
+    /// Rows of the transform from the mesh to the scene.
+    pub to_scene: [[f32; 4]; 3],
+    /// Rows of the inverse of its linear part. After the first: number of the first primitive.
+    pub from_scene_x: [f32; 3],
+    pub first: u32,
+    /// After the second: index of the first of the mesh's primitives as they are stored; of the
+    /// first of the table, how many instances follow.
+    pub from_scene_y: [f32; 3],
+    pub stored: u32,
+    /// After the third: root of the mesh's tree.
+    pub from_scene_z: [f32; 3],
+    pub root: u32,
+}
+
+/// Texels of an [`Instance`].
+pub const INSTANCE_TEXELS: u32 = 6;
+
 /// Interpolated normals of a triangle's corners, octahedral (see
 /// [`octahedral`](super::octahedral())); unused for spheres.
 #[repr(C)]

@@ -12,7 +12,7 @@ use crate::{
         cryptomatte::hash,
         layers::{HITS, LightComponent, POSITIONS, Source},
     },
-    layout::{ArrivingLight, Gathered, VisiblePoint},
+    layout::{ArrivingLight, FirstHit, Gathered, VisiblePoint},
     map_kind::MapKind,
     passes::{CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
@@ -271,24 +271,24 @@ impl<'a> CameraPass<'a> {
 
     /// Adds to the mattes what the tile's samples see first.
     fn add_mattes(&self, tile: &Tile, film: &mut Film) -> Result<()> {
-        let (triangles, spheres) = (&self.geometry.triangles, &self.geometry.spheres);
-        let owner = |id: u32| match triangles.get(id as usize) {
-            Some(triangle) => (triangle.object, triangle.material),
-            None => {
-                spheres.get(id as usize - triangles.len()).map_or((0, 0), |sphere| (sphere.object, sphere.material))
-            }
+        let Scene { triangles, spheres, instances, .. } = self.geometry;
+        let object = |hit: &FirstHit| {
+            let instance = (hit.instance as usize).checked_sub(1).and_then(|at| instances.get(at));
+            let triangle = || triangles.get(hit.id as usize).map(|triangle| triangle.object);
+            let sphere = || Some(spheres.get((hit.id as usize).checked_sub(triangles.len())?)?.object);
+            instance.map(|instance| instance.object).or_else(triangle).or_else(sphere).unwrap_or(0)
         };
         let hits = self.tracer.first_hits(self.gpu, tile)?;
         for (i, hits) in (0..).zip(hits.chunks(tile.samples as usize)) {
             let Some(pixel) = self.tracer.pixel(tile, i) else { continue };
-            let owners = || hits.iter().filter(|hit| hit.alpha > 0.0).map(|hit| owner(hit.id));
+            let seen = || hits.iter().filter(|hit| hit.alpha > 0.0);
             let of = |hashes: &[u32], index: u32| hashes.get(index as usize).copied();
             let [objects, materials] = &self.hashes;
-            film.add_to_matte(ExtraLayers::Objects, pixel, owners().filter_map(|(object, _)| of(objects, object)));
+            film.add_to_matte(ExtraLayers::Objects, pixel, seen().filter_map(|hit| of(objects, object(hit))));
             film.add_to_matte(
                 ExtraLayers::Materials,
                 pixel,
-                owners().filter_map(|(_, material)| of(materials, material)),
+                seen().filter_map(|hit| of(materials, hit.material)),
             );
         }
         Ok(())

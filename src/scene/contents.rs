@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
 
-use super::{Attributes, Bounds, Camera, Environment, Image, Light, LoadOptions, Material, Sphere, Surface, Triangle};
+use super::{
+    Attributes, Bounds, Camera, Environment, Image, Instance, Light, LoadOptions, Material, SharedMesh, Sphere, Surface,
+    Triangle, instance_bounds, reach_of_instances,
+};
 use crate::{
     Error, Result,
     image::{EnvironmentProvenance, Provenance},
@@ -30,8 +33,12 @@ pub struct Scene {
     pub hash: String,
     /// Offset subtracted from all world coordinates of the file: the centre of its geometry.
     pub center: DVec3,
-    /// Triangles of all meshes.
+    /// Triangles of all meshes that are not shared.
     pub triangles: Vec<Triangle>,
+    /// Meshes that instances share.
+    pub meshes: Vec<SharedMesh>,
+    /// Places of these.
+    pub instances: Vec<Instance>,
     /// Attributes at the corners of triangles with textures or colours.
     pub attributes: Vec<Attributes>,
     /// Images of the materials' textures.
@@ -65,7 +72,8 @@ impl Scene {
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         let triangles = self.triangles.iter().map(Bounds::from);
-        triangles.chain(self.spheres.iter().map(Bounds::from)).fold(Bounds::EMPTY, Bounds::union)
+        let instances = instance_bounds(&self.meshes, &self.instances);
+        triangles.chain(self.spheres.iter().map(Bounds::from)).chain(instances).fold(Bounds::EMPTY, Bounds::union)
     }
 
     /// Bounding sphere of all geometry, around the centre of its bounding box: centre and radius,
@@ -79,7 +87,8 @@ impl Scene {
         let center = 0.5 * (bounds.min + bounds.max);
         let corners = self.triangles.iter().flat_map(|t| t.positions).map(|p| p.distance(center));
         let balls = self.spheres.iter().map(|s| s.center.distance(center) + s.radius);
-        (center, corners.chain(balls).fold(0.0, f32::max))
+        let instances = reach_of_instances(&self.meshes, &self.instances, center);
+        (center, corners.chain(balls).fold(instances, f32::max))
     }
 
     /// Whether a surface is sharp enough for caustics.
@@ -137,6 +146,14 @@ impl Scene {
         let satisfies = |material: u32| satisfied.get(material as usize) == Some(&true);
         self.triangles.iter().any(|triangle| satisfies(triangle.material))
             || self.spheres.iter().any(|sphere| satisfies(sphere.material))
+            || self.meshes.iter().flat_map(|mesh| &mesh.triangles).any(|triangle| satisfies(triangle.material))
+    }
+
+    /// Number of triangles that are shown, those of each instance counted.
+    #[must_use]
+    pub fn triangle_count(&self) -> usize {
+        let of = |instance: &Instance| self.meshes[instance.mesh as usize].triangles.len();
+        self.triangles.len() + self.instances.iter().map(of).sum::<usize>()
     }
 
     /// Whether the scene names a light, dark or not.
@@ -215,7 +232,7 @@ impl Scene {
     pub fn check_renderable(&self) -> Result<()> {
         let error =
             |place: &str, problem: String| Error::Scene { path: self.path.clone(), place: place.to_owned(), problem };
-        if self.triangles.is_empty() && self.spheres.is_empty() {
+        if self.triangles.is_empty() && self.spheres.is_empty() && self.instances.is_empty() {
             let notes =
                 if self.warnings.is_empty() { String::new() } else { format!(" ({})", self.warnings.join("; ")) };
             return Err(error("scene", format!("nothing to draw: it holds no triangle and no sphere{notes}")));

@@ -21,8 +21,12 @@ pub struct SceneInfo {
     pub hash: String,
     /// Number of meshes in the file.
     pub meshes: usize,
-    /// Number of triangles.
+    /// Number of triangles, those of each instance counted.
     pub triangles: usize,
+    /// Number of instances, places of meshes that are held once.
+    pub instances: usize,
+    /// Number of triangles that are held.
+    pub stored_triangles: usize,
     /// Number of exact spheres.
     pub spheres: usize,
     /// Corners of the bounding box of all geometry; `None` if there is no geometry.
@@ -102,7 +106,9 @@ impl Scene {
             file_name: self.file_name.clone(),
             hash: self.hash.clone(),
             meshes: self.mesh_count,
-            triangles: self.triangles.len(),
+            triangles: self.triangle_count(),
+            instances: self.instances.len(),
+            stored_triangles: self.triangles.len() + self.meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>(),
             spheres: self.spheres.len(),
             bounds: (bounds.min.x <= bounds.max.x).then(|| [world(bounds.min), world(bounds.max)]),
             lights: (self.lights.iter())
@@ -186,7 +192,10 @@ impl fmt::Display for SceneInfo {
         writeln!(f, "{}", self.file_name)?;
         writeln!(f, "  sha256     {}", self.hash)?;
         writeln!(f, "  meshes     {}", self.meshes)?;
-        writeln!(f, "  triangles  {}", self.triangles)?;
+        match self.instances {
+            0 => writeln!(f, "  triangles  {}", self.triangles)?,
+            n => writeln!(f, "  triangles  {}, {n} instances share those of {} in memory", self.triangles, self.stored_triangles)?,
+        }
         writeln!(f, "  spheres    {}", self.spheres)?;
         match self.bounds {
             Some([min, max]) => writeln!(f, "  bounds     {} .. {} m", triple(min), triple(max))?,

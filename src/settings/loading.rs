@@ -24,6 +24,11 @@ pub struct LoadOptions {
     pub allow_outside: bool,
     /// Names of unsupported extensions that are ignored although the file requires them.
     pub ignore_required: Vec<String>,
+    /// A mesh is held once for all its copies from that number of triangles on, of all copies
+    /// together. Held for themselves they take more memory, and rays are faster. Pictures differ by
+    /// rounding.
+    #[serde(skip)]
+    pub share_from: usize,
 }
 
 impl Default for LoadOptions {
@@ -36,6 +41,7 @@ impl Default for LoadOptions {
             single_scattering: false,
             allow_outside: false,
             ignore_required: Vec::new(),
+            share_from: 200_000,
         }
     }
 }

@@ -14,7 +14,10 @@ use crate::{
         Buffer, Gpu, Kernel, SHORT_LOOPS, Table,
         shaders::{Shader, shader},
     },
-    layout::{self, ALPHA_BIT, CONTACT_BIT, Primitive, RANK_SHIFT, SLOT_SHIFT, SPHERE_BIT, TRANSMITS_BIT},
+    layout::{
+        self, ALPHA_BIT, CONTACT_BIT, INSTANCE, INSTANCED_STACK, Primitive, RANK_SHIFT, SLOT_SHIFT, SPHERE_BIT,
+        TRANSMITS_BIT,
+    },
     scene::{Alpha, Medium, Scene, Solids},
     settings::{LightSettings, Sampler},
 };
@@ -27,6 +30,8 @@ pub struct SceneBuffers {
     normals: Table,
     pub materials: MaterialBuffers,
     media: Table,
+    instances: Table,
+    has_instances: bool,
     has_spheres: bool,
     /// Maximum number of deferred children in a traversal.
     stack: usize,
@@ -112,7 +117,9 @@ impl SceneBuffers {
             single_scattering: scene.options.single_scattering,
             has_dispersion: solids.media.iter().any(|m| m.dispersion > 0.0),
             media: Table::new(gpu, "media", &media)?,
-            visits: (bvh.nodes.len() + bvh.primitives.len()) as u32,
+            instances: Table::new(gpu, "instances", &bvh.instances)?,
+            has_instances: !bvh.instances.is_empty(),
+            visits: visits(bvh),
             contacts,
             has_lobes: scene.has_lobes(),
             splits: scene
@@ -121,7 +128,7 @@ impl SceneBuffers {
                 .any(|m| m.surface.ior().is_some() || m.surface.is_coated() || m.is_finished()),
             has_spheres: !scene.spheres.is_empty(),
             // Rounded up to multiples of 16, so that few variants of a kernel are compiled.
-            stack: bvh.max_stack_depth().max(1).next_multiple_of(16),
+            stack: bvh.max_stack_depth().max(1).next_multiple_of(16).min(INSTANCED_STACK),
             solids,
             lights,
         })
@@ -140,6 +147,7 @@ impl SceneBuffers {
             normals: self.normals.clone(),
             materials: self.materials.relit(gpu, scene, settings.unit)?,
             media: self.media.clone(),
+            instances: self.instances.clone(),
             solids: self.solids.clone(),
             contacts: Arc::clone(&self.contacts),
             lights,
@@ -166,6 +174,7 @@ impl SceneBuffers {
         let mut overrides = vec![
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
             ("HAS_CONTACTS", f64::from(u8::from(self.contacts.ranks.iter().any(Option::is_some)))),
+            ("HAS_INSTANCES", f64::from(u8::from(self.has_instances))),
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_LAYERS", f64::from(u8::from(self.materials.has_layers))),
             ("HAS_FINISHES", f64::from(u8::from(self.materials.has_finishes))),
@@ -186,7 +195,8 @@ impl SceneBuffers {
         let budget = self.visits.next_power_of_two().clamp(SHORT_LOOPS, gpu.trace_budget);
         overrides.push(("TRACE_BUDGET", f64::from(budget)));
         let [light_nodes, pixels, cells, rows] = self.lights.tables();
-        let own = [("normals", &self.normals), ("media_table", &self.media), light_nodes, pixels, cells, rows];
+        let own = [("normals", &self.normals), ("media_table", &self.media), ("instances", &self.instances)];
+        let own = [&own[..], &[light_nodes, pixels, cells, rows]].concat();
         let tables = [&own[..], &self.materials.tables()].concat();
         Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }
@@ -218,6 +228,18 @@ fn split_or_none(split: u64) -> f64 {
     if split == 0 { f64::from(u32::MAX) } else { split as f64 }
 }
 
+/// Nodes and primitives that a ray may visit, those of each instance counted.
+fn visits(bvh: &Bvh) -> u32 {
+    let all = bvh.nodes.len() + bvh.primitives.len();
+    // A tree has fewer nodes than primitives.
+    let of_instance = |from: &layout::Instance, to: u32| 2 * (to - from.first) as usize;
+    let firsts = bvh.instances.iter().skip(2).map(|instance| instance.first);
+    let between: usize = bvh.instances.iter().skip(1).zip(firsts).map(|(from, to)| of_instance(from, to)).sum();
+    // The last may be as large as all that are stored.
+    let last = if bvh.instances.is_empty() { 0 } else { all };
+    u32::try_from(all + between + last).unwrap_or(u32::MAX >> 1)
+}
+
 /// The primitives, each with the light that it is, and marked as [`Primitive::material`] says.
 fn marked(
     primitives: &[Primitive],
@@ -229,6 +251,9 @@ fn marked(
     let transmits: Vec<bool> = scene.materials.iter().map(|m| m.surface.transmits()).collect();
     let has_alpha: Vec<bool> = scene.materials.iter().map(|m| m.alpha != Alpha::Opaque).collect();
     let mark = |(p, rank): (&Primitive, &Option<u32>)| {
+        if p.emitter == INSTANCE {
+            return *p;
+        }
         let of = |marks: &[bool]| marks.get((p.material & !SPHERE_BIT) as usize) == Some(&true);
         let alpha = if of(&has_alpha) { ALPHA_BIT } else { 0 };
         let transmits = if of(&transmits) { TRANSMITS_BIT } else { 0 };

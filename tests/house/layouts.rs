@@ -41,6 +41,7 @@ fn twins() -> Vec<Twin> {
     twins! {
         BvhNode { grid, low, high }
         Primitive { v0, material, e1, id, e2, emitter }
+        Instance { to_scene, from_scene_x, first, from_scene_y, stored, from_scene_z, root }
         Normals { n0, n1, n2, attributes }
         MaterialRecord { color, kind, emission, ior, roughness, metallic, transmission, flags, f0, specular, normal_scale, opacity, cutoff, diffuse_transmission, diffuse_transmission_color, clearcoat, clearcoat_roughness, clearcoat_normal_scale, anisotropy, anisotropy_rotation, sheen_color, sheen_roughness, iridescence, iridescence_ior, iridescence_thickness, textures }
         TextureRecord { first, size, flags, levels, transform }
@@ -65,7 +66,7 @@ fn twins() -> Vec<Twin> {
         IrradianceRecord { position, ng, irradiance, direction_and_reach }
         RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, footprint }
         IrradianceCell { coordinates, level, position, split, normal, pad0, irradiance, pad1 }
-        FirstHit { normal, depth, albedo, alpha, position, id, uv, pad0, pad1 }
+        FirstHit { normal, depth, albedo, alpha, position, id, uv, instance, material }
         DirectLight { light, points, pad0, pad1 }
         EmitterSample { points, sample, samples, roots }
         Cell { lo, wi_lo, hi, wi_hi }

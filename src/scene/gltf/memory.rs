@@ -30,6 +30,18 @@ pub(super) fn check(triangles: usize, with_attributes: usize) -> Read<()> {
     }
 }
 
+/// Maximum number of triangles with those of all instances, so that each has a number of 28 bits;
+/// boxes that splitting adds are left room for.
+const MAX_SHOWN: usize = 260_000_000;
+
+/// Refuses more triangles, those of each instance counted, than can be numbered.
+pub(super) fn check_shown(triangles: usize) -> Read<()> {
+    if triangles > MAX_SHOWN {
+        return fault("scene", format!("{triangles} triangles with those of all instances, at most {MAX_SHOWN} are read"));
+    }
+    Ok(())
+}
+
 /// Memory per texel, bytes: RGBA, a copy with smaller versions on the way to the device, and there
 /// where the device has no memory of its own.
 const BYTES_PER_TEXEL: u64 = 4 + 6 + 6;

@@ -16,13 +16,18 @@ use super::memory;
 use super::meshes::{self, Deformation, MeshPrimitive};
 use super::nodes::PlacedNode;
 use super::primitives::Shape;
+use super::sharing;
 use super::skins;
 
 /// A mesh as a node shows it.
 #[derive(Debug)]
 pub(super) struct MeshInstance<'a> {
     pub(super) node: usize,
+    /// Index of the mesh among those that are read.
+    pub(super) mesh: usize,
     pub(super) primitives: &'a [MeshPrimitive],
+    /// Those of them that are held once for all copies.
+    pub(super) shared: &'a [bool],
     world: DMat4,
     instances: Option<&'a Instances<'a>>,
     /// For each joint of the node's skin the transform from the mesh to the world.
@@ -55,6 +60,8 @@ pub(super) struct MeshCache<'d> {
     keys: Vec<MeshKey>,
     /// In the order of the keys.
     meshes: Vec<Vec<MeshPrimitive>>,
+    /// For each primitive of each mesh, whether it is held once for all copies.
+    shared: Vec<Vec<bool>>,
     poses: HashMap<usize, Vec<DMat4>>,
 }
 
@@ -103,10 +110,10 @@ impl<'d> MeshCache<'d> {
             }
             let copies = instances.as_ref().map_or(1, |instances| instances.count);
             let claimed: usize = shapes[mesh].iter().flatten().map(|shape| shape.triangles).sum();
-            triangles = triangles.saturating_add(copies.saturating_mul(claimed));
             if claimed == 0 || copies == 0 {
                 continue;
             }
+            triangles = triangles.saturating_add(copies);
             let joints = skin.map(|skin| document.root.skins[skin].joints.len());
             let key = (mesh, node.weights.as_ref().map(|_| placed.node), joints);
             let mesh = *known.entry(key).or_insert_with(|| {
@@ -131,29 +138,48 @@ impl<'d> MeshCache<'d> {
         uses
     }
 
-    /// Refuses more triangles than there is memory for, once it is known which have attributes.
-    pub(super) fn check_memory(
-        &self,
+    /// Chooses the meshes that are held once for all copies: those whose copies have `share_from`
+    /// triangles together. Refuses more triangles than there is memory for, now that it is known
+    /// which have attributes.
+    pub(super) fn share(
+        &mut self,
         document: &Document<'_>,
         shapes: &[Vec<Option<Shape>>],
         materials: &MaterialTable,
+        share_from: usize,
     ) -> Read<()> {
-        let needs = |(primitive, _): &(&Primitive, Shape)| {
+        let mut copies = vec![0_usize; self.keys.len()];
+        self.entries.iter().for_each(|e| copies[e.mesh] = copies[e.mesh].saturating_add(e.copies()));
+        // For each primitive its triangles, whether they have attributes, and may be shared.
+        let primitive = |(primitive, shape): (&Primitive, Shape)| {
             let slot =
                 materials.slot(primitive.material.map(|material| material.value()), &attributes::sets(primitive));
-            attributes::are_needed(primitive, slot)
+            let may_share = sharing::is_sharable(&materials.materials[slot.index as usize]);
+            (shape.triangles, attributes::are_needed(primitive, slot), may_share)
         };
-        let of_mesh: Vec<[usize; 2]> = (self.keys.iter())
-            .map(|(mesh, ..)| {
-                let all = shown(document, *mesh, shapes).map(|(_, shape)| shape.triangles).sum();
-                [all, shown(document, *mesh, shapes).filter(needs).map(|(_, shape)| shape.triangles).sum()]
-            })
-            .collect();
-        let of_entries =
-            self.entries.iter().map(|entry| of_mesh[entry.mesh].map(|count| count.saturating_mul(entry.copies())));
-        let [triangles, attributes] =
-            of_entries.fold([0_usize; 2], |[a, b], [c, d]| [a.saturating_add(c), b.saturating_add(d)]);
-        memory::check(triangles, attributes)
+        let of_mesh = |(mesh, _, joints): &MeshKey| -> Vec<(usize, bool, bool)> {
+            let rigid = |(triangles, needs, may)| (triangles, needs, may && joints.is_none());
+            shown(document, *mesh, shapes).map(primitive).map(rigid).collect()
+        };
+        let meshes: Vec<Vec<(usize, bool, bool)>> = self.keys.iter().map(of_mesh).collect();
+        let once: usize = meshes.iter().flatten().map(|(triangles, ..)| triangles).fold(0, |a, b| a.saturating_add(*b));
+        let [mut triangles, mut with_attributes, mut shown] = [0_usize; 3];
+        for (mesh, copies) in meshes.iter().zip(&copies) {
+            let sharable = mesh.iter().filter(|(.., may)| *may).map(|(triangles, ..)| *triangles).sum();
+            let is_shared = sharing::is_worth_it(sharable, *copies, once, share_from);
+            for (count, needs, may) in mesh {
+                let held = if is_shared && *may { 1 } else { *copies };
+                triangles = triangles.saturating_add(count.saturating_mul(held));
+                with_attributes = with_attributes.saturating_add(if *needs { count.saturating_mul(held) } else { 0 });
+            }
+            if is_shared {
+                triangles = triangles.saturating_add(*copies);
+                shown = shown.saturating_add(sharable.saturating_mul(*copies));
+            }
+            self.shared.push(mesh.iter().map(|(.., may)| is_shared && *may).collect());
+        }
+        memory::check(triangles, with_attributes)?;
+        memory::check_shown(triangles.saturating_add(shown))
     }
 
     /// Reads the meshes.
@@ -187,6 +213,8 @@ impl<'d> MeshCache<'d> {
     pub(super) fn instances(&self) -> Vec<MeshInstance<'_>> {
         let instances = self.entries.iter().map(|entry| MeshInstance {
             node: entry.placed.node,
+            mesh: entry.mesh,
+            shared: &self.shared[entry.mesh],
             primitives: &self.meshes[entry.mesh],
             world: entry.placed.world,
             instances: entry.instances.as_ref(),

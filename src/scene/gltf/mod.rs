@@ -41,6 +41,7 @@ mod nodes;
 mod placing;
 mod primitives;
 mod root;
+mod sharing;
 mod skins;
 mod spheres;
 mod strict_json;
@@ -91,7 +92,7 @@ pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<S
     }
     let resources = Resources { bin, folder, allow_outside: options.allow_outside };
     let scene =
-        assemble(&root, chosen, &resources, options.texture_size, hash, notes).map_err(|fault| fault.of(path))?;
+        assemble(&root, chosen, &resources, options, hash, notes).map_err(|fault| fault.of(path))?;
     Ok(Scene {
         path: path.to_owned(),
         file_name,
@@ -116,7 +117,7 @@ fn assemble(
     root: &json::Root,
     chosen: usize,
     resources: &Resources<'_>,
-    texture_size: Option<u32>,
+    options: &LoadOptions,
     mut hash: Sha256,
     mut notes: Notes,
 ) -> Read<Scene> {
@@ -131,7 +132,7 @@ fn assemble(
     let contents = NodeContents::read(root, &placed, &mut notes)?;
     let uses = [cache.uses(&document, &shapes), contents.uses()].concat();
     let materials = MaterialTable::read(root, &uses, &mut notes)?;
-    cache.check_memory(&document, &shapes, &materials)?;
+    cache.share(&document, &shapes, &materials, options.share_from)?;
     cache.read(&document, &shapes, &worlds, &materials)?;
     let instances = cache.instances();
     let mut bounds = WorldBounds::EMPTY;
@@ -150,9 +151,9 @@ fn assemble(
     }
 
     let mut scene = Scene { center, mesh_count: root.meshes.len(), ..Scene::default() };
-    let Placed { mut triangles, attributes, meshes } = placing::place(&instances, center, &mut notes)?;
+    let Placed { mut triangles, attributes, meshes, shared } = placing::place(&instances, center, &mut notes)?;
     drop(instances);
-    scene.images = materials.images.read(&document, resources, texture_size, &mut hash, &mut notes)?;
+    scene.images = materials.images.read(&document, resources, options.texture_size, &mut hash, &mut notes)?;
     let slot = |material: Option<usize>| materials.slot(material, &[]).index;
     scene.spheres = contents.spheres.iter().map(|sphere| sphere.relative_to(center, &slot)).collect();
     scene.names_dark_light = materials.names_dark_light;
@@ -161,10 +162,12 @@ fn assemble(
     let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges);
     warnings.into_iter().for_each(|warning| notes.add(warning));
     (scene.triangles, scene.attributes, scene.shells) = (triangles, attributes, shells);
+    (scene.meshes, scene.instances) = (shared.meshes, shared.instances);
     name_objects(root, &mut scene);
     doubled_lamps::remove(&mut scene, &mut notes);
     placing::turn_tangents(&scene.triangles, &mut scene.attributes);
     placing::keep_attributes_in_use(&mut scene.triangles, &mut scene.attributes);
+    scene.add_attributes_of_meshes(shared.attributes);
     contents.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     scene.warnings = notes.into_lines();
@@ -189,6 +192,7 @@ fn name_objects(root: &json::Root, scene: &mut Scene) {
     };
     scene.triangles.iter_mut().for_each(|triangle| renumber(&mut triangle.object));
     scene.spheres.iter_mut().for_each(|sphere| renumber(&mut sphere.object));
+    scene.instances.iter_mut().for_each(|instance| renumber(&mut instance.object));
 }
 
 /// A copy of a mesh with its name in messages.

@@ -7,6 +7,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3, Vec4};
 use super::fault::{Notes, Read, fault};
 use super::mesh_cache::MeshInstance;
 use super::meshes::MeshPrimitive;
+use super::sharing::Shared;
 use crate::scene::{Attributes, Triangle, vertex_bits};
 
 /// Maximum size of a scene, metres.
@@ -31,6 +32,10 @@ impl WorldBounds {
         self.max = self.max.max(point + radius);
     }
 
+    fn hold(&self, point: DVec3) -> bool {
+        point.cmpge(self.min).all() && point.cmple(self.max).all()
+    }
+
     /// Whether areas within the box are representable in f32.
     pub(super) fn fits(&self) -> bool {
         let extent = self.max - self.min;
@@ -46,9 +51,15 @@ impl WorldBounds {
 /// Adds the vertices of all shown triangles to `bounds`.
 pub(super) fn measure(instances: &[MeshInstance<'_>], bounds: &mut WorldBounds) -> Read<()> {
     for instance in instances {
+        let boxes: Vec<[DVec3; 8]> = instance.primitives.iter().map(corners_of_box).collect();
         for i in 0..instance.copies() {
             let to_world = instance.world(i)?;
-            for primitive in instance.primitives {
+            for (primitive, corners) in instance.primitives.iter().zip(&boxes) {
+                // What lies in a box that is within the bounds adds nothing.
+                if primitive.influences.is_empty() && corners.iter().all(|c| bounds.hold(to_world.transform_point3(*c)))
+                {
+                    continue;
+                }
                 (0..primitive.positions.len()).for_each(|v| {
                     bounds.add(
                         instance.matrix(primitive, v, to_world).transform_point3(primitive.positions[v].as_dvec3()),
@@ -64,6 +75,16 @@ pub(super) fn measure(instances: &[MeshInstance<'_>], bounds: &mut WorldBounds) 
     Ok(())
 }
 
+/// Corners of the box around a primitive.
+fn corners_of_box(primitive: &MeshPrimitive) -> [DVec3; 8] {
+    let (min, max) = (primitive.positions.iter())
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), position| (min.min(*position), max.max(*position)));
+    std::array::from_fn(|i| {
+        let side = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
+        Vec3::new(side(0), side(1), side(2)).as_dvec3()
+    })
+}
+
 /// The triangles of a copy of a mesh, with the node that shows it.
 pub(super) type PlacedMesh = (Range<usize>, usize);
 
@@ -75,22 +96,31 @@ pub(super) struct Placed {
     pub(super) attributes: Vec<Attributes>,
     /// Copies of meshes to which the triangles belong, in their order.
     pub(super) meshes: Vec<PlacedMesh>,
+    pub(super) shared: Shared,
 }
 
 /// All shown triangles relative to `center`. Their objects are the indices of nodes.
 pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut Notes) -> Read<Placed> {
-    let sum = |of: fn(&MeshPrimitive) -> usize| -> usize {
-        instances.iter().map(|instance| instance.copies() * total(instance.primitives, of)).sum()
+    let sum = |of: fn(&MeshPrimitive, bool) -> usize| -> usize {
+        let total = |copy: &MeshInstance<'_>| copy.primitives.iter().zip(copy.shared).map(|(p, s)| of(p, *s)).sum::<usize>();
+        instances.iter().map(|instance| instance.copies() * total(instance)).sum()
     };
-    let claimed = sum(|primitive| primitive.claimed);
+    let claimed = sum(|primitive, _| primitive.claimed);
     let mut placed = Placed::default();
-    placed.triangles.reserve_exact(sum(|primitive| primitive.corners.len()));
-    placed.attributes.reserve_exact(sum(|p| if p.attributes.is_some() { p.corners.len() } else { 0 }));
+    placed.triangles.reserve_exact(sum(|p, shared| if shared { 0 } else { p.corners.len() }));
+    placed.attributes.reserve_exact(sum(|p, shared| if p.attributes.is_some() && !shared { p.corners.len() } else { 0 }));
+    let mut of_instances = 0;
     for instance in instances {
         for i in 0..instance.copies() {
             let to_scene = DMat4::from_translation(-center) * instance.world(i)?;
             let first = placed.triangles.len();
-            for primitive in instance.primitives {
+            let is_shared = instance.shared.contains(&true);
+            let added = if is_shared { placed.shared.add(instance, to_scene) } else { None };
+            of_instances += added.unwrap_or(0);
+            for (primitive, shared) in instance.primitives.iter().zip(instance.shared) {
+                if *shared && added.is_some() {
+                    continue;
+                }
                 if primitive.influences.is_empty() {
                     place_rigid(primitive, to_scene, &mut placed);
                 } else {
@@ -98,10 +128,12 @@ pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut N
                 }
             }
             placed.triangles[first..].iter_mut().for_each(|triangle| triangle.object = instance.node as u32);
-            placed.meshes.push((first..placed.triangles.len(), instance.node));
+            if first < placed.triangles.len() {
+                placed.meshes.push((first..placed.triangles.len(), instance.node));
+            }
         }
     }
-    let dropped = claimed - placed.triangles.len();
+    let dropped = claimed - placed.triangles.len() - of_instances;
     if dropped > 0 {
         notes.add(format!("{dropped} of {claimed} triangles have no area and are not drawn"));
     }
@@ -112,7 +144,7 @@ impl Placed {
     /// Leaves out meshes whose triangles all are those of an earlier one: the same lamp twice
     /// shines once, and no ray has to visit thousands of copies in one place.
     fn without_copies(self, notes: &mut Notes) -> Self {
-        let Self { triangles, attributes, meshes } = self;
+        let Self { triangles, attributes, meshes, shared } = self;
         let corners = |triangle: &Triangle| triangle.positions.map(vertex_bits);
         // Each triangle has attributes of its own: equal ones have different indices.
         let values = |triangle: &Triangle| {
@@ -133,17 +165,20 @@ impl Placed {
         };
         let copies: Vec<bool> = meshes.iter().map(|(range, _)| is_copy(range)).collect();
         let count = copies.iter().filter(|copy| **copy).count();
-        if count == 0 {
-            return Self { triangles, attributes, meshes };
+        if count + shared.copies > 0 {
+            let count = count + shared.copies;
+            notes.add(format!("{count} copies of meshes lie exactly where others do and are not drawn"));
         }
-        notes.add(format!("{count} copies of meshes lie exactly where others do and are not drawn"));
+        if count == 0 {
+            return Self { triangles, attributes, meshes, shared };
+        }
         let (mut kept, mut ranges) = (Vec::new(), Vec::new());
         for ((range, node), _) in meshes.into_iter().zip(copies).filter(|(_, copy)| !*copy) {
             let first = kept.len();
             kept.extend_from_slice(&triangles[range]);
             ranges.push((first..kept.len(), node));
         }
-        Self { triangles: kept, attributes, meshes: ranges }
+        Self { triangles: kept, attributes, meshes: ranges, shared }
     }
 }
 
@@ -168,10 +203,6 @@ pub(super) fn keep_attributes_in_use(triangles: &mut [Triangle], attributes: &mu
         triangle.attributes = kept.len() as u32;
     }
     *attributes = kept;
-}
-
-fn total(primitives: &[MeshPrimitive], of: impl Fn(&MeshPrimitive) -> usize) -> usize {
-    primitives.iter().map(of).sum()
 }
 
 /// Motion of the vertices of a primitive to the scene.
@@ -206,7 +237,7 @@ impl Move {
 }
 
 /// Triangles of one primitive with non-zero area.
-fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, placed: &mut Placed) {
+pub(super) fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, placed: &mut Placed) {
     let all = Move::new(to_scene);
     let positions: Vec<Vec3> = primitive.positions.iter().map(|position| all.position(*position)).collect();
     let normals: Option<Vec<Vec3>> =
