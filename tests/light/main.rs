@@ -5,6 +5,7 @@ mod contacts;
 mod extremes;
 mod few_photons;
 mod flat_surfaces;
+mod instances;
 mod lights;
 mod modes;
 mod narrow_things;
