@@ -179,15 +179,7 @@ fn instances(instances: &[scene::Instance], places: &[Place], stored: usize) -> 
         let (rows, inverse) = (instance.linear.transpose(), instance.linear.inverse().transpose());
         let row = |axis: usize| rows.col(axis).extend(instance.offset[axis]).to_array();
         let [from_scene_x, from_scene_y, from_scene_z] = [0, 1, 2].map(|axis| inverse.col(axis).to_array());
-        Instance {
-            to_scene: [row(0), row(1), row(2)],
-            from_scene_x,
-            first,
-            from_scene_y,
-            stored,
-            from_scene_z,
-            root,
-        }
+        Instance { to_scene: [row(0), row(1), row(2)], from_scene_x, first, from_scene_y, stored, from_scene_z, root }
     };
     let of_all: Vec<Instance> = instances.iter().map(instance).collect();
     [vec![head], of_all].concat()

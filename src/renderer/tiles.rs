@@ -285,11 +285,7 @@ impl<'a> CameraPass<'a> {
             let of = |hashes: &[u32], index: u32| hashes.get(index as usize).copied();
             let [objects, materials] = &self.hashes;
             film.add_to_matte(ExtraLayers::Objects, pixel, seen().filter_map(|hit| of(objects, object(hit))));
-            film.add_to_matte(
-                ExtraLayers::Materials,
-                pixel,
-                seen().filter_map(|hit| of(materials, hit.material)),
-            );
+            film.add_to_matte(ExtraLayers::Materials, pixel, seen().filter_map(|hit| of(materials, hit.material)));
         }
         Ok(())
     }

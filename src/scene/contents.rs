@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use glam::{DVec3, Vec3};
 
 use super::{
-    Attributes, Bounds, Camera, Environment, Image, Instance, Light, LoadOptions, Material, SharedMesh, Sphere, Surface,
-    Triangle, instance_bounds, reach_of_instances,
+    Attributes, Bounds, Camera, Environment, Image, Instance, Light, LoadOptions, Material, SharedMesh, Sphere,
+    Surface, Triangle, instance_bounds, reach_of_instances,
 };
 use crate::{
     Error, Result,

@@ -194,7 +194,11 @@ impl fmt::Display for SceneInfo {
         writeln!(f, "  meshes     {}", self.meshes)?;
         match self.instances {
             0 => writeln!(f, "  triangles  {}", self.triangles)?,
-            n => writeln!(f, "  triangles  {}, {n} instances share those of {} in memory", self.triangles, self.stored_triangles)?,
+            n => writeln!(
+                f,
+                "  triangles  {}, {n} instances share those of {} in memory",
+                self.triangles, self.stored_triangles
+            )?,
         }
         writeln!(f, "  spheres    {}", self.spheres)?;
         match self.bounds {

@@ -3,11 +3,11 @@
 
 use caustica::{
     bvh::Bvh,
-    scene::{Scene, Sphere, Triangle},
+    scene::{Instance, Scene, SharedMesh, Sphere, Triangle},
     settings::LightSettings,
     upload::SceneBuffers,
 };
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 use support::*;
 
 use super::probe::{Probe, Row};
@@ -71,7 +71,13 @@ fn on_device(scene: &Scene, bvh: &Bvh, rays: &[Row]) -> Vec<f64> {
 /// The same by testing everything in f64.
 fn by_brute_force(scene: &Scene, ray: &Row) -> f64 {
     let [o, d] = ray.map(|[x, y, z, _]| Vec3::new(x, y, z).as_dvec3());
-    let triangles = scene.triangles.iter().filter_map(|t| hit_triangle(t.positions.map(Vec3::as_dvec3), o, d));
+    let of_instance = |instance: &Instance| {
+        let own = &scene.meshes[instance.mesh as usize].triangles;
+        let own = own.iter().map(|triangle| instance.triangle(triangle)).collect::<Vec<_>>();
+        own.into_iter()
+    };
+    let all = scene.triangles.iter().copied().chain(scene.instances.iter().flat_map(of_instance));
+    let triangles = all.filter_map(|t| hit_triangle(t.positions.map(Vec3::as_dvec3), o, d));
     let spheres = scene.spheres.iter().filter_map(|s| hit_sphere(s.center.as_dvec3(), f64::from(s.radius), o, d));
     triangles.chain(spheres).fold(f64::INFINITY, f64::min)
 }
@@ -137,6 +143,34 @@ fn finds_what_brute_force_finds() {
     flat.triangles.iter_mut().flat_map(|t| &mut t.positions).for_each(|p| p.y = 0.25);
     assert!(mismatches(&flat, &Bvh::build(&flat), Vec3::ZERO) <= UNSURE, "in a plane");
     assert!(short > 0 && long > 0, "stacks of several sizes are tested: {short}, {long}");
+}
+
+/// Meshes at random places, some stretched; between single shapes.
+#[test]
+fn finds_what_brute_force_finds_in_instances() {
+    for (triangles, instances, middle) in
+        [(1, 1, Vec3::ZERO), (30, 200, Vec3::ZERO), (500, 40, Vec3::ZERO), (60, 90, Vec3::new(200.0, -100.0, 500.0))]
+    {
+        let mut scene = shapes(300, 30, 0.1, middle);
+        let mesh = |triangles| SharedMesh { triangles: shapes(triangles, 0, 0.5, Vec3::ZERO).triangles };
+        scene.meshes = vec![mesh(triangles), mesh(2 * triangles + 1)];
+        let mut random = Random(3);
+        scene.instances = (0..instances)
+            .map(|i| {
+                let axis = |axis: Vec3| 0.1 * (axis + 0.6 * random.point());
+                let [x, y, z] = Vec3::AXES.map(axis);
+                let linear = Mat3::from_cols(x, y, z);
+                let linear = if linear.determinant() < 0.0 { -linear } else { linear };
+                Instance { mesh: i % 2, object: 0, linear, offset: middle + random.point() }
+            })
+            .collect();
+        let bvh = Bvh::build(&scene);
+        let wrong = mismatches(&scene, &bvh, middle);
+        assert!(wrong <= UNSURE, "{wrong} rays of {instances} instances of {triangles} triangles about {middle}");
+        // Control: instances 1 cm aside.
+        scene.instances.iter_mut().for_each(|instance| instance.offset += 0.01);
+        assert!(instances == 1 || mismatches(&scene, &bvh, middle) > 10 * UNSURE);
+    }
 }
 
 /// Controls: a box that is too small, and shapes that the tree does not hold.

@@ -37,7 +37,10 @@ const MAX_SHOWN: usize = 260_000_000;
 /// Refuses more triangles, those of each instance counted, than can be numbered.
 pub(super) fn check_shown(triangles: usize) -> Read<()> {
     if triangles > MAX_SHOWN {
-        return fault("scene", format!("{triangles} triangles with those of all instances, at most {MAX_SHOWN} are read"));
+        return fault(
+            "scene",
+            format!("{triangles} triangles with those of all instances, at most {MAX_SHOWN} are read"),
+        );
     }
     Ok(())
 }

@@ -91,8 +91,7 @@ pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<S
         hash.update(format!("texture size {size}"));
     }
     let resources = Resources { bin, folder, allow_outside: options.allow_outside };
-    let scene =
-        assemble(&root, chosen, &resources, options, hash, notes).map_err(|fault| fault.of(path))?;
+    let scene = assemble(&root, chosen, &resources, options, hash, notes).map_err(|fault| fault.of(path))?;
     Ok(Scene {
         path: path.to_owned(),
         file_name,

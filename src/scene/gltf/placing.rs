@@ -102,13 +102,16 @@ pub(super) struct Placed {
 /// All shown triangles relative to `center`. Their objects are the indices of nodes.
 pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut Notes) -> Read<Placed> {
     let sum = |of: fn(&MeshPrimitive, bool) -> usize| -> usize {
-        let total = |copy: &MeshInstance<'_>| copy.primitives.iter().zip(copy.shared).map(|(p, s)| of(p, *s)).sum::<usize>();
+        let total =
+            |copy: &MeshInstance<'_>| copy.primitives.iter().zip(copy.shared).map(|(p, s)| of(p, *s)).sum::<usize>();
         instances.iter().map(|instance| instance.copies() * total(instance)).sum()
     };
     let claimed = sum(|primitive, _| primitive.claimed);
     let mut placed = Placed::default();
     placed.triangles.reserve_exact(sum(|p, shared| if shared { 0 } else { p.corners.len() }));
-    placed.attributes.reserve_exact(sum(|p, shared| if p.attributes.is_some() && !shared { p.corners.len() } else { 0 }));
+    placed
+        .attributes
+        .reserve_exact(sum(|p, shared| if p.attributes.is_some() && !shared { p.corners.len() } else { 0 }));
     let mut of_instances = 0;
     for instance in instances {
         for i in 0..instance.copies() {

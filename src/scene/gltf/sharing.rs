@@ -7,7 +7,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::mesh_cache::MeshInstance;
 use super::placing::{Placed, place_rigid};
 use crate::{
-    layout::{even_height, TREE_HEIGHTS},
+    layout::{TREE_HEIGHTS, even_height},
     scene::{Attributes, Instance, Material, SharedMesh},
 };
 
@@ -87,8 +87,9 @@ impl Shared {
         }
         let shown = || copy.primitives.iter().zip(copy.shared).filter(|(_, shared)| **shared).map(|(p, _)| p);
         let positions = || shown().flat_map(|primitive| &primitive.positions);
-        let (min, max) = positions()
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), position| (min.min(*position), max.max(*position)));
+        let (min, max) = positions().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), position| {
+            (min.min(*position), max.max(*position))
+        });
         let center = if min.x <= max.x { 0.5 * (min.as_dvec3() + max.as_dvec3()) } else { DVec3::ZERO };
         let mut own = Placed { attributes: std::mem::take(&mut self.attributes), ..Placed::default() };
         let to_own = DMat4::from_scale(mirror) * DMat4::from_translation(-center);
