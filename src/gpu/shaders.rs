@@ -110,7 +110,7 @@ mod tests {
         };
         assert_eq!(more(BindingKind::ReadOnly, 1), ["trace_camera: 11 storage buffers, at most 10"]);
         assert_eq!(more(BindingKind::Uniform, 2), ["trace_camera: 5 uniform buffers, at most 4"]);
-        assert_eq!(more(BindingKind::Table, 9), ["trace_camera: 17 textures, at most 16"]);
+        assert_eq!(more(BindingKind::Table, 6), ["trace_camera: 17 textures, at most 16"]);
         let large = Shader { workgroup_size: 512, ..most };
         assert_eq!(not_portable(&[large]), ["trace_camera: 512 invocations, at most 256"]);
     }

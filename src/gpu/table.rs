@@ -33,11 +33,7 @@ impl Table {
     /// # Errors
     /// [`Error::Limit`] if a texture cannot hold it, [`Error::Memory`] if none is left.
     pub fn new<T: bytemuck::Pod>(gpu: &Gpu, label: &str, data: &[T]) -> Result<Self> {
-        let (format, texel) = match size_of::<T>() {
-            4 => (wgpu::TextureFormat::R32Uint, 4),
-            _ => (wgpu::TextureFormat::Rgba32Uint, 16),
-        };
-        assert_eq!(size_of::<T>() % texel, 0, "{label}: elements of a table fill texels");
+        let (format, texel) = texel_of::<T>(label);
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let texels = (bytes.len() / texel) as u64;
         check(gpu, label, texels, gpu.max_table_texels(), "maxImageDimension2D")?;
@@ -54,24 +50,28 @@ impl Table {
         Ok(Self(Arc::new(Texture { view, bytes: allotted, memory: Arc::clone(&gpu.memory) })))
     }
 
-    /// A table of one texel a word with layers of `TABLE_COLUMNS` rows: it holds more than one
+    /// A table as [`Self::new`] makes, with layers of `TABLE_COLUMNS` rows: it holds more than one
     /// texture.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn layered(gpu: &Gpu, label: &str, data: &[u32]) -> Result<Self> {
+    pub fn layered<T: bytemuck::Pod>(gpu: &Gpu, label: &str, data: &[T]) -> Result<Self> {
+        let (format, texel) = texel_of::<T>(label);
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let texels = bytes.len() / texel;
         let layer = TABLE_COLUMNS as usize * TABLE_COLUMNS as usize;
-        check(gpu, label, data.len() as u64, gpu.max_layered_texels(), "maxImageArrayLayers")?;
+        check(gpu, label, texels as u64, gpu.max_layered_texels(), "maxImageArrayLayers")?;
         let columns = if data.is_empty() { 1 } else { TABLE_COLUMNS };
         let size = wgpu::Extent3d {
             width: columns,
-            height: (data.len() as u32).div_ceil(columns).clamp(1, TABLE_COLUMNS),
-            depth_or_array_layers: data.len().div_ceil(layer).max(1) as u32,
+            height: (texels.div_ceil(columns as usize)).clamp(1, TABLE_COLUMNS as usize) as u32,
+            depth_or_array_layers: texels.div_ceil(layer).max(1) as u32,
         };
-        let allotted = 4 * u64::from(columns) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
-        let texture = gpu.allot(label, allotted, || create(gpu, label, size, wgpu::TextureFormat::R32Uint))?;
-        for (z, data) in data.chunks(layer).enumerate() {
-            write(gpu, &texture, z as u32, bytemuck::cast_slice(data), columns, 4);
+        let all = u64::from(columns) * u64::from(size.height) * u64::from(size.depth_or_array_layers);
+        let allotted = texel as u64 * all;
+        let texture = gpu.allot(label, allotted, || create(gpu, label, size, format))?;
+        for (z, bytes) in bytes.chunks(layer * texel).enumerate() {
+            write(gpu, &texture, z as u32, bytes, columns, texel as u32);
         }
         let view = texture.create_view(&wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
@@ -83,6 +83,16 @@ impl Table {
     pub(super) fn view(&self) -> &wgpu::TextureView {
         &self.0.view
     }
+}
+
+/// Format of the texels of a table, and their size in bytes.
+fn texel_of<T>(label: &str) -> (wgpu::TextureFormat, usize) {
+    let (format, texel) = match size_of::<T>() {
+        4 => (wgpu::TextureFormat::R32Uint, 4),
+        _ => (wgpu::TextureFormat::Rgba32Uint, 16),
+    };
+    assert_eq!(size_of::<T>() % texel, 0, "{label}: elements of a table fill texels");
+    (format, texel)
 }
 
 fn check(gpu: &Gpu, label: &str, texels: u64, max_texels: u64, limit: &'static str) -> Result<()> {

@@ -55,7 +55,7 @@ impl MaterialBuffers {
             has_rough: materials().any(is_rough),
             has_alpha: materials().any(|m| m.alpha != Alpha::Opaque),
             materials: Table::new(gpu, "materials", &rows)?,
-            attributes: Table::new(gpu, "attributes of triangles", &attributes)?,
+            attributes: Table::layered(gpu, "attributes of triangles", &attributes)?,
             texels: Table::layered(gpu, "texels", &texels.into_words())?,
         })
     }

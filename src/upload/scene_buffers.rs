@@ -25,8 +25,8 @@ use crate::{
 /// The scene's buffers.
 #[derive(Debug)]
 pub struct SceneBuffers {
-    nodes: Arc<Buffer>,
-    primitives: Halves,
+    nodes: Arc<Split>,
+    primitives: Split,
     normals: Table,
     pub materials: MaterialBuffers,
     media: Table,
@@ -64,21 +64,21 @@ pub fn sampler_constant(sampler: Sampler) -> (&'static str, f64) {
     ("SAMPLER", f64::from(number))
 }
 
-/// An array in one binding, or in two where it exceeds one.
+/// An array in a storage buffer, and what exceeds one binding in a table.
 #[derive(Debug)]
-struct Halves {
+struct Split {
     low: Buffer,
-    high: Buffer,
+    high: Table,
     /// Elements in `low` if `high` is used, else 0.
-    split: u64,
+    at: u64,
 }
 
 impl SceneBuffers {
     /// Uploads the scene.
     ///
     /// # Errors
-    /// [`crate::Error::Limit`] if the primitives exceed two bindings, the nodes one, or normals,
-    /// materials or media a table; as [`LightBuffers::new`].
+    /// [`crate::Error::Limit`] if normals, materials or media exceed a table; as
+    /// [`LightBuffers::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, bvh: &Bvh, settings: &LightSettings) -> Result<Self> {
         Self::with_contacts(gpu, (scene, bvh), Arc::new(contacts(scene, bvh)), settings)
     }
@@ -104,8 +104,8 @@ impl SceneBuffers {
         let media: Vec<_> = solids.media.iter().map(row).collect();
         let lights = LightBuffers::new(gpu, (scene, bvh), &MediaProbe::new(scene, bvh, &solids), settings)?;
         Ok(Self {
-            nodes: Arc::new(gpu.storage_with("bvh nodes", &bvh.nodes)?),
-            primitives: Halves::new::<Primitive>(
+            nodes: Arc::new(Split::new(gpu, "bvh nodes", &bvh.nodes)?),
+            primitives: Split::new::<Primitive>(
                 gpu,
                 "primitives",
                 &marked(&bvh.primitives, scene, &solids, &contacts.ranks, &lights.table),
@@ -143,7 +143,7 @@ impl SceneBuffers {
         let primitives = marked(&bvh.primitives, scene, &self.solids, &self.contacts.ranks, &lights.table);
         Ok(Self {
             nodes: Arc::clone(&self.nodes),
-            primitives: Halves::new::<Primitive>(gpu, "primitives", &primitives)?,
+            primitives: Split::new::<Primitive>(gpu, "primitives", &primitives)?,
             normals: self.normals.clone(),
             materials: self.materials.relit(gpu, scene, settings.unit)?,
             media: self.media.clone(),
@@ -186,8 +186,9 @@ impl SceneBuffers {
             ("HAS_ABSORPTION", f64::from(u8::from(self.has_absorption))),
             ("HAS_VARIED_LIGHTS", f64::from(u8::from(self.lights.table.is_varied))),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
-            ("SPLIT", f64::from(u8::from(self.primitives.split > 0))),
-            ("PRIMITIVE_SPLIT", split_or_none(self.primitives.split)),
+            ("SPLIT", f64::from(u8::from(self.primitives.at + self.nodes.at > 0))),
+            ("NODE_SPLIT", self.nodes.constant()),
+            ("PRIMITIVE_SPLIT", self.primitives.constant()),
         ];
         overrides.extend_from_slice(others);
         // After those of the caller, which has the say. Few values, so that few kernels are
@@ -196,7 +197,8 @@ impl SceneBuffers {
         overrides.push(("TRACE_BUDGET", f64::from(budget)));
         let [light_nodes, pixels, cells, rows] = self.lights.tables();
         let own = [("normals", &self.normals), ("media_table", &self.media), ("instances", &self.instances)];
-        let own = [&own[..], &[light_nodes, pixels, cells, rows]].concat();
+        let high = [("nodes_high", &self.nodes.high), ("primitives_high", &self.primitives.high)];
+        let own = [&own[..], &high, &[light_nodes, pixels, cells, rows]].concat();
         let tables = [&own[..], &self.materials.tables()].concat();
         Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }
@@ -204,28 +206,25 @@ impl SceneBuffers {
     /// The scene's variables, followed by others.
     #[must_use]
     pub fn with<'a>(&'a self, others: &[(&'a str, &'a Buffer)]) -> Vec<(&'a str, &'a Buffer)> {
-        let mut all = vec![
-            ("nodes", &*self.nodes),
-            ("primitives", &self.primitives.low),
-            ("primitives_high", &self.primitives.high),
-        ];
+        let mut all = vec![("nodes", &self.nodes.low), ("primitives", &self.primitives.low)];
         all.extend(self.lights.bindings());
         all.extend_from_slice(others);
         all
     }
 }
 
-impl Halves {
+impl Split {
     fn new<T: Pod>(gpu: &Gpu, label: &str, data: &[T]) -> Result<Self> {
         let fits = usize::try_from(gpu.max_binding() / size_of::<T>() as u64).unwrap_or(usize::MAX);
         let (low, high) = data.split_at(data.len().min(fits));
-        let split = if high.is_empty() { 0 } else { low.len() as u64 };
-        Ok(Self { low: gpu.storage_with(label, low)?, high: gpu.storage_with(label, high)?, split })
+        let at = if high.is_empty() { 0 } else { low.len() as u64 };
+        Ok(Self { low: gpu.storage_with(label, low)?, high: Table::layered(gpu, label, high)?, at })
     }
-}
 
-fn split_or_none(split: u64) -> f64 {
-    if split == 0 { f64::from(u32::MAX) } else { split as f64 }
+    /// The value of the kernels' constant.
+    fn constant(&self) -> f64 {
+        if self.at == 0 { f64::from(u32::MAX) } else { self.at as f64 }
+    }
 }
 
 /// Nodes and primitives that a ray may visit, those of each instance counted.

@@ -50,18 +50,25 @@ fn device_with_bindings(bytes: u64) -> Gpu {
 
 #[test]
 fn what_exceeds_a_binding_is_split() {
-    let scene = room(360);
+    let scene = room(560);
     let primitives = scene.triangles.len() as u64 * 48;
-    let settings = settings(Mode::Hybrid, 300_000, 24);
-    let picture = |gpu: &Gpu| render(gpu, &scene, &settings, &Silent).map(|r| r.frame);
-    let whole = picture(gpu()).expect("the scene renders");
-    // The primitives need two bindings. So do the photons of a map. Nothing else scales with the
-    // scene.
-    let split = picture(&device_with_bindings(primitives * 55 / 100)).expect("what exceeds a binding is split");
-    assert!(split == whole, "the split scene gives another picture");
-    let refused = picture(&device_with_bindings(primitives * 45 / 100)).expect_err("control: three windows");
+    let picture = |gpu: &Gpu, photons| {
+        let settings = settings(Mode::Hybrid, photons, 24);
+        render(gpu, &scene, &settings, &Silent).map(|r| r.frame)
+    };
+    // More than a half of the primitives exceed a binding, and the photons of a map; then most of
+    // the nodes too.
+    let [more, less] = [primitives * 55 / 100, 5_500_000];
+    for (photons, bytes) in [(300_000, more), (30_000, less)] {
+        let whole = picture(gpu(), photons).expect("the scene renders");
+        let split = picture(&device_with_bindings(bytes), photons).expect("what exceeds a binding is split");
+        assert!(split == whole, "{bytes} bytes: the split scene gives another picture");
+    }
+    let mut gpu = device_with_bindings(less);
+    gpu.limits.max_texture_array_layers = 0;
+    let refused = picture(&gpu, 30_000).expect_err("control: no room for the rest");
     let Error::Limit { what, limit, .. } = &refused else { panic!("{refused}") };
-    assert_eq!((what.as_str(), *limit), ("primitives", "maxStorageBufferRange"), "{refused}");
+    assert_eq!((what.as_str(), *limit), ("bvh nodes", "maxImageArrayLayers"), "{refused}");
 }
 
 #[test]

@@ -71,15 +71,19 @@ fn on_device(scene: &Scene, bvh: &Bvh, rays: &[Row]) -> Vec<f64> {
 /// The same by testing everything in f64.
 fn by_brute_force(scene: &Scene, ray: &Row) -> f64 {
     let [o, d] = ray.map(|[x, y, z, _]| Vec3::new(x, y, z).as_dvec3());
-    let of_instance = |instance: &Instance| {
-        let own = &scene.meshes[instance.mesh as usize].triangles;
-        let own = own.iter().map(|triangle| instance.triangle(triangle)).collect::<Vec<_>>();
-        own.into_iter()
-    };
-    let all = scene.triangles.iter().copied().chain(scene.instances.iter().flat_map(of_instance));
-    let triangles = all.filter_map(|t| hit_triangle(t.positions.map(Vec3::as_dvec3), o, d));
+    let triangles = scene.triangles.iter().filter_map(|t| hit_triangle(t.positions.map(Vec3::as_dvec3), o, d));
     let spheres = scene.spheres.iter().filter_map(|s| hit_sphere(s.center.as_dvec3(), f64::from(s.radius), o, d));
     triangles.chain(spheres).fold(f64::INFINITY, f64::min)
+}
+
+/// The scene with the triangles of its instances.
+fn with_copies(scene: &Scene) -> Scene {
+    let of_instance = |instance: &Instance| {
+        let own = &scene.meshes[instance.mesh as usize].triangles;
+        own.iter().map(|triangle| instance.triangle(triangle)).collect::<Vec<_>>()
+    };
+    let all = scene.triangles.iter().copied().chain(scene.instances.iter().flat_map(of_instance));
+    Scene { triangles: all.collect(), ..scene.clone() }
 }
 
 /// Möller and Trumbore 1997.
@@ -103,7 +107,8 @@ fn hit_sphere(center: DVec3, radius: f64, o: DVec3, d: DVec3) -> Option<f64> {
 fn mismatches(scene: &Scene, bvh: &Bvh, middle: Vec3) -> usize {
     let rays = rays(middle);
     let found = on_device(scene, bvh, &rays);
-    let expected: Vec<f64> = rays.iter().map(|ray| by_brute_force(scene, ray)).collect();
+    let copies = with_copies(scene);
+    let expected: Vec<f64> = rays.iter().map(|ray| by_brute_force(&copies, ray)).collect();
     let hits = expected.iter().filter(|t| t.is_finite()).count();
     let few = scene.triangles.len() + scene.spheres.len() < 2;
     assert!(few || hits > RAYS / 50, "the rays must hit something: {hits}");
