@@ -5,11 +5,16 @@ use std::{f64::consts::PI, fmt};
 use glam::DVec3;
 use serde::Serialize;
 
+use crate::layout::{self, BvhNode, Normals, Primitive};
+
 use super::{
     Cut, EmissionMap, LightKind, Projection, Scene,
     describe_materials::{self, ImageInfo, MaterialInfo},
     words::one_line,
 };
+
+/// Nodes of a tree for each of its primitives.
+const NODES_OF_PRIMITIVE: f64 = 0.2;
 
 /// Summary of a scene. Coordinates are those of the file: world space, metres. Angles are in
 /// radians.
@@ -27,6 +32,9 @@ pub struct SceneInfo {
     pub instances: usize,
     /// Number of triangles that are held.
     pub stored_triangles: usize,
+    /// Memory of geometry and its tree on the device, bytes; about, since the tree follows the
+    /// scene.
+    pub geometry_bytes: u64,
     /// Number of exact spheres.
     pub spheres: usize,
     /// Corners of the bounding box of all geometry; `None` if there is no geometry.
@@ -108,7 +116,8 @@ impl Scene {
             meshes: self.mesh_count,
             triangles: self.triangle_count(),
             instances: self.instances.len(),
-            stored_triangles: self.triangles.len() + self.meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>(),
+            stored_triangles: self.stored_triangles(),
+            geometry_bytes: self.geometry_bytes(),
             spheres: self.spheres.len(),
             bounds: (bounds.min.x <= bounds.max.x).then(|| [world(bounds.min), world(bounds.max)]),
             lights: (self.lights.iter())
@@ -134,6 +143,19 @@ impl Scene {
             variants: self.variants.clone(),
             notes: self.warnings.clone(),
         }
+    }
+
+    fn stored_triangles(&self) -> usize {
+        self.triangles.len() + self.meshes.iter().map(|mesh| mesh.triangles.len()).sum::<usize>()
+    }
+
+    fn geometry_bytes(&self) -> u64 {
+        let primitives = (self.stored_triangles() + self.spheres.len() + self.instances.len()) as u64;
+        let of_primitive = (size_of::<Primitive>() + size_of::<Normals>()) as u64;
+        primitives * of_primitive
+            + (primitives as f64 * NODES_OF_PRIMITIVE) as u64 * size_of::<BvhNode>() as u64
+            + (self.instances.len() * size_of::<layout::Instance>()) as u64
+            + (self.attributes.len() * size_of::<layout::Attributes>()) as u64
     }
 
     /// Emissive materials of visible geometry.
@@ -201,6 +223,7 @@ impl fmt::Display for SceneInfo {
             )?,
         }
         writeln!(f, "  spheres    {}", self.spheres)?;
+        writeln!(f, "  geometry   about {} bytes on the device", self.geometry_bytes)?;
         match self.bounds {
             Some([min, max]) => writeln!(f, "  bounds     {} .. {} m", triple(min), triple(max))?,
             None => writeln!(f, "  bounds     none: nothing to draw")?,

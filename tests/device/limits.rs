@@ -72,6 +72,16 @@ fn what_exceeds_a_binding_is_split() {
 }
 
 #[test]
+fn info_says_about_how_much_memory_geometry_takes() {
+    for scene in [room(60), room(200)] {
+        let bvh = caustica::bvh::Bvh::build(&scene);
+        let right = (48 * bvh.nodes.len() + (48 + 16) * bvh.primitives.len()) as f64;
+        let said = scene.describe().geometry_bytes as f64;
+        assert!((said / right - 1.0).abs() < 0.1, "{said} for {right}");
+    }
+}
+
+#[test]
 fn maps_that_no_buffers_hold_are_refused_at_once() {
     let scene = room(4);
     // A binding holds the positions of 1024 photons; there are two bindings.
