@@ -73,7 +73,8 @@ impl Bvh {
         bvh
     }
 
-    /// A tree over primitives, whose triangles are those, the first of which is the first primitive.
+    /// A tree over primitives, whose triangles are those, the first of which is the first
+    /// primitive.
     fn of<'t>(
         mut primitives: Vec<Primitive>,
         triangles: impl ExactSizeIterator<Item = &'t Triangle>,
