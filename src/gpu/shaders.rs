@@ -108,7 +108,7 @@ mod tests {
             let bindings: Vec<_> = most.bindings.iter().copied().chain(extra).collect();
             not_portable(&[Shader { bindings: bindings.leak(), ..most }])
         };
-        assert_eq!(more(BindingKind::ReadOnly, 1), ["trace_camera: 11 storage buffers, at most 10"]);
+        assert_eq!(more(BindingKind::ReadOnly, 2), ["trace_camera: 11 storage buffers, at most 10"]);
         assert_eq!(more(BindingKind::Uniform, 2), ["trace_camera: 5 uniform buffers, at most 4"]);
         assert_eq!(more(BindingKind::Table, 6), ["trace_camera: 17 textures, at most 16"]);
         let large = Shader { workgroup_size: 512, ..most };

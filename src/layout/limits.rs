@@ -17,7 +17,7 @@ pub const TREE_HEIGHTS: u32 = 38;
 const _: () = assert!(3 * (TREE_HEIGHTS as usize / 2) + 4 + 1 <= INSTANCED_STACK);
 /// Levels of an evenly split tree over so many primitives, at least 1, four in a leaf.
 #[must_use]
-pub const fn even_height(primitives: usize) -> u32 {
+pub fn even_height(primitives: usize) -> u32 {
     primitives.div_ceil(4).next_power_of_two().trailing_zeros()
 }
 // The stacks of a workgroup's traversals fit the workgroup memory that every adapter has, 16 KiB.

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
-use super::{Attributes, Bounds, Triangle, vertex_bits};
+use super::{Bounds, Triangle, vertex_bits};
 
 /// A mesh, or a part of one, that [`Instance`]s share. Its surfaces are opaque and emit no light.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -78,14 +78,4 @@ fn vertices(mesh: &SharedMesh) -> Vec<Vec3> {
         known.insert(vertex_bits(position), position);
     }
     known.into_values().collect()
-}
-
-impl super::Scene {
-    /// Appends the attributes to which the triangles of shared meshes refer by index plus one.
-    pub(super) fn add_attributes_of_meshes(&mut self, attributes: Vec<Attributes>) {
-        let first = self.attributes.len() as u32;
-        let triangles = self.meshes.iter_mut().flat_map(|mesh| &mut mesh.triangles);
-        triangles.filter(|triangle| triangle.attributes > 0).for_each(|triangle| triangle.attributes += first);
-        self.attributes.extend(attributes);
-    }
 }

@@ -277,7 +277,9 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "attributes",
             "meshes", //
             // The scene.
+            "sharing",
             "mesh_cache",
+            "shared_meshes",
             "placing",
             "doubled_lamps",
         ],

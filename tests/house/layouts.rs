@@ -93,6 +93,8 @@ fn constants() -> Vec<(&'static str, f64)> {
         WORKGROUP_SIZE,
         BVH_INDEX_BITS,
         BVH_STACK,
+        INSTANCED_STACK,
+        TREE_HEIGHTS,
         MAX_NORMAL_WEIGHT,
         OFFSET_SCALE,
         MEDIA_WORDS,
@@ -121,6 +123,8 @@ fn constants() -> Vec<(&'static str, f64)> {
         LAYERED,
         MATERIAL_TEXELS,
         ATTRIBUTE_TEXELS,
+        INSTANCE,
+        INSTANCE_TEXELS,
         DOUBLE_SIDED_BIT,
         MASK_BIT,
         BLEND_BIT,
@@ -223,7 +227,7 @@ fn disagreements(wgsl: &str) -> Vec<String> {
 }
 
 /// Structs that kernels decode from the texels of tables.
-const IN_TABLES: [&str; 3] = ["LightNode", "Medium", "Normals"];
+const IN_TABLES: [&str; 4] = ["Instance", "LightNode", "Medium", "Normals"];
 
 /// Records of tables of which kernels read single texels, so that no struct of theirs is one.
 const READ_BY_ROWS: [&str; 3] = ["MaterialRecord", "TextureRecord", "Attributes"];
@@ -338,7 +342,7 @@ fn this_test_knows_every_struct_and_constant_of_the_host() {
 
 /// Constants that no kernel names: sizes of structs; values that a kernel reads from a field or
 /// infers from the others of their kind; a limit of the host. Their values are not compared.
-const NOT_NAMED: [&str; 11] = [
+const NOT_NAMED: [&str; 13] = [
     "MASK_BIT",
     "WRAP_REPEAT",
     "MEDIA_WORDS",
@@ -350,6 +354,8 @@ const NOT_NAMED: [&str; 11] = [
     "SAMPLER_SOBOL",
     "MAX_TARGETS",
     "SPLIT_CELL",
+    "INSTANCED_STACK",
+    "TREE_HEIGHTS",
 ];
 
 #[test]

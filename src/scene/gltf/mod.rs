@@ -11,7 +11,7 @@ use gltf::json;
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    Bounds, Camera, Light, LoadOptions, Scene, Sphere,
+    Attributes, Bounds, Camera, Light, LoadOptions, Scene, Sphere,
     solids::{self, MeshRange},
 };
 use crate::{Error, Result};
@@ -41,6 +41,7 @@ mod nodes;
 mod placing;
 mod primitives;
 mod root;
+mod shared_meshes;
 mod sharing;
 mod skins;
 mod spheres;
@@ -166,7 +167,7 @@ fn assemble(
     doubled_lamps::remove(&mut scene, &mut notes);
     placing::turn_tangents(&scene.triangles, &mut scene.attributes);
     placing::keep_attributes_in_use(&mut scene.triangles, &mut scene.attributes);
-    scene.add_attributes_of_meshes(shared.attributes);
+    add_attributes_of_meshes(shared.attributes, &mut scene);
     contents.finish(&mut scene, &mut notes);
     scene.hash = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     scene.warnings = notes.into_lines();
@@ -192,6 +193,14 @@ fn name_objects(root: &json::Root, scene: &mut Scene) {
     scene.triangles.iter_mut().for_each(|triangle| renumber(&mut triangle.object));
     scene.spheres.iter_mut().for_each(|sphere| renumber(&mut sphere.object));
     scene.instances.iter_mut().for_each(|instance| renumber(&mut instance.object));
+}
+
+/// Appends the attributes to which the triangles of shared meshes refer by index plus one.
+fn add_attributes_of_meshes(attributes: Vec<Attributes>, scene: &mut Scene) {
+    let first = scene.attributes.len() as u32;
+    let triangles = scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.triangles);
+    triangles.filter(|triangle| triangle.attributes > 0).for_each(|triangle| triangle.attributes += first);
+    scene.attributes.extend(attributes);
 }
 
 /// A copy of a mesh with its name in messages.

@@ -7,7 +7,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3, Vec4};
 use super::fault::{Notes, Read, fault};
 use super::mesh_cache::MeshInstance;
 use super::meshes::MeshPrimitive;
-use super::sharing::Shared;
+use super::shared_meshes::Shared;
 use crate::scene::{Attributes, Triangle, vertex_bits};
 
 /// Maximum size of a scene, metres.
@@ -118,7 +118,7 @@ pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut N
             let to_scene = DMat4::from_translation(-center) * instance.world(i)?;
             let first = placed.triangles.len();
             let is_shared = instance.shared.contains(&true);
-            let added = if is_shared { placed.shared.add(instance, to_scene) } else { None };
+            let added = if is_shared { placed.shared.add(instance, to_scene, &place_own) } else { None };
             of_instances += added.unwrap_or(0);
             for (primitive, shared) in instance.primitives.iter().zip(instance.shared) {
                 if *shared && added.is_some() {
@@ -239,8 +239,21 @@ impl Move {
     }
 }
 
+/// Triangles of a primitive of a shared mesh.
+fn place_own(
+    primitive: &MeshPrimitive,
+    to_own: DMat4,
+    triangles: &mut Vec<Triangle>,
+    attributes: &mut Vec<Attributes>,
+) {
+    let mut own =
+        Placed { triangles: std::mem::take(triangles), attributes: std::mem::take(attributes), ..Placed::default() };
+    place_rigid(primitive, to_own, &mut own);
+    (*triangles, *attributes) = (own.triangles, own.attributes);
+}
+
 /// Triangles of one primitive with non-zero area.
-pub(super) fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, placed: &mut Placed) {
+fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, placed: &mut Placed) {
     let all = Move::new(to_scene);
     let positions: Vec<Vec3> = primitive.positions.iter().map(|position| all.position(*position)).collect();
     let normals: Option<Vec<Vec3>> =
