@@ -99,7 +99,14 @@ pub struct RenderArgs {
     #[arg(required_if_eq("search", "radius"))]
     pub radius: Option<f32>,
 
-    /// Photons, samples and final gathering of a picture for a purpose; single options override it
+    #[arg(help = format!(
+        "Photons, samples and final gathering of a picture for a purpose; single options override it. With a --size below \
+         {}x{}, photons are in proportion to the number of pixels, at least those of {}x{}",
+        Quality::WHOLE.0,
+        Quality::WHOLE.1,
+        Quality::LEAST.0,
+        Quality::LEAST.1
+    ))]
     #[arg(long, value_name = "WHAT", value_enum, default_value = "normal", help_heading = "Picture")]
     pub quality: QualityArg,
 
@@ -192,7 +199,9 @@ impl RenderArgs {
             && matches!(self.search, SearchArg::Grid)
             && !options.shared.raw_estimate;
         let gathers = self.final_gather.map_or(goes, |rays| rays > 0);
-        let base = if gathers { quality.settings() } else { quality.without_final_gather() };
+        // Without a size, a picture is large enough.
+        let size = options.shared.size.unwrap_or(Quality::WHOLE);
+        let base = if gathers { quality.settings_for(size) } else { quality.without_final_gather_for(size) };
         options.settings(base).with(|s| {
             s.photons.final_gather = self.final_gather.unwrap_or(s.photons.final_gather);
             s.estimate.gather_spacing = self.gather_spacing.unwrap_or(s.estimate.gather_spacing);

@@ -135,6 +135,7 @@ fn name(stage: Stage) -> &'static str {
         Stage::Bvh => "bvh",
         Stage::Photons => "photons",
         Stage::Grid => "grid",
+        Stage::Cells => "irradiance cells",
         Stage::Records => "final gathering",
         Stage::Camera => "camera",
         Stage::Compare => "compare",
@@ -143,12 +144,16 @@ fn name(stage: Stage) -> &'static str {
 
 /// Name of a stage's units; `None` if the stage is not counted, or has fewer than two units.
 fn unit(stage: Stage, total: u64) -> Option<&'static str> {
-    let unit = if stage == Stage::Photons { "photons" } else { "tiles" };
+    let unit = match stage {
+        Stage::Photons => "photons",
+        Stage::Records => "rays a point",
+        _ => "tiles",
+    };
     (total > 1 && is_counted(stage)).then_some(unit)
 }
 
 fn is_counted(stage: Stage) -> bool {
-    matches!(stage, Stage::Photons | Stage::Records | Stage::Camera | Stage::Compare)
+    matches!(stage, Stage::Photons | Stage::Cells | Stage::Records | Stage::Camera | Stage::Compare)
 }
 
 /// Style without numbers.

@@ -116,14 +116,21 @@ impl<'a> MapGatherer<'a> {
     }
 
     /// Traces the rays of final gathering, and adds to each visible point the light of all maps
-    /// where its rays end.
-    fn gather_finally(&mut self, pass: &CameraPass, tile: &Tile, progress: &dyn Progress) -> Result<StepCount> {
+    /// where its rays end. `report` receives the number of each point's rays that are done.
+    fn gather_finally(
+        &mut self,
+        pass: &CameraPass,
+        tile: &Tile,
+        report: &dyn Fn(u32),
+        progress: &dyn Progress,
+    ) -> Result<StepCount> {
         // Indices of the visible points of the ends that the cache does not light. They are few in
         // each step, and a search of few points leaves most of the device idle.
         let mut left = Vec::new();
         let Self { maps, search, estimate, cache, .. } = self;
         let done = pass.gather_finally(tile, progress, &mut |gather, rays, chosen| {
             let (points, radiance, count) = (&gather.ends, &gather.found, rays.all());
+            report(rays.first);
             let direct = gather.light_directly(pass.gpu, pass.scene, &pass.tracer, tile, rays)?;
             if let Some(cache) = cache {
                 cache.light(pass.gpu, points, count, radiance);
@@ -178,7 +185,8 @@ impl Gatherer for MapGatherer<'_> {
     ) -> Result<()> {
         let window = coarse.window;
         let mut taken = Records::new((window.width, window.height), coarse.tracer.branches());
-        coarse.for_each_tile(Stage::Records, stats, progress, &mut |tile, stats| {
+        let rays = coarse.final_rays();
+        coarse.for_each_tile((Stage::Records, rays), stats, progress, &mut |tile, report, stats| {
             let (found, count) = timed(&mut stats.seconds.gather, || {
                 self.light_blurred(coarse, tile);
                 // Irradiance itself, by the geometric normal.
@@ -187,7 +195,7 @@ impl Gatherer for MapGatherer<'_> {
                 coarse.clear_arriving();
                 coarse.set_points(&points);
                 coarse.set_radiance(&vec![[0.0; 4]; points.len()]);
-                let count = self.gather_finally(coarse, tile, progress)?;
+                let count = self.gather_finally(coarse, tile, report, progress)?;
                 let light = coarse.radiance(tile)?.into_iter().zip(coarse.arriving(tile)?);
                 Ok((points.into_iter().zip(light).collect::<Vec<_>>(), count))
             })?;
@@ -246,7 +254,7 @@ impl Gatherer for MapGatherer<'_> {
             let buffers = (&pass.tracer.points, &pass.tracer.radiance);
             timed(&mut seconds, || records.light(pass.gpu, &view, buffers));
         }
-        let count = timed(&mut seconds, || self.gather_finally(pass, tile, progress))?;
+        let count = timed(&mut seconds, || self.gather_finally(pass, tile, &|_| {}, progress))?;
         stats.seconds.gather += seconds;
         stats.non_finite.gather += count.non_finite;
         tally::add_step(stats, count);
@@ -265,7 +273,7 @@ fn bare(point: &VisiblePoint) -> VisiblePoint {
 /// The ends of all final-gather rays of a pass.
 fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<Vec<VisiblePoint>> {
     let mut ends = Vec::new();
-    pass.for_each_tile(Stage::Records, stats, progress, &mut |tile, stats| {
+    pass.for_each_tile((Stage::Cells, 1), stats, progress, &mut |tile, _, stats| {
         let gather = || {
             pass.gather_finally(tile, progress, &mut |gather, rays, _| {
                 let found: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
