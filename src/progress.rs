@@ -16,8 +16,7 @@ pub enum Stage {
     /// Estimates of irradiance where rays of final gathering will end. Units are tiles of the small
     /// picture that shows where that is.
     Cells,
-    /// Final gathering at spaced points. Units are rays of a point, over all tiles of the coarser
-    /// picture that the points make.
+    /// Final gathering at spaced points. Units are rays; their total is estimated before.
     Records,
     /// Camera rays, direct light and gather. Units are tiles of camera samples.
     Camera,

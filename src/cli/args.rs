@@ -100,8 +100,9 @@ pub struct RenderArgs {
     pub radius: Option<f32>,
 
     #[arg(help = format!(
-        "Photons, samples and final gathering of a picture for a purpose; single options override it. With a --size below \
-         {}x{}, photons are in proportion to the number of pixels, at least those of {}x{}",
+        "Photons, samples and final gathering of a picture for a purpose; single options override it. With a --size of \
+         fewer pixels than {}x{}, the photons of the global map are in proportion to their number and those of the caustic \
+         map to its root, at least as for {}x{}",
         Quality::WHOLE.0,
         Quality::WHOLE.1,
         Quality::LEAST.0,
@@ -267,6 +268,20 @@ mod tests {
             s.photons.final_gather = 32;
         });
         assert_eq!(high, expected);
+    }
+
+    #[test]
+    fn small_pictures_have_fewer_photons_unless_they_are_given() {
+        assert_eq!(settings("--size 256x256").photons, settings("").photons);
+        let photons = |line: &str| {
+            let photons = settings(line).photons;
+            (photons.global, photons.caustic)
+        };
+        assert_eq!(photons("--size 64x64"), (6250, 25_000));
+        assert_eq!(photons("--size 64x64 --final-gather 0"), (6250, 25_000));
+        assert_eq!(photons("--size 64x64 --quality high"), (18_750, 75_000));
+        assert_eq!(photons("--size 64x64 --photons 100k"), (100_000, 100_000));
+        assert_eq!(photons("--size 64x64 --caustic-photons 7"), (6250, 7));
     }
 
     #[test]

@@ -13,6 +13,12 @@ use caustica::{
 const SAMPLE: f64 = 1.4;
 const CAUSTICS: f64 = 2.8;
 const LIGHT_SAMPLE: f64 = 1.0;
+/// The same under an environment: rays that escape to it take little.
+const SKY_SAMPLE: f64 = 2.0;
+/// Part of a stage that has to be done, beyond its first report, before its pace is trusted: the
+/// top of a picture may be sky. More where something is known already.
+const TRUSTED: f64 = 1.0 / 16.0;
+const TRUSTED_AFTER: f64 = 1.0 / 4.0;
 
 /// What is known of a picture before it is begun.
 #[derive(Clone, Copy, Debug)]
@@ -29,9 +35,14 @@ impl Plan {
     pub fn new(scene: &Scene, settings: &Settings) -> Result<Self> {
         let Settings { photons, estimate, picture, .. } = settings;
         let has_records = photons.final_gather > 0 && estimate.gather_spacing > 0 && estimate.search != Search::KdTree;
-        let has_extent = scene.has_emission() || scene.environment.is_some();
-        let light_samples = if has_extent { LIGHT_SAMPLE * f64::from(picture.light_samples) } else { 0.0 };
-        let sample = SAMPLE + light_samples + if scene.has_specular() { CAUSTICS } else { 0.0 };
+        let light_sample = match scene.environment {
+            Some(_) => SKY_SAMPLE,
+            None if scene.has_emission() => LIGHT_SAMPLE,
+            None => 0.0,
+        };
+        let sample = SAMPLE
+            + light_sample * f64::from(picture.light_samples)
+            + if scene.has_specular() { CAUSTICS } else { 0.0 };
         let rays = f64::from(photons.final_gather) / f64::from(estimate.gather_spacing).powi(2);
         let by_group = picture.layers.contains(&ExtraLayers::Lights);
         let groups = if by_group { scene.light_groups()?.len().max(1) } else { 1 };
@@ -100,6 +111,11 @@ impl Outlook {
             None if done > 0 && total <= 2 => (pace.began, 0),
             _ => return None,
         };
+        let is_known = pace.stage == Stage::Camera && self.plan.camera.is_some();
+        let trusted = if is_known { TRUSTED_AFTER } else { TRUSTED };
+        if ((done - before) as f64) < trusted * total as f64 {
+            return None;
+        }
         let unit = (now - since) / (done - before) as f64;
         Some(unit * (total.saturating_sub(done) as f64 + later * total as f64))
     }

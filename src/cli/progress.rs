@@ -178,7 +178,7 @@ fn name(stage: Stage) -> &'static str {
 fn unit(stage: Stage, total: u64) -> Option<&'static str> {
     let unit = match stage {
         Stage::Photons => "photons",
-        Stage::Records => "rays a point",
+        Stage::Records => "rays",
         _ => "tiles",
     };
     (total > 1 && is_counted(stage)).then_some(unit)

@@ -71,9 +71,6 @@ pub(crate) trait Gatherer {
 /// points that they started from.
 pub(crate) type RayLight<'a> = dyn FnMut(&FinalGather, FinalRays, &[u32]) -> Result<StepCount> + 'a;
 
-/// Work on a tile. The second argument reports units of the tile that are done.
-type TileWork<'a> = dyn FnMut(&Tile, &dyn Fn(u32), &mut Stats) -> Result<()> + 'a;
-
 /// Device part of a camera pass: camera paths, direct light, rays of final gathering.
 pub(crate) struct CameraPass<'a> {
     pub gpu: &'a Gpu,
@@ -169,7 +166,7 @@ impl<'a> CameraPass<'a> {
     ) -> Result<Vec<Film>> {
         let film = Film::new(self.size, self.window, self.spp).with_layers(&self.layers);
         let mut films = vec![film; gatherer.pictures()];
-        self.for_each_tile((stage, 1), stats, progress, &mut |tile, _, stats| {
+        self.for_each_tile(Some(stage), stats, progress, &mut |tile, stats| {
             self.finished.borrow_mut().clear();
             self.finished_component(tile, LightComponent::Emission, &mut films[0])?;
             if self.direct {
@@ -189,27 +186,30 @@ impl<'a> CameraPass<'a> {
     }
 
     /// Calls `work` for each tile of the data window, with its camera paths traced to their visible
-    /// points. A tile has that many units of the stage; `work` may report those that it has done.
+    /// points. Tiles are reported as units of the stage, if there is one.
     pub fn for_each_tile(
         &self,
-        (stage, units): (Stage, u32),
+        stage: Option<Stage>,
         stats: &mut Stats,
         progress: &dyn Progress,
-        work: &mut TileWork,
+        work: &mut dyn FnMut(&Tile, &mut Stats) -> Result<()>,
     ) -> Result<()> {
         let tiles = self.tracer.tiles();
-        let all = tiles.len() as u64 * u64::from(units);
-        for (done, tile) in (0_u64..).zip(&tiles) {
-            let report = |part: u32| progress.report(stage, done * u64::from(units) + u64::from(part), all);
+        let report = |done: usize| {
+            if let Some(stage) = stage {
+                progress.report(stage, done as u64, tiles.len() as u64);
+            }
+        };
+        for (done, tile) in tiles.iter().enumerate() {
             progress.check()?;
-            report(0);
+            report(done);
             let trace = || self.tracer.trace(self.gpu, self.scene, tile);
             let count = timed(&mut stats.seconds.camera, trace)?;
             stats.non_finite.camera += count.non_finite;
             tally::add_step(stats, count);
-            work(tile, &report, stats)?;
+            work(tile, stats)?;
         }
-        progress.report(stage, all, all);
+        report(tiles.len());
         Ok(())
     }
 

@@ -46,8 +46,9 @@ impl Quality {
     }
 
     /// Settings for a picture of that size: those of [`Self::settings`], with fewer photons for a
-    /// small picture, so that estimates are as wide in its pixels. They are in proportion to the
-    /// number of pixels between [`Self::LEAST`] and [`Self::WHOLE`].
+    /// small picture. Between [`Self::LEAST`] and [`Self::WHOLE`], those of the global map are in
+    /// proportion to the number of pixels, so that an estimate is as wide in pixels. Those of the
+    /// caustic map are in proportion to its root: lines of light are finer than pixels.
     #[must_use]
     pub fn settings_for(self, size: (u32, u32)) -> Settings {
         for_size(self.settings(), size)
@@ -89,12 +90,12 @@ impl Quality {
 
 /// The settings with photons for a picture of that size.
 fn for_size(settings: Settings, size: (u32, u32)) -> Settings {
-    let pixels = |(width, height): (u32, u32)| u64::from(width) * u64::from(height);
+    let pixels = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
     let (least, whole) = (pixels(Quality::LEAST), pixels(Quality::WHOLE));
-    let of = |photons: u32| (u64::from(photons) * pixels(size).clamp(least, whole) / whole) as u32;
+    let part = pixels(size).clamp(least, whole) / whole;
     settings.with(|s| {
-        s.photons.global = of(s.photons.global);
-        s.photons.caustic = of(s.photons.caustic);
+        s.photons.global = (f64::from(s.photons.global) * part) as u32;
+        s.photons.caustic = (f64::from(s.photons.caustic) * part.sqrt()) as u32;
     })
 }
 
@@ -109,12 +110,13 @@ mod tests {
             assert_eq!(quality.settings_for((256, 256)), quality.settings());
             assert_eq!(quality.settings_for((65_535, 65_535)), quality.settings());
             assert_eq!(2 * photons((512, 64)), photons((256, 256)), "pixels count, whatever their shape");
-            assert_eq!((16 * photons((64, 64)), photons((1, 1))), (photons((256, 256)), photons((64, 64))));
+            assert_eq!(photons((256, 256)) / 16, photons((64, 64)));
+            assert_eq!(quality.settings_for((1, 1)), quality.settings_for((64, 64)));
             assert_eq!(quality.settings_for((64, 64)).picture, quality.settings().picture);
             assert_eq!(quality.without_final_gather_for((256, 256)), quality.without_final_gather());
         }
         let plain = Quality::Normal.without_final_gather_for((128, 128)).photons;
-        assert_eq!((plain.global, plain.caustic), (25_000, 25_000), "those of the defaults");
+        assert_eq!((plain.global, plain.caustic), (25_000, 50_000), "those of the defaults");
     }
 
     #[test]
