@@ -13,8 +13,10 @@ pub enum Stage {
     Photons,
     /// Sorting photons into the grid.
     Grid,
-    /// Final gathering at spaced points, and the search for the ends of its rays before. Units are
-    /// tiles of the coarser picture that they make.
+    /// Estimates of irradiance where rays of final gathering will end. Units are tiles of the small
+    /// picture that shows where that is.
+    Cells,
+    /// Final gathering at spaced points. Units are rays; their total is estimated before.
     Records,
     /// Camera rays, direct light and gather. Units are tiles of camera samples.
     Camera,

@@ -99,7 +99,15 @@ pub struct RenderArgs {
     #[arg(required_if_eq("search", "radius"))]
     pub radius: Option<f32>,
 
-    /// Photons, samples and final gathering of a picture for a purpose; single options override it
+    #[arg(help = format!(
+        "Photons, samples and final gathering of a picture for a purpose; single options override it. With a --size of \
+         fewer pixels than {}x{}, the photons of the global map are in proportion to their number and those of the caustic \
+         map to its root, at least as for {}x{}",
+        Quality::WHOLE.0,
+        Quality::WHOLE.1,
+        Quality::LEAST.0,
+        Quality::LEAST.1
+    ))]
     #[arg(long, value_name = "WHAT", value_enum, default_value = "normal", help_heading = "Picture")]
     pub quality: QualityArg,
 
@@ -192,7 +200,9 @@ impl RenderArgs {
             && matches!(self.search, SearchArg::Grid)
             && !options.shared.raw_estimate;
         let gathers = self.final_gather.map_or(goes, |rays| rays > 0);
-        let base = if gathers { quality.settings() } else { quality.without_final_gather() };
+        // Without a size, a picture is large enough.
+        let size = options.shared.size.unwrap_or(Quality::WHOLE);
+        let base = if gathers { quality.settings_for(size) } else { quality.without_final_gather_for(size) };
         options.settings(base).with(|s| {
             s.photons.final_gather = self.final_gather.unwrap_or(s.photons.final_gather);
             s.estimate.gather_spacing = self.gather_spacing.unwrap_or(s.estimate.gather_spacing);
@@ -258,6 +268,20 @@ mod tests {
             s.photons.final_gather = 32;
         });
         assert_eq!(high, expected);
+    }
+
+    #[test]
+    fn small_pictures_have_fewer_photons_unless_they_are_given() {
+        assert_eq!(settings("--size 256x256").photons, settings("").photons);
+        let photons = |line: &str| {
+            let photons = settings(line).photons;
+            (photons.global, photons.caustic)
+        };
+        assert_eq!(photons("--size 64x64"), (6250, 25_000));
+        assert_eq!(photons("--size 64x64 --final-gather 0"), (6250, 25_000));
+        assert_eq!(photons("--size 64x64 --quality high"), (18_750, 75_000));
+        assert_eq!(photons("--size 64x64 --photons 100k"), (100_000, 100_000));
+        assert_eq!(photons("--size 64x64 --caustic-photons 7"), (6250, 7));
     }
 
     #[test]

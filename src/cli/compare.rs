@@ -11,7 +11,14 @@ use caustica::{
     settings::Settings,
 };
 
-use super::{args::CompareArgs, files::Files, progress::Display, render::RAW_NOTE, say::print};
+use super::{
+    args::CompareArgs,
+    files::Files,
+    outlook::{Outlook, Plan},
+    progress::Display,
+    render::RAW_NOTE,
+    say::print,
+};
 
 /// Compares, writes the files and fails if the two sides disagree.
 pub fn run(args: &CompareArgs) -> Result<()> {
@@ -30,6 +37,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         display.note(RAW_NOTE);
     }
     let asked = Options { tolerance: args.tolerance, sabotage: args.sabotage };
+    display.expect(Outlook::new(Plan::new(&scene, &settings)?), started);
     let result = compare(&gpu, &scene, &settings, &asked, &display);
     display.finish();
     let comparison = result?;

@@ -14,6 +14,7 @@ mod loading;
 mod merge;
 mod merge_args;
 mod options;
+mod outlook;
 mod pass_args;
 mod passes;
 mod progress;

@@ -31,7 +31,8 @@ pub struct RenderOptions {
     #[arg(long, value_parser = ModeParser, default_value = "hybrid", help_heading = "Light")]
     pub mode: ModeArg,
 
-    /// Photons that each map can hold, as 100000, 200k or 1.5M [default: 100k]
+    /// Photons that each map can hold, as 100000, 200k or 1.5M [default: 100k; `render` has them by
+    /// --quality and --size]
     #[arg(long, value_name = "N", value_parser = photons, allow_hyphen_values = true, help_heading = "Photons")]
     pub photons: Option<u32>,
 

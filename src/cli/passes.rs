@@ -18,7 +18,7 @@ use caustica::{
     stats::{DeviceStats, PassStats, Stats},
 };
 
-use super::{args::RenderArgs, progress::Display, signals, study_progress::duration};
+use super::{args::RenderArgs, progress::Display, signals, values::words_of_seconds};
 
 /// Passes from which on their spread is trusted to end a run.
 const LEAST_PASSES: u32 = 4;
@@ -173,7 +173,11 @@ fn line(next: u32, range: PassRange, has_no_time: bool, error: Option<&ErrorEsti
     let done = next - range.first;
     let ends = range.end < PassRange::END.most();
     let of = if ends { format!(" of {}", range.count()) } else { String::new() };
-    let left = if (ends || !has_no_time) && left >= 0.5 { format!("; {} left", duration(left)) } else { String::new() };
+    let left = if (ends || !has_no_time) && left >= 0.5 {
+        format!("; {} left", words_of_seconds(left))
+    } else {
+        String::new()
+    };
     format!("passes: {done}{of}{error}{left}")
 }
 

@@ -1,15 +1,15 @@
 //! Progress of a render on stderr: a bar on a terminal, plain lines elsewhere.
 
 use std::{
-    fmt::Write,
     io::IsTerminal,
     sync::{Mutex, MutexGuard, PoisonError},
+    time::Instant,
 };
 
 use caustica::progress::{Progress, Stage};
-use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::{say::say, signals};
+use super::{outlook::Outlook, say::say, signals, values::words_of_seconds};
 
 /// Destination of the progress reports.
 #[derive(Debug)]
@@ -23,24 +23,55 @@ enum Target {
 
 /// Listener that shows the progress of a render and passes stop signals to it.
 #[derive(Debug)]
-pub struct Display(Target);
+pub struct Display {
+    target: Target,
+    outlook: Mutex<Option<Expected>>,
+}
+
+/// What is expected of a picture.
+#[derive(Debug)]
+struct Expected {
+    outlook: Outlook,
+    began: Instant,
+    /// The time of all of it was told.
+    is_told: bool,
+}
 
 impl Display {
     /// Creates the display. `quiet` shows nothing; `plain` writes lines even on a terminal.
     pub fn new(quiet: bool, plain: bool) -> Self {
-        Self(if quiet {
+        let target = if quiet {
             Target::Nowhere
         } else if plain || !std::io::stderr().is_terminal() {
             Target::Lines(Mutex::default())
         } else {
             let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()).with_style(words());
             Target::Bar(bar, Mutex::default())
-        })
+        };
+        Self { target, outlook: Mutex::default() }
+    }
+
+    /// Tells the time of a picture that began then, as soon as it is known, and from there on what
+    /// is left of it.
+    pub fn expect(&self, outlook: Outlook, began: Instant) {
+        *lock(&self.outlook) = Some(Expected { outlook, began, is_told: false });
+    }
+
+    /// The time that is left, in words; tells that of the whole once.
+    fn left(&self, stage: Stage, done: u64, total: u64) -> String {
+        let mut outlook = lock(&self.outlook);
+        let Some(Expected { outlook, began, is_told }) = &mut *outlook else { return String::new() };
+        let now = began.elapsed().as_secs_f64();
+        let Some(left) = outlook.left(stage, done, total, now) else { return String::new() };
+        if !std::mem::replace(is_told, true) {
+            self.note(&format!("about {} in all", words_of_seconds(now + left)));
+        }
+        if left < 0.5 { String::new() } else { format!(", {} left", words_of_seconds(left)) }
     }
 
     /// Prints a line unless quiet.
     pub fn note(&self, line: &str) {
-        match &self.0 {
+        match &self.target {
             Target::Nowhere => {}
             Target::Lines(_) => say(line),
             Target::Bar(bar, _) => bar.suspend(|| say(line)),
@@ -50,7 +81,7 @@ impl Display {
     /// Shows the state of long work in one line. On a terminal it stands beside the bar; elsewhere
     /// it is printed only if it is `new`.
     pub fn state(&self, line: &str, done: f64, new: bool) {
-        match &self.0 {
+        match &self.target {
             Target::Nowhere => {}
             Target::Lines(_) if new => say(line),
             Target::Lines(_) => {}
@@ -67,7 +98,7 @@ impl Display {
 
     /// Removes the bar.
     pub fn finish(&self) {
-        if let Target::Bar(bar, _) = &self.0 {
+        if let Target::Bar(bar, _) = &self.target {
             bar.finish_and_clear();
         }
     }
@@ -75,11 +106,12 @@ impl Display {
 
 impl Progress for Display {
     fn report(&self, stage: Stage, done: u64, total: u64) {
-        match &self.0 {
+        let left = self.left(stage, done, total);
+        match &self.target {
             Target::Nowhere => {}
             Target::Lines(told) => {
                 if let Some(line) = next_line(&mut lock(told), stage, done, total) {
-                    say(&line);
+                    say(&format!("{line}{left}"));
                 }
             }
             Target::Bar(bar, shown) => {
@@ -96,7 +128,7 @@ impl Progress for Display {
                 bar.set_length(total);
                 bar.set_position(done);
                 if let Some(unit) = unit {
-                    bar.set_style(style(unit));
+                    bar.set_style(style(unit, &left));
                 }
             }
         }
@@ -135,6 +167,7 @@ fn name(stage: Stage) -> &'static str {
         Stage::Bvh => "bvh",
         Stage::Photons => "photons",
         Stage::Grid => "grid",
+        Stage::Cells => "irradiance cells",
         Stage::Records => "final gathering",
         Stage::Camera => "camera",
         Stage::Compare => "compare",
@@ -143,12 +176,16 @@ fn name(stage: Stage) -> &'static str {
 
 /// Name of a stage's units; `None` if the stage is not counted, or has fewer than two units.
 fn unit(stage: Stage, total: u64) -> Option<&'static str> {
-    let unit = if stage == Stage::Photons { "photons" } else { "tiles" };
+    let unit = match stage {
+        Stage::Photons => "photons",
+        Stage::Records => "rays",
+        _ => "tiles",
+    };
     (total > 1 && is_counted(stage)).then_some(unit)
 }
 
 fn is_counted(stage: Stage) -> bool {
-    matches!(stage, Stage::Photons | Stage::Records | Stage::Camera | Stage::Compare)
+    matches!(stage, Stage::Photons | Stage::Cells | Stage::Records | Stage::Camera | Stage::Compare)
 }
 
 /// Style without numbers.
@@ -156,16 +193,9 @@ fn words() -> ProgressStyle {
     ProgressStyle::with_template("{msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
-fn style(unit: &str) -> ProgressStyle {
-    let template = format!("{{msg:8}} {{bar:32}} {{human_pos}} of {{human_len}} {unit}{{left}}");
-    let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    style.with_key("left", |state: &ProgressState, text: &mut dyn Write| {
-        // Zero also means that there is no estimate yet.
-        let left = state.eta();
-        if left.as_secs() > 0 {
-            let _ = write!(text, ", {:#} left", HumanDuration(left));
-        }
-    })
+fn style(unit: &str, left: &str) -> ProgressStyle {
+    let template = format!("{{msg:8}} {{bar:32}} {{human_pos}} of {{human_len}} {unit}{left}");
+    ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 fn state_style() -> ProgressStyle {

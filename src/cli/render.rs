@@ -24,6 +24,7 @@ use super::{
     args::{Args, RenderArgs},
     bugs,
     files::{Files, identity},
+    outlook::{Outlook, Plan},
     passes::{self, Inputs, Picture},
     progress::Display,
     say::say,
@@ -153,6 +154,7 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
         let (gpu, scene, settings) = (&*gpu, &scene, &settings);
         passes::render(&Inputs { gpu, scene, settings, args, display, write: &write })?
     } else {
+        display.expect(Outlook::new(Plan::new(&scene, &settings)?), started);
         let result = renderer::render(gpu, &scene, &settings, display);
         display.finish();
         let renderer::Render { frame, stats } = result?;

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use caustica::study::{State, Watch};
 
-use super::{progress::Display, signals};
+use super::{progress::Display, signals, values::words_of_seconds};
 
 /// Shows the progress of a study and passes stop signals to it.
 #[derive(Debug)]
@@ -30,18 +30,8 @@ impl Watch for StudyDisplay<'_> {
 fn line(state: &State) -> String {
     let kept = if state.kept > 0 { format!(", {} kept", state.kept) } else { String::new() };
     let known = state.seconds_left.filter(|s| *s >= 0.5);
-    let left = known.map(|s| format!(", {} left", duration(s))).unwrap_or_default();
+    let left = known.map(|s| format!(", {} left", words_of_seconds(s))).unwrap_or_default();
     format!("study: {:.0} %{left}; cell {} of {}{kept}: {}", 100.0 * state.done, state.number, state.total, state.cell)
-}
-
-/// Formats a rounded duration: `40 s`, `12 min`, `3 h 20 min`.
-pub(super) fn duration(seconds: f64) -> String {
-    let minutes = (seconds / 60.0).round() as u64;
-    match seconds {
-        s if s < 90.0 => format!("{s:.0} s"),
-        _ if minutes < 60 => format!("{minutes} min"),
-        _ => format!("{} h {} min", minutes / 60, minutes % 60),
-    }
 }
 
 #[cfg(test)]
@@ -63,6 +53,6 @@ mod tests {
         assert_eq!(line(&state), "study: 25 %; cell 3 of 8, 2 kept: a.gltf, hybrid");
         state.seconds_left = Some(0.2);
         assert!(!line(&state).contains("left"), "{}", line(&state));
-        assert_eq!([91.0, 3500.0, 12_000.0].map(duration), ["2 min", "58 min", "3 h 20 min"]);
+        assert_eq!([91.0, 3500.0, 12_000.0].map(words_of_seconds), ["2 min", "58 min", "3 h 20 min"]);
     }
 }

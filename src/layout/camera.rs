@@ -93,7 +93,8 @@ pub struct CameraTile {
     /// First sample of each pixel, and samples of each pixel, in this tile.
     pub first_sample: u32,
     pub samples: u32,
-    pub pad0: u32,
+    /// 1: the paths are rays of final gathering; 0: they start at the camera.
+    pub gathers: u32,
     /// Path slots per sample: reflection and refraction are both followed at its first
     /// log2(branches) dielectric interfaces.
     pub branches: u32,

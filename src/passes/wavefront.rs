@@ -9,7 +9,10 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Surfaces per submission. After each submission, the host checks whether any path is left.
+/// Surfaces of the first submission, and of further ones. After each, the host checks whether any
+/// path is left: mostly there is none after a few surfaces, and a dispatch costs something even if
+/// it finds nothing to do.
+const FIRST_SURFACES: u32 = 8;
 const SURFACES_PER_SUBMISSION: u32 = 32;
 
 /// Living paths, two queues of their slots, and their counters.
@@ -71,7 +74,8 @@ impl Wavefront {
         let mut surfaces = 0;
         loop {
             let until = if surfaces < expected_surfaces { expected_surfaces } else { most_surfaces };
-            for _ in 0..SURFACES_PER_SUBMISSION.min(until - surfaces) {
+            let most = if surfaces == 0 { FIRST_SURFACES } else { SURFACES_PER_SUBMISSION };
+            for _ in 0..most.min(until - surfaces) {
                 self.advance.dispatch(&mut encoder, &advance, 1);
                 for (kernel, bindings) in &bound {
                     kernel.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most_paths);

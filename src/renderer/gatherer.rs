@@ -38,6 +38,8 @@ pub(crate) struct MapGatherer<'a> {
     cache: Option<IrradianceCache>,
     /// Irradiance at some of the picture's points.
     records: Option<IrradianceRecords>,
+    /// Rays of final gathering of a pixel with one sample, on average.
+    rays_per_pixel: Option<f64>,
 }
 
 enum Searches<'a> {
@@ -73,7 +75,7 @@ impl<'a> MapGatherer<'a> {
         // they stand.
         let stretched = GatherSettings::from(estimate).neighbors as f32 / estimate.neighbors as f32;
         let sharing = EstimateSharing::new(gpu, estimate.share_reach / stretched.sqrt());
-        Ok(Self { maps, search, sharing, estimate, observer, cache: None, records: None })
+        Ok(Self { maps, search, sharing, estimate, observer, cache: None, records: None, rays_per_pixel: None })
     }
 
     /// Adds the light of one map at the tile's visible points. `index` is the index in the photon
@@ -116,14 +118,21 @@ impl<'a> MapGatherer<'a> {
     }
 
     /// Traces the rays of final gathering, and adds to each visible point the light of all maps
-    /// where its rays end.
-    fn gather_finally(&mut self, pass: &CameraPass, tile: &Tile, progress: &dyn Progress) -> Result<StepCount> {
+    /// where its rays end. `report` receives the number of rays of each step.
+    fn gather_finally(
+        &mut self,
+        pass: &CameraPass,
+        tile: &Tile,
+        report: &mut dyn FnMut(u32),
+        progress: &dyn Progress,
+    ) -> Result<StepCount> {
         // Indices of the visible points of the ends that the cache does not light. They are few in
         // each step, and a search of few points leaves most of the device idle.
         let mut left = Vec::new();
         let Self { maps, search, estimate, cache, .. } = self;
         let done = pass.gather_finally(tile, progress, &mut |gather, rays, chosen| {
             let (points, radiance, count) = (&gather.ends, &gather.found, rays.all());
+            report(rays.all());
             let direct = gather.light_directly(pass.gpu, pass.scene, &pass.tracer, tile, rays)?;
             if let Some(cache) = cache {
                 cache.light(pass.gpu, points, count, radiance);
@@ -153,7 +162,9 @@ impl<'a> MapGatherer<'a> {
 impl Gatherer for MapGatherer<'_> {
     /// Fills the cache of irradiance about the ends of the preview's final-gather rays.
     fn prepare(&mut self, preview: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
-        let marks = ends_of_rays(preview, stats, progress)?;
+        let (marks, rays) = ends_of_rays(preview, stats, progress)?;
+        let pixels = f64::from(preview.size.0) * f64::from(preview.size.1);
+        self.rays_per_pixel = Some(rays as f64 / pixels);
         let Self { maps, search, estimate, .. } = self;
         let mut irradiances = |points: &[VisiblePoint]| {
             let points: Vec<_> = points.iter().map(bare).collect();
@@ -178,7 +189,12 @@ impl Gatherer for MapGatherer<'_> {
     ) -> Result<()> {
         let window = coarse.window;
         let mut taken = Records::new((window.width, window.height), coarse.tracer.branches());
-        coarse.for_each_tile(Stage::Records, stats, progress, &mut |tile, stats| {
+        // Where the preview has no points, this has none either.
+        let pixels = f64::from(window.width) * f64::from(window.height);
+        let expected = (self.rays_per_pixel.unwrap_or(coarse.final_rays().into()) * pixels) as u64;
+        let mut rays_done = 0;
+        progress.report(Stage::Records, 0, expected);
+        coarse.for_each_tile(None, stats, progress, &mut |tile, stats| {
             let (found, count) = timed(&mut stats.seconds.gather, || {
                 self.light_blurred(coarse, tile);
                 // Irradiance itself, by the geometric normal.
@@ -187,7 +203,11 @@ impl Gatherer for MapGatherer<'_> {
                 coarse.clear_arriving();
                 coarse.set_points(&points);
                 coarse.set_radiance(&vec![[0.0; 4]; points.len()]);
-                let count = self.gather_finally(coarse, tile, progress)?;
+                let mut report = |rays: u32| {
+                    rays_done += u64::from(rays);
+                    progress.report(Stage::Records, rays_done, expected.max(rays_done));
+                };
+                let count = self.gather_finally(coarse, tile, &mut report, progress)?;
                 let light = coarse.radiance(tile)?.into_iter().zip(coarse.arriving(tile)?);
                 Ok((points.into_iter().zip(light).collect::<Vec<_>>(), count))
             })?;
@@ -203,6 +223,7 @@ impl Gatherer for MapGatherer<'_> {
             }
             Ok(())
         })?;
+        progress.report(Stage::Records, rays_done, rays_done);
         let spacing = record_spacing(size, self.estimate.gather_spacing, coarse.tracer.branches());
         let per_pixel = |coarse: u32, fine: u32| coarse as f32 / fine as f32;
         // Measured in the picture's pixels.
@@ -246,7 +267,7 @@ impl Gatherer for MapGatherer<'_> {
             let buffers = (&pass.tracer.points, &pass.tracer.radiance);
             timed(&mut seconds, || records.light(pass.gpu, &view, buffers));
         }
-        let count = timed(&mut seconds, || self.gather_finally(pass, tile, progress))?;
+        let count = timed(&mut seconds, || self.gather_finally(pass, tile, &mut |_| {}, progress))?;
         stats.seconds.gather += seconds;
         stats.non_finite.gather += count.non_finite;
         tally::add_step(stats, count);
@@ -262,13 +283,14 @@ fn bare(point: &VisiblePoint) -> VisiblePoint {
     VisiblePoint { weight: [1.0; 3], above: 0, ..*point }
 }
 
-/// The ends of all final-gather rays of a pass.
-fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<Vec<VisiblePoint>> {
-    let mut ends = Vec::new();
-    pass.for_each_tile(Stage::Records, stats, progress, &mut |tile, stats| {
+/// The ends of all final-gather rays of a pass, and the number of its rays.
+fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<(Vec<VisiblePoint>, u64)> {
+    let (mut ends, mut count_of_rays) = (Vec::new(), 0);
+    pass.for_each_tile(Some(Stage::Cells), stats, progress, &mut |tile, stats| {
         let gather = || {
             pass.gather_finally(tile, progress, &mut |gather, rays, _| {
                 let found: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
+                count_of_rays += u64::from(rays.all());
                 ends.extend(found.into_iter().filter(|point| point.next_map != 0));
                 Ok(StepCount::default())
             })
@@ -278,7 +300,7 @@ fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -
         tally::add_step(stats, count);
         Ok(())
     })?;
-    Ok(ends)
+    Ok((ends, count_of_rays))
 }
 
 impl Searches<'_> {

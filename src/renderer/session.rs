@@ -30,8 +30,10 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Rays of final gathering that the preview of a picture traces at most.
+/// Rays of final gathering that the preview of a picture traces at most, in all and for each pixel
+/// of the picture.
 const PREVIEW_RAYS: f64 = (1 << 17) as f64;
+const PREVIEW_RAYS_PER_PIXEL: f64 = 2.0;
 
 /// A finished render.
 #[derive(Clone, Debug)]
@@ -136,14 +138,18 @@ impl<'a> Session<'a> {
             MapKernels::prefetch(gpu);
         }
         CameraKernels::prefetch(gpu, scene, photons, picture.light_samples);
+        if photons.final_gather > 0 {
+            FinalGather::prefetch(gpu, scene, photons.sampler);
+        }
         if photons.mode.traces_photons() && estimate.search != Search::KdTree {
-            EstimateSharing::prefetch(gpu);
             gather_for(gpu, scene, estimate).prefetch(gpu, &estimate.into());
         }
         if photons.final_gather > 0 {
-            FinalGather::prefetch(gpu, scene, photons.sampler);
             IrradianceCache::prefetch(gpu);
             IrradianceRecords::prefetch(gpu);
+        }
+        if photons.mode.traces_photons() && estimate.search != Search::KdTree {
+            EstimateSharing::prefetch(gpu);
         }
     }
 
@@ -286,11 +292,12 @@ fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSetti
     }
 }
 
-/// Settings of a small version of the whole picture, with about `PREVIEW_RAYS` rays of final
-/// gathering. It does not depend on the data window.
+/// Settings of a small version of the whole picture, with about as many rays of final gathering as
+/// the constants say. It does not depend on the data window.
 fn preview_of(picture: &PictureSettings, size: (u32, u32), rays: u32) -> PictureSettings {
     let pixels = f64::from(size.0) * f64::from(size.1);
-    let scale = (PREVIEW_RAYS / f64::from(rays) / pixels).min(0.25).sqrt();
+    let most = PREVIEW_RAYS.min(PREVIEW_RAYS_PER_PIXEL * pixels);
+    let scale = (most / f64::from(rays) / pixels).min(0.25).sqrt();
     let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(1);
     PictureSettings { size: Some((side(size.0), side(size.1))), spp: 1, crop: None, ..picture.clone() }
 }

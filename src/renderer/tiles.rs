@@ -166,7 +166,7 @@ impl<'a> CameraPass<'a> {
     ) -> Result<Vec<Film>> {
         let film = Film::new(self.size, self.window, self.spp).with_layers(&self.layers);
         let mut films = vec![film; gatherer.pictures()];
-        self.for_each_tile(stage, stats, progress, &mut |tile, stats| {
+        self.for_each_tile(Some(stage), stats, progress, &mut |tile, stats| {
             self.finished.borrow_mut().clear();
             self.finished_component(tile, LightComponent::Emission, &mut films[0])?;
             if self.direct {
@@ -186,25 +186,30 @@ impl<'a> CameraPass<'a> {
     }
 
     /// Calls `work` for each tile of the data window, with its camera paths traced to their visible
-    /// points.
+    /// points. Tiles are reported as units of the stage, if there is one.
     pub fn for_each_tile(
         &self,
-        stage: Stage,
+        stage: Option<Stage>,
         stats: &mut Stats,
         progress: &dyn Progress,
         work: &mut dyn FnMut(&Tile, &mut Stats) -> Result<()>,
     ) -> Result<()> {
         let tiles = self.tracer.tiles();
+        let report = |done: usize| {
+            if let Some(stage) = stage {
+                progress.report(stage, done as u64, tiles.len() as u64);
+            }
+        };
         for (done, tile) in tiles.iter().enumerate() {
             progress.check()?;
-            progress.report(stage, done as u64, tiles.len() as u64);
+            report(done);
             let trace = || self.tracer.trace(self.gpu, self.scene, tile);
             let count = timed(&mut stats.seconds.camera, trace)?;
             stats.non_finite.camera += count.non_finite;
             tally::add_step(stats, count);
             work(tile, stats)?;
         }
-        progress.report(stage, tiles.len() as u64, tiles.len() as u64);
+        report(tiles.len());
         Ok(())
     }
 

@@ -21,6 +21,12 @@ pub enum Quality {
 type Row = (u32, u32, u32, u32, u32, u32, f32);
 
 impl Quality {
+    /// Width and height of a picture that has all photons of a quality, and of one that has the
+    /// fewest; in pixels.
+    pub const WHOLE: (u32, u32) = (256, 256);
+    /// See [`Self::WHOLE`].
+    pub const LEAST: (u32, u32) = (64, 64);
+
     /// All of them, the quickest first.
     pub const ALL: [Self; 4] = [Self::Draft, Self::Normal, Self::High, Self::Final];
 
@@ -37,6 +43,21 @@ impl Quality {
             Self::High => (300_000, 50, 16, 4, 128, 2, 8.0),
             Self::Final => (1_000_000, 50, 64, 4, 256, 1, 4.0),
         }
+    }
+
+    /// Settings for a picture of that size: those of [`Self::settings`], with fewer photons for a
+    /// small picture. Between [`Self::LEAST`] and [`Self::WHOLE`], those of the global map are in
+    /// proportion to the number of pixels, so that an estimate is as wide in pixels. Those of the
+    /// caustic map are in proportion to its root: lines of light are finer than pixels.
+    #[must_use]
+    pub fn settings_for(self, size: (u32, u32)) -> Settings {
+        for_size(self.settings(), size)
+    }
+
+    /// The same without final gathering, as [`Self::without_final_gather`].
+    #[must_use]
+    pub fn without_final_gather_for(self, size: (u32, u32)) -> Settings {
+        for_size(self.without_final_gather(), size)
     }
 
     /// The defaults of [`Settings`], with those of this quality.
@@ -67,9 +88,36 @@ impl Quality {
     }
 }
 
+/// The settings with photons for a picture of that size.
+fn for_size(settings: Settings, size: (u32, u32)) -> Settings {
+    let pixels = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
+    let (least, whole) = (pixels(Quality::LEAST), pixels(Quality::WHOLE));
+    let part = pixels(size).clamp(least, whole) / whole;
+    settings.with(|s| {
+        s.photons.global = (f64::from(s.photons.global) * part) as u32;
+        s.photons.caustic = (f64::from(s.photons.caustic) * part.sqrt()) as u32;
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn small_pictures_have_photons_in_proportion() {
+        for quality in Quality::ALL {
+            let photons = |size| quality.settings_for(size).photons.global;
+            assert_eq!(quality.settings_for((256, 256)), quality.settings());
+            assert_eq!(quality.settings_for((65_535, 65_535)), quality.settings());
+            assert_eq!(2 * photons((512, 64)), photons((256, 256)), "pixels count, whatever their shape");
+            assert_eq!(photons((256, 256)) / 16, photons((64, 64)));
+            assert_eq!(quality.settings_for((1, 1)), quality.settings_for((64, 64)));
+            assert_eq!(quality.settings_for((64, 64)).picture, quality.settings().picture);
+            assert_eq!(quality.without_final_gather_for((256, 256)), quality.without_final_gather());
+        }
+        let plain = Quality::Normal.without_final_gather_for((128, 128)).photons;
+        assert_eq!((plain.global, plain.caustic), (25_000, 50_000), "those of the defaults");
+    }
 
     #[test]
     fn each_takes_more_work_than_the_one_before() {

@@ -34,12 +34,9 @@ impl FinalKernels {
         let constant = sampler_constant(sampler);
         Self {
             start: scene.kernel_with(gpu, "start_final_gather", &[constant]),
-            // An emitter that a ray hits gives direct light, or a caustic by way of lobes that cast
-            // one: the visible point has both already.
-            trace: scene.kernel_with(gpu, "trace_camera", &[constant, ("SEES_BEYOND_WIDE_LOBES", 1.0)]),
+            trace: scene.kernel_with(gpu, "trace_camera", &[constant, ("SEES_LIGHTS", 1.0)]),
             sum: Kernel::new(gpu, "sum_final_gather", &[]),
-            lobes: (scene.materials.has_rough)
-                .then(|| scene.kernel_with(gpu, "light_lobes", &[constant, ("LIGHTS_WIDE_LOBES_ONLY", 1.0)])),
+            lobes: (scene.materials.has_rough).then(|| scene.kernel_with(gpu, "light_lobes", &[constant])),
             direct: DirectLighting::new(gpu, scene, sampler, 1),
         }
     }
@@ -220,6 +217,7 @@ fn rays_as_samples(view: &CameraTile, rays: FinalRays) -> CameraTile {
         first_column: 0,
         first_row: 0,
         first_sample: 0,
+        gathers: 1,
         ..*view
     }
 }

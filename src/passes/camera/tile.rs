@@ -4,8 +4,10 @@ use crate::layout::{CameraTile, Counters, LOST_SCALE, MARGIN_CELL};
 
 /// Rays of final gathering of each visible point of a small picture for which a tile has room.
 const RAYS_AT_ONCE: u64 = 16;
-/// Visible points for which a tile has room at least, without its margin.
+/// Visible points for which a tile has room at least, without its margin; fewer for a picture of
+/// few pixels.
 const MIN_ROOM: u64 = 1 << 16;
+const MIN_ROOM_PER_PIXEL: u64 = 128;
 /// Maximum number of samples of one pixel in a tile.
 pub(super) const PIXEL_SAMPLES: u32 = 256;
 /// Minimum number of pixels of a tile.
@@ -61,10 +63,12 @@ impl From<Counters> for StepCount {
 /// twice as many since each step of its rays waits for the device; or those of the whole picture
 /// and some of their rays.
 pub(super) fn room_for(view: &CameraTile, batch: u64, final_rays: u32) -> u64 {
-    let points = u64::from(view.width) * u64::from(view.height) * u64::from(view.branches) * u64::from(view.spp);
+    let pixels = u64::from(view.width) * u64::from(view.height);
+    let points = pixels * u64::from(view.branches) * u64::from(view.spp);
     let rays = u64::from(final_rays).clamp(1, RAYS_AT_ONCE);
     let most = if final_rays > 0 { 2 * batch } else { batch };
-    (points * rays).next_power_of_two().clamp(MIN_ROOM.min(most), most)
+    let least = MIN_ROOM.min((MIN_ROOM_PER_PIXEL * pixels).next_power_of_two());
+    (points * rays).next_power_of_two().clamp(least.min(most), most)
 }
 
 /// Pixels along the sides of each tile, powers of 2.

@@ -25,6 +25,9 @@ use crate::{
 /// Minimum and maximum number of paths of one batch: the device must be busy, and the key of a
 /// staged photon holds its path.
 const MIN_BATCH: u64 = 1 << 16;
+/// Paths for each photon of a small map that a batch has room for at least: buffers for more would
+/// take longer to clear than to fill.
+const BATCH_PER_PHOTON: u64 = 4;
 const MAX_BATCH: u64 = layout::PATH_MASK as u64 + 1;
 /// Minimum number of paths over which the growth of a map is measured. The capacity of the map is
 /// used if it is larger.
@@ -139,7 +142,8 @@ impl PhotonTracer {
         };
         let largest = u64::from(settings.global.max(settings.caustic));
         let max_paths = settings.max_paths.unwrap_or(PATHS_PER_PHOTON * largest);
-        let batch_limit = (largest / 4).clamp(MIN_BATCH, MAX_BATCH).min(max_paths.max(1));
+        let busy = MIN_BATCH.min((BATCH_PER_PHOTON * largest).next_power_of_two());
+        let batch_limit = (largest / 4).clamp(busy, MAX_BATCH).min(max_paths.max(1));
         let named = scene.lights.table.named.len();
         let buffers = BatchBuffers::new(gpu, batch_limit, named)?;
         for plan in plans(scene, settings, caustics, paths) {
