@@ -264,6 +264,7 @@ fn info_reads_well() {
       meshes     1
       triangles  1
       spheres    0
+      geometry   about 64 bytes on the device
       bounds     0 0 0 .. 1 1 0 m
       lights (3)
         0  lamp  point  at 0 0 2  12.5664 12.5664 12.5664 W
