@@ -3,6 +3,7 @@
 use std::{collections::HashMap, mem};
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::solid::{COVER_BIT, NONE};
 use crate::scene::{Bounds, Triangle, vertex_bits};
@@ -37,8 +38,8 @@ pub(super) struct Shells {
 /// Holes smaller than this fraction of the surface are cracks of rounding.
 const CLOSED: f64 = 1e-4;
 
-/// Points at which a shell is probed at most, triangles visited for them in all, and their depth
-/// below a face over its size.
+/// Points at which a shell is probed at most, triangles visited for those of all shells, and their
+/// depth below a face over its size.
 const MAX_PROBES: usize = 256;
 const PROBE_COST: usize = 20_000_000;
 const PROBE_DEPTH: f64 = 1e-3;
@@ -85,6 +86,16 @@ impl Shells {
         Self::new(triangles, &groups)
     }
 
+    /// For each shell, whether it is closed and crosses itself.
+    pub(super) fn crossing(&self, triangles: &[Triangle]) -> Vec<bool> {
+        let visited: usize = self.shells.iter().map(|shell| shell.triangles.len()).sum();
+        let probes = (PROBE_COST / visited.max(1)).clamp(1, MAX_PROBES);
+        let crosses = |(i, shell): (usize, &Shell)| {
+            !shell.is_cover && shell.is_closed() && shell.crosses_itself(triangles, probes, i)
+        };
+        self.shells.par_iter().enumerate().map(crosses).collect()
+    }
+
     /// The solid of each triangle: a shell with faces outwards and the cavities in it.
     pub(super) fn solids(&self, triangles: &[Triangle]) -> Vec<u32> {
         let mut of = vec![NONE; self.triangles];
@@ -115,11 +126,10 @@ impl Shells {
 
 impl Shell {
     /// Whether faces lie inside of the shell, which then crosses itself; by some points just below
-    /// its faces.
-    pub(super) fn crosses_itself(&self, triangles: &[Triangle]) -> bool {
-        let probes = (PROBE_COST / self.triangles.len()).clamp(1, MAX_PROBES);
+    /// its faces, with others for another `number`.
+    fn crosses_itself(&self, triangles: &[Triangle], probes: usize, number: usize) -> bool {
         let step = (self.triangles.len() / probes).max(1);
-        self.triangles.iter().step_by(step).any(|i| {
+        self.triangles.iter().skip(number % step).step_by(step).any(|i| {
             let triangle = &triangles[*i as usize];
             let [a, b, c] = triangle.positions.map(Vec3::as_dvec3);
             let below = PROBE_DEPTH * triangle.area().sqrt() * triangle.geometric_normal().as_dvec3();
