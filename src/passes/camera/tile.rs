@@ -5,7 +5,7 @@ use crate::layout::{CameraTile, Counters, LOST_SCALE, MARGIN_CELL};
 /// Rays of final gathering of each visible point of a small picture for which a tile has room.
 const RAYS_AT_ONCE: u64 = 16;
 /// Visible points for which a tile has room at least, without its margin; fewer for a picture of
-/// few pixels.
+/// few pixels, if the smallest tile fits.
 const MIN_ROOM: u64 = 1 << 16;
 const MIN_ROOM_PER_PIXEL: u64 = 128;
 /// Maximum number of samples of one pixel in a tile.
@@ -67,7 +67,8 @@ pub(super) fn room_for(view: &CameraTile, batch: u64, final_rays: u32) -> u64 {
     let points = pixels * u64::from(view.branches) * u64::from(view.spp);
     let rays = u64::from(final_rays).clamp(1, RAYS_AT_ONCE);
     let most = if final_rays > 0 { 2 * batch } else { batch };
-    let least = MIN_ROOM.min((MIN_ROOM_PER_PIXEL * pixels).next_power_of_two());
+    let smallest = u64::from(MIN_TILE_PIXELS * view.branches * view.spp.min(PIXEL_SAMPLES));
+    let least = MIN_ROOM.min((MIN_ROOM_PER_PIXEL * pixels).max(smallest).next_power_of_two());
     (points * rays).next_power_of_two().clamp(least.min(most), most)
 }
 
