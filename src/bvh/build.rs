@@ -6,9 +6,10 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
+use rayon::prelude::*;
 
 use super::node::MAX_LEAF;
-use super::{convert, split, widen};
+use super::{parallel, split};
 use crate::layout::{BVH_STACK, BvhNode, Normals, Primitive, SPHERE_BIT, octahedral};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
@@ -29,27 +30,26 @@ pub struct Bvh {
 impl Bvh {
     /// Builds the tree over all triangles and spheres: PLOC with reinsertion (Meister and Bittner
     /// 2018, 2021). Large primitives among many that cross are listed several times, in smaller
-    /// boxes. Equal scenes give equal trees on any number of threads.
+    /// boxes. Large scenes are divided into parts that are built on all cores. Equal scenes give
+    /// equal trees on any number of threads.
     ///
     /// # Panics
     /// If there are 2^28 triangles and spheres or more. The loader refuses such files earlier.
     #[must_use]
     pub fn build(scene: &Scene) -> Self {
-        let mut primitives: Vec<Primitive> = Vec::with_capacity(scene.triangles.len() + scene.spheres.len());
-        primitives.extend(scene.triangles.iter().map(triangle_primitive));
-        primitives.extend(scene.spheres.iter().map(sphere_primitive));
-        for (id, primitive) in primitives.iter_mut().enumerate() {
-            primitive.id = id as u32;
-        }
+        let triangles = scene.triangles.par_iter().map(triangle_primitive);
+        let primitives = triangles.chain(scene.spheres.par_iter().map(sphere_primitive)).enumerate();
+        let mut primitives: Vec<Primitive> =
+            primitives.map(|(id, primitive)| Primitive { id: id as u32, ..primitive }).collect();
         primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
-        let (bounds, of_bounds) = split::pieces(&primitives, primitives.iter().map(bounds).collect());
-        let binary = convert::convert(&build_binary(&bounds), &bounds);
-        let (nodes, order) = widen::widen(&binary);
+        let (bounds, of_bounds) = split::pieces(&primitives, primitives.par_iter().map(bounds).collect());
+        let (nodes, order) = parallel::tree(&bounds);
         let normals = |primitive: &Primitive| {
             scene.triangles.get(primitive.id as usize).map_or(Normals::default(), corner_normals)
         };
-        let primitives: Vec<Primitive> = order.iter().map(|i| primitives[of_bounds[*i as usize] as usize]).collect();
-        Self { normals: primitives.iter().map(normals).collect(), nodes, primitives }
+        let primitives: Vec<Primitive> =
+            order.par_iter().map(|i| primitives[of_bounds[*i as usize] as usize]).collect();
+        Self { normals: primitives.par_iter().map(normals).collect(), nodes, primitives }
     }
 
     /// Maximum number of children that a traversal holds on its stack.

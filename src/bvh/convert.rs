@@ -1,12 +1,12 @@
-//! Conversion of a binary tree of any depth to one of at most [`MAX_HEIGHT`] levels, whose nodes
-//! store the boxes of both children.
+//! Conversion of a binary tree of any depth to one of a limited number of levels, whose nodes store
+//! the boxes of both children.
 
 use obvhs::bvh2::Bvh2;
 
 use super::{BvhChild, MAX_LEAF};
 use crate::scene::Bounds;
 
-/// Maximum height of the converted tree: interior nodes on the longest path from the root.
+/// Maximum height of the tree of a whole scene: interior nodes on the longest path from the root.
 pub(super) const MAX_HEIGHT: u32 = 32;
 
 /// A binary tree. [`BvhChild::first`] of a leaf is an index into `order`.
@@ -17,10 +17,11 @@ pub(super) struct Binary {
     pub order: Vec<u32>,
 }
 
-/// Converts `tree`, which holds at least two primitives with the given bounds.
-pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds]) -> Binary {
+/// Converts `tree`, which holds at least two primitives with the given bounds, to one of at most
+/// `limit` levels.
+pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds], limit: u32) -> Binary {
     let made = Binary { nodes: Vec::new(), order: Vec::with_capacity(bounds.len()) };
-    let mut converter = Converter { tree, bounds, subtrees: measure(tree), made };
+    let mut converter = Converter { tree, bounds, limit, subtrees: measure(tree), made };
     let root = converter.tree_node(0, 0);
     if root.count > 0 {
         // All primitives fit in one leaf, but the root needs two children.
@@ -70,14 +71,15 @@ fn even_height(primitives: u32) -> u32 {
 struct Converter<'a> {
     tree: &'a Bvh2,
     bounds: &'a [Bounds],
+    limit: u32,
     subtrees: Vec<Subtree>,
     made: Binary,
 }
 
 impl Converter<'_> {
     /// Converts the subtree of a node that lies below `depth` interior nodes. A subtree that is too
-    /// deep keeps its upper nodes as long as an even split of the children still fits into
-    /// [`MAX_HEIGHT`].
+    /// deep keeps its upper nodes as long as an even split of the children still fits into the
+    /// limit.
     fn tree_node(&mut self, index: u32, depth: u32) -> BvhChild {
         let node = &self.tree.nodes[index as usize];
         if node.is_leaf() {
@@ -86,8 +88,8 @@ impl Converter<'_> {
             return self.leaf(&leaf);
         }
         let children = [node.first_index, node.first_index + 1];
-        let fits = depth + self.subtrees[index as usize].height <= MAX_HEIGHT;
-        let fits_later = |child: u32| depth + 1 + even_height(self.subtrees[child as usize].primitives) <= MAX_HEIGHT;
+        let fits = depth + self.subtrees[index as usize].height <= self.limit;
+        let fits_later = |child: u32| depth + 1 + even_height(self.subtrees[child as usize].primitives) <= self.limit;
         if !fits && !children.into_iter().all(fits_later) {
             let mut below = self.primitives_below(index);
             return self.even_node(&mut below, depth);

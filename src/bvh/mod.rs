@@ -12,6 +12,7 @@ mod convert;
 mod media;
 mod node;
 mod overlap;
+mod parallel;
 mod ray;
 mod split;
 #[cfg(test)]
