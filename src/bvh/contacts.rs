@@ -48,8 +48,14 @@ impl Patches {
         let triangles = scene.triangles.iter().map(|t| ((t.object, t.material), t.area()));
         let spheres = scene.spheres.iter().map(|s| ((s.object, s.material), s.area()));
         let (mut all, mut known) = (Vec::new(), HashMap::new());
+        // Those of a mesh follow each other.
+        let mut last = None;
         let number = |(key, area): ((u32, u32), f64)| {
-            let number = *known.entry(key).or_insert(all.len());
+            let number = match last {
+                Some((same, number)) if same == key => number,
+                _ => *known.entry(key).or_insert(all.len()),
+            };
+            last = Some((key, number));
             if number == all.len() {
                 all.push(Patch { object: key.0, material: key.1, area: 0.0 });
             }
@@ -163,8 +169,11 @@ struct Search<'a> {
 impl Search<'_> {
     /// Patches of which a primitive lies in the surface of `primitive`, but for the patch `apart`.
     fn touching(&self, primitive: &Primitive, apart: Option<u32>) -> Vec<u32> {
-        let shape = Shape::new(primitive);
         let is_apart = |patch: Option<u32>| patch.is_some() && patch == apart;
+        if is_apart(self.of_nodes[0]) {
+            return Vec::new();
+        }
+        let shape = Shape::new(primitive);
         let (mut found, mut waiting) = (Vec::new(), vec![0]);
         while let Some(node) = waiting.pop() {
             for child in self.bvh.nodes[node as usize].children() {

@@ -19,8 +19,8 @@ use crate::scene::Bounds;
 
 /// Number of primitives from which on they are divided.
 pub(super) const LARGE: usize = 100_000;
-/// A part has at most this fraction of the primitives, and each side of a division at least a third
-/// of what is divided: there are at most three times as many parts.
+/// A part has at most this fraction of the primitives, and each side of a division about a third of
+/// what is divided at least: there are hardly more than three times as many parts.
 const PARTS: usize = 32;
 const SMALLER_SIDE: usize = 3;
 /// Fraction of the area of the scene's box from which on a primitive's box is large, and maximum
@@ -31,18 +31,33 @@ const MAX_APART: usize = 128;
 const BINS: usize = 32;
 /// Levels of the common nodes at most.
 const LEVELS: u32 = 5;
-const _: () = assert!(PARTS * SMALLER_SIDE + MAX_APART <= capacity(0));
-/// Primitives that one task looks at.
-const CHUNK: usize = 1 << 14;
+const _: () = assert!(2 * PARTS * SMALLER_SIDE + MAX_APART <= capacity(0));
+/// Primitives that decide about a division.
+const SAMPLE: usize = 1 << 15;
 
 /// Nodes, parents before children, and the indices of the boxes in leaf order.
 pub(super) fn tree(bounds: &[Bounds]) -> (Vec<BvhNode>, Vec<u32>) {
-    if bounds.len() < LARGE { subtree(bounds, BVH_STACK as u32) } else { joined(bounds) }
+    if bounds.len() < LARGE { subtree(bounds, BVH_STACK as u32, Curve::Whole) } else { joined(bounds) }
+}
+
+/// Box through which the curve runs along which the builder sorts.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Curve {
+    /// That around everything.
+    Whole,
+    /// A cube: the box of a part may be much flatter than that of a scene, and the shorter axes
+    /// must not count as much as the longest.
+    Cube,
 }
 
 /// The tree by one thread. A traversal defers `room` children at most.
-pub(super) fn subtree(bounds: &[Bounds], room: u32) -> (Vec<BvhNode>, Vec<u32>) {
-    widen::widen(&convert::convert(&build_binary(bounds), bounds, widen::height_for(room)), room)
+pub(super) fn subtree(bounds: &[Bounds], room: u32, curve: Curve) -> (Vec<BvhNode>, Vec<u32>) {
+    let all = bounds.iter().copied().fold(Bounds::EMPTY, Bounds::union);
+    let within = match curve {
+        Curve::Whole => all,
+        Curve::Cube => Bounds { max: all.min + (all.max - all.min).max_element(), ..all },
+    };
+    widen::widen(&convert::convert(&build_binary(bounds, within), bounds, widen::height_for(room)), room)
 }
 
 fn joined(bounds: &[Bounds]) -> (Vec<BvhNode>, Vec<u32>) {
@@ -54,7 +69,7 @@ fn joined(bounds: &[Bounds]) -> (Vec<BvhNode>, Vec<u32>) {
     let built = on_all_cores(parts.len(), |part| {
         let indices = &parts[part];
         let own: Vec<Bounds> = indices.iter().map(|i| bounds[*i as usize]).collect();
-        let (nodes, mut order) = subtree(&own, places[part].room);
+        let (nodes, mut order) = subtree(&own, places[part].room, Curve::Cube);
         order.iter_mut().for_each(|i| *i = indices[*i as usize]);
         (nodes, order)
     });
@@ -99,19 +114,17 @@ fn divide(bounds: &[Bounds]) -> (Vec<Vec<u32>>, Vec<u32>) {
         apart.sort_by(|a, b| area(b).total_cmp(&area(a)));
         rest.extend(apart.drain(MAX_APART..));
     }
-    let mut parts = Vec::new();
-    split(bounds, rest, bounds.len().div_ceil(PARTS), &mut parts);
-    (parts, apart)
+    (split(bounds, rest, bounds.len().div_ceil(PARTS)), apart)
 }
 
-fn split(bounds: &[Bounds], indices: Vec<u32>, most: usize, parts: &mut Vec<Vec<u32>>) {
+fn split(bounds: &[Bounds], indices: Vec<u32>, most: usize) -> Vec<Vec<u32>> {
     if indices.len() <= most {
-        parts.push(indices);
-        return;
+        return vec![indices];
     }
     let [left, right] = halves(bounds, indices);
-    split(bounds, left, most, parts);
-    split(bounds, right, most, parts);
+    let (mut parts, others) = rayon::join(|| split(bounds, left, most), || split(bounds, right, most));
+    parts.extend(others);
+    parts
 }
 
 /// Twice the centre of a box.
@@ -119,39 +132,24 @@ fn middle(bounds: &Bounds) -> glam::Vec3 {
     bounds.min + bounds.max
 }
 
-/// Boxes and number of the primitives of each interval along each axis.
-type Bins = [[(Bounds, usize); BINS]; 3];
-
 /// Divides primitives where the surface area heuristic says, as far as neither side becomes too
-/// small.
+/// small, both by a sample of them.
 fn halves(bounds: &[Bounds], mut indices: Vec<u32>) -> [Vec<u32>; 2] {
-    let centers = indices.par_chunks(CHUNK).map(|chunk| {
-        let middles = chunk.iter().map(|i| middle(&bounds[*i as usize]));
-        middles.fold(Bounds::EMPTY, |all, p| all.union(Bounds { min: p, max: p }))
-    });
-    let centers = centers.reduce(|| Bounds::EMPTY, Bounds::union);
+    let step = indices.len().div_ceil(SAMPLE);
+    let sample: Vec<Bounds> = indices.iter().step_by(step).map(|i| bounds[*i as usize]).collect();
+    let centers = sample.iter().map(middle).fold(Bounds::EMPTY, |all, p| all.union(Bounds { min: p, max: p }));
     let scale = BINS as f32 / (centers.max - centers.min);
-    let bin = |i: u32| {
-        let at = (middle(&bounds[i as usize]) - centers.min) * scale;
-        // Not a number without an extent: 0.
-        [0, 1, 2].map(|axis| (at[axis] as usize).min(BINS - 1))
+    // Not a number without an extent: 0.
+    let bin = |b: &Bounds, axis: usize| {
+        (((middle(b)[axis] - centers.min[axis]) * scale[axis]) as usize).min(BINS - 1)
     };
-    let empty = || [[(Bounds::EMPTY, 0); BINS]; 3];
+    let mut bins = [[(Bounds::EMPTY, 0); BINS]; 3];
     let add = |(all, count): &mut (Bounds, usize), (more, others): (Bounds, usize)| {
         (*all, *count) = (all.union(more), *count + others);
     };
-    let bins = indices.par_chunks(CHUNK).map(|chunk| {
-        let mut bins: Bins = empty();
-        for &i in chunk {
-            let of_axes = bin(i);
-            (0..3).for_each(|axis| add(&mut bins[axis][of_axes[axis]], (bounds[i as usize], 1)));
-        }
-        bins
-    });
-    let bins = bins.reduce(empty, |mut a, b| {
-        (0..3).for_each(|axis| (0..BINS).for_each(|k| add(&mut a[axis][k], b[axis][k])));
-        a
-    });
+    for b in &sample {
+        (0..3).for_each(|axis| add(&mut bins[axis][bin(b, axis)], (*b, 1)));
+    }
     let cost = |axis: usize, border: usize| {
         let side = |bins: &[(Bounds, usize)]| {
             let mut sum = (Bounds::EMPTY, 0);
@@ -159,14 +157,14 @@ fn halves(bounds: &[Bounds], mut indices: Vec<u32>) -> [Vec<u32>; 2] {
             sum
         };
         let sides = [side(&bins[axis][..border]), side(&bins[axis][border..])];
-        let large = sides.iter().all(|(_, count)| count * SMALLER_SIDE >= indices.len());
+        let large = sides.iter().all(|(_, count)| count * SMALLER_SIDE >= sample.len());
         large.then(|| sides.iter().map(|(all, count)| all.half_area() * *count as f32).sum::<f32>())
     };
     let borders = (0..3).flat_map(|axis| (1..BINS).map(move |border| (axis, border)));
     let costs = borders.filter_map(|(axis, border)| Some((cost(axis, border)?, axis, border)));
     match costs.min_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((_, axis, border)) => {
-            let (left, right) = indices.into_par_iter().partition(|i| bin(*i)[axis] < border);
+            let (left, right) = indices.into_par_iter().partition(|i| bin(&bounds[*i as usize], axis) < border);
             [left, right]
         }
         None => {
