@@ -2,8 +2,8 @@
 //! are built each by one thread and joined below common nodes.
 //!
 //! Parts follow from the primitives alone, so that the tree is the same on any number of threads.
-//! Primitives of which a part would become much larger than it is without them, as the walls around
-//! a fine mesh, are in no part but directly below the common nodes.
+//! Large primitives, as the walls around a fine mesh, are a part of their own, for they would make
+//! any other much larger.
 
 use std::{
     panic::resume_unwind,
@@ -13,7 +13,7 @@ use std::{
 
 use rayon::prelude::*;
 
-use super::{WIDTH, build::build_binary, convert, widen};
+use super::{WIDTH, binary::build_binary, convert, widen};
 use crate::layout::{BVH_STACK, BvhNode};
 use crate::scene::Bounds;
 
@@ -23,15 +23,13 @@ pub(super) const LARGE: usize = 100_000;
 /// what is divided at least: there are hardly more than three times as many parts.
 const PARTS: usize = 32;
 const SMALLER_SIDE: usize = 3;
-/// Fraction of the area of the scene's box from which on a primitive's box is large, and maximum
-/// number of those that are in no part.
+/// Fraction of the area of the scene's box from which on a primitive's box is large.
 const LARGE_BOX: f32 = 1.0 / 128.0;
-const MAX_APART: usize = 128;
 /// Intervals along an axis between which primitives are divided.
 const BINS: usize = 32;
 /// Levels of the common nodes at most.
 const LEVELS: u32 = 5;
-const _: () = assert!(2 * PARTS * SMALLER_SIDE + MAX_APART <= capacity(0));
+const _: () = assert!(2 * PARTS * SMALLER_SIDE < capacity(0));
 /// Primitives that decide about a division.
 const SAMPLE: usize = 1 << 15;
 
@@ -61,11 +59,10 @@ pub(super) fn subtree(bounds: &[Bounds], room: u32, curve: Curve) -> (Vec<BvhNod
 }
 
 fn joined(bounds: &[Bounds]) -> (Vec<BvhNode>, Vec<u32>) {
-    let (parts, apart) = divide(bounds);
-    let entries = common_entries(bounds, &parts, &apart);
-    let mut top = Top { nodes: vec![BvhNode::default()], order: Vec::new(), places: vec![Place::default(); parts.len()] };
-    top.node(0, entries, 0, BVH_STACK as u32);
-    let Top { mut nodes, mut order, places } = top;
+    let parts = divide(bounds);
+    let mut top = Top { nodes: vec![BvhNode::default()], places: vec![Place::default(); parts.len()] };
+    top.node(0, boxes_of(bounds, &parts), 0, BVH_STACK as u32);
+    let Top { mut nodes, places } = top;
     let built = on_all_cores(parts.len(), |part| {
         let indices = &parts[part];
         let own: Vec<Bounds> = indices.iter().map(|i| bounds[*i as usize]).collect();
@@ -74,7 +71,7 @@ fn joined(bounds: &[Bounds]) -> (Vec<BvhNode>, Vec<u32>) {
         (nodes, order)
     });
     nodes.reserve_exact(built.iter().map(|(below, _)| below.len() - 1).sum());
-    order.reserve_exact(bounds.len() - order.len());
+    let mut order = Vec::with_capacity(bounds.len());
     for ((below, own), place) in built.into_iter().zip(places) {
         // The root of a part lies beside its siblings, all others behind each other.
         let (before, first) = (nodes.len() as u32 - 1, order.len() as u32);
@@ -104,17 +101,19 @@ fn on_all_cores<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<
     done.into_iter().map(|(_, result)| result).collect()
 }
 
-/// The parts, each the indices of its primitives, and the primitives that are in none.
-fn divide(bounds: &[Bounds]) -> (Vec<Vec<u32>>, Vec<u32>) {
+/// The parts, each the indices of its primitives, two or more.
+fn divide(bounds: &[Bounds]) -> Vec<Vec<u32>> {
     let all = bounds.par_iter().copied().reduce(|| Bounds::EMPTY, Bounds::union);
+    let most = bounds.len().div_ceil(PARTS);
     let area = |i: &u32| bounds[*i as usize].half_area();
     let is_large = |i: &u32| area(i) > LARGE_BOX * all.half_area();
-    let (mut apart, mut rest): (Vec<u32>, Vec<u32>) = (0..bounds.len() as u32).into_par_iter().partition(is_large);
-    if apart.len() > MAX_APART {
-        apart.sort_by(|a, b| area(b).total_cmp(&area(a)));
-        rest.extend(apart.drain(MAX_APART..));
-    }
-    (split(bounds, rest, bounds.len().div_ceil(PARTS)), apart)
+    let (mut large, mut rest): (Vec<u32>, Vec<u32>) = (0..bounds.len() as u32).into_par_iter().partition(is_large);
+    large.sort_by(|a, b| area(b).total_cmp(&area(a)));
+    let kept = if large.len() < 2 { 0 } else { large.len().min(most) };
+    rest.extend(large.drain(kept..));
+    let mut parts = split(bounds, rest, most);
+    parts.extend((!large.is_empty()).then_some(large));
+    parts
 }
 
 fn split(bounds: &[Bounds], indices: Vec<u32>, most: usize) -> Vec<Vec<u32>> {
@@ -140,9 +139,7 @@ fn halves(bounds: &[Bounds], mut indices: Vec<u32>) -> [Vec<u32>; 2] {
     let centers = sample.iter().map(middle).fold(Bounds::EMPTY, |all, p| all.union(Bounds { min: p, max: p }));
     let scale = BINS as f32 / (centers.max - centers.min);
     // Not a number without an extent: 0.
-    let bin = |b: &Bounds, axis: usize| {
-        (((middle(b)[axis] - centers.min[axis]) * scale[axis]) as usize).min(BINS - 1)
-    };
+    let bin = |b: &Bounds, axis: usize| (((middle(b)[axis] - centers.min[axis]) * scale[axis]) as usize).min(BINS - 1);
     let mut bins = [[(Bounds::EMPTY, 0); BINS]; 3];
     let add = |(all, count): &mut (Bounds, usize), (more, others): (Bounds, usize)| {
         (*all, *count) = (all.union(more), *count + others);
@@ -178,32 +175,21 @@ fn halves(bounds: &[Bounds], mut indices: Vec<u32>) -> [Vec<u32>; 2] {
     }
 }
 
-/// A part, by its index, or a primitive that is in none, by its own.
-#[derive(Clone, Copy)]
-enum Content {
-    Part(usize),
-    Primitive(u32),
-}
-
-/// What lies below the common nodes.
+/// A part as the common nodes know it.
 #[derive(Clone, Copy)]
 struct Entry {
     bounds: Bounds,
     primitives: usize,
-    content: Content,
+    part: usize,
 }
 
-fn common_entries(bounds: &[Bounds], parts: &[Vec<u32>], apart: &[u32]) -> Vec<Entry> {
+fn boxes_of(bounds: &[Bounds], parts: &[Vec<u32>]) -> Vec<Entry> {
     let of_part = |(part, indices): (usize, &Vec<u32>)| Entry {
         bounds: indices.iter().map(|i| bounds[*i as usize]).fold(Bounds::EMPTY, Bounds::union),
         primitives: indices.len(),
-        content: Content::Part(part),
+        part,
     };
-    let of_primitive =
-        |i: &u32| Entry { bounds: bounds[*i as usize], primitives: 1, content: Content::Primitive(*i) };
-    let mut entries: Vec<Entry> = parts.par_iter().enumerate().map(of_part).collect();
-    entries.extend(apart.iter().map(of_primitive));
-    entries
+    parts.par_iter().enumerate().map(of_part).collect()
 }
 
 /// Place of the root of a part among the nodes, and number of children that a traversal may defer
@@ -217,29 +203,21 @@ struct Place {
 /// The common nodes.
 struct Top {
     nodes: Vec<BvhNode>,
-    /// The primitives that are in no part, in leaf order.
-    order: Vec<u32>,
     places: Vec<Place>,
 }
 
 impl Top {
     /// Writes the node above `entries`, and all common nodes below it.
     fn node(&mut self, at: usize, entries: Vec<Entry>, level: u32, room: u32) {
-        let is_leaf = |group: &Vec<Entry>| matches!(group[..], [Entry { content: Content::Primitive(_), .. }]);
-        let (leaves, groups): (Vec<_>, Vec<_>) = groups(entries, level).into_iter().partition(is_leaf);
-        let room = room - (groups.len() + leaves.len() - 1) as u32;
-        let boxes: Vec<Bounds> = groups.iter().chain(&leaves).map(|group| around(group).0).collect();
+        let groups = groups(entries, level);
+        let room = room - (groups.len() - 1) as u32;
+        let boxes: Vec<Bounds> = groups.iter().map(|group| around(group).0).collect();
         let first = self.nodes.len();
-        self.nodes[at] = BvhNode::new(&boxes, &vec![1; leaves.len()], first as u32, self.order.len() as u32);
+        self.nodes[at] = BvhNode::new(&boxes, &[], first as u32, 0);
         self.nodes.resize(first + groups.len(), BvhNode::default());
-        for entry in leaves.into_iter().flatten() {
-            if let Content::Primitive(primitive) = entry.content {
-                self.order.push(primitive);
-            }
-        }
         for (slot, group) in (first..).zip(groups) {
             match group[..] {
-                [Entry { content: Content::Part(part), .. }] => self.places[part] = Place { root: slot, room },
+                [Entry { part, .. }] => self.places[part] = Place { root: slot, room },
                 _ => self.node(slot, group, level + 1, room),
             }
         }
@@ -298,4 +276,20 @@ fn halved(entries: Vec<Entry>, evenly: bool) -> [Vec<Entry>; 2] {
     let mut left = sorted[axis].clone();
     let right = left.split_off(border);
     [left, right]
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn boxes_in_one_place_are_divided_too() {
+        let parts = divide(&vec![Bounds { min: Vec3::ZERO, max: Vec3::ONE }; LARGE + 7]);
+        let mut all = parts.concat();
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..LARGE as u32 + 7));
+        assert!(parts.iter().all(|part| part.len() > 1 && part.len() <= LARGE / PARTS + 1), "{}", parts.len());
+    }
 }
