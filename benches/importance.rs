@@ -1,58 +1,67 @@
 //! Benchmark: photons where the camera needs them, as squared error at equal time.
 //!
 //! `cargo bench --bench importance [-- ROUNDS]`, 3 rounds by default. Renders the light that comes
-//! over other surfaces in scenes of which the camera sees a small part, with `--emission aimed`,
-//! which knows what the cameras see, and with `--emission unaimed`, which does not. The relMSE is
-//! against a picture of twenty times the photons. The last column is the product of relMSE and
-//! seconds with aimed emission over that without: the squared error at equal time. The aim is a
-//! tenth.
+//! over other surfaces, with final gathering and without, in scenes of which the camera sees a
+//! small part, with `--emission aimed`, which knows what the cameras see, and with
+//! `--emission unaimed`, which does not. The relMSE is against a picture of twenty times the
+//! photons. The last column is the product of relMSE and seconds with aimed emission over that
+//! without: the squared error at equal time. The aim is a tenth.
 
 use caustica::{
     image::difference::rel_mse,
     progress::Silent,
     renderer::{Render, render},
     scene::{Environment, Light, LightKind, Scene},
-    settings::{Emission, Mode, Settings},
+    settings::{Emission, Mode, Quality},
 };
 use glam::{Vec3, vec3};
 use support::{add_box, add_quad, camera, diffuse, emissive, gpu, point_light, scene};
 
 const SIZE: u32 = 96;
 const PHOTONS: u32 = 20_000;
-const REFERENCE: u32 = 20 * PHOTONS;
+const REFERENCE: u32 = 50 * PHOTONS;
 
 fn main() {
     let rounds: u32 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(3);
     println!("{} ({})", gpu().name, gpu().driver);
+    let head = ["scene", "estimate", "emission", "seconds", "relMSE", "at equal time", "seen"];
     println!(
-        "{:>22} {:>8} {:>10} {:>12} {:>14} {:>8}",
-        "scene", "emission", "seconds", "relMSE", "at equal time", "seen"
+        "{:>20} {:>10} {:>9} {:>9} {:>10} {:>14} {:>8}",
+        head[0], head[1], head[2], head[3], head[4], head[5], head[6]
     );
     for (name, scene) in scenes() {
-        let reference = rendered(&scene, Emission::Aimed, REFERENCE, 1000);
-        let mut general = 0.0;
-        for (emission, word) in [(Emission::Unaimed, "unaimed"), (Emission::Aimed, "aimed")] {
-            let _ = rendered(&scene, emission, PHOTONS, 0);
-            let renders: Vec<Render> = (0..rounds).map(|seed| rendered(&scene, emission, PHOTONS, seed)).collect();
-            let of = |measure: fn(&Render, &Render) -> f64| {
-                renders.iter().map(|render| measure(render, &reference)).sum::<f64>() / f64::from(rounds)
-            };
-            let seconds = of(|render, _| render.stats.seconds.total);
-            let error = of(|render, right| rel_mse(render.frame.radiance(), right.frame.radiance(), None));
-            let seen = of(|render, _| {
-                let seen = render.stats.photons.global.seen.unwrap_or_default();
-                seen.seen as f64 / seen.sampled.max(1) as f64
-            });
-            general = if emission == Emission::Unaimed { error * seconds } else { general };
-            let ratio = error * seconds / general;
-            println!("{name:>22} {word:>8} {seconds:>10.3} {error:>12.5} {ratio:>14.3} {:>6.1} %", 100.0 * seen);
+        for (estimate, gathers) in [("photons", false), ("gathered", true)] {
+            let rendered = |emission, photons, seed| rendered(&scene, gathers, emission, photons, seed);
+            let reference = rendered(Emission::Aimed, REFERENCE, 1000);
+            let mut general = 0.0;
+            for (emission, word) in [(Emission::Unaimed, "unaimed"), (Emission::Aimed, "aimed")] {
+                let _ = rendered(emission, PHOTONS, 0);
+                let renders: Vec<Render> = (0..rounds).map(|seed| rendered(emission, PHOTONS, seed)).collect();
+                let of = |measure: fn(&Render, &Render) -> f64| {
+                    renders.iter().map(|render| measure(render, &reference)).sum::<f64>() / f64::from(rounds)
+                };
+                let seconds = of(|render, _| render.stats.seconds.total);
+                let error = of(|render, right| rel_mse(render.frame.radiance(), right.frame.radiance(), None));
+                let seen = 100.0
+                    * of(|render, _| {
+                        let seen = render.stats.photons.global.seen.unwrap_or_default();
+                        seen.seen as f64 / seen.sampled.max(1) as f64
+                    });
+                general = if emission == Emission::Unaimed { error * seconds } else { general };
+                let ratio = error * seconds / general;
+                println!(
+                    "{name:>20} {estimate:>10} {word:>9} {seconds:>9.3} {error:>10.5} {ratio:>14.3} {seen:>6.1} %"
+                );
+            }
         }
     }
 }
 
-/// The light over other surfaces, of photons alone.
-fn rendered(scene: &Scene, emission: Emission, photons: u32, seed: u32) -> Render {
-    let settings = Settings::default().with(|s| {
+/// The light over other surfaces.
+fn rendered(scene: &Scene, gathers: bool, emission: Emission, photons: u32, seed: u32) -> Render {
+    let quality = Quality::Normal;
+    let settings = if gathers { quality.settings() } else { quality.without_final_gather() };
+    let settings = settings.with(|s| {
         s.photons.mode = Mode::IndirectPhotons;
         s.photons.emission = emission;
         (s.photons.global, s.photons.caustic) = (photons, 1000);

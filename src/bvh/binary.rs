@@ -6,7 +6,6 @@ use obvhs::{
     ploc::{PlocBuilder, SortPrecision},
 };
 
-use super::node::MAX_LEAF;
 use crate::scene::Bounds;
 
 /// Neighbours along the curve among which PLOC looks for the nearest; only for the next ones at
@@ -20,9 +19,10 @@ const REINSERTED: f32 = 0.05;
 /// Cost of one level of the binary tree, in primitive tests.
 const LEVEL_COST: f32 = 1.5;
 
-/// Builds the tree before conversion; primitives are sorted along a curve through the box `within`.
-/// Runs on one thread: the parallel sorts do not promise an order of equal keys.
-pub(super) fn build_binary(bounds: &[Bounds], within: Bounds) -> Bvh2 {
+/// Builds the tree before conversion, with leaves of at most `max_leaf` boxes; they are sorted
+/// along a curve through the box `within`. Runs on one thread: the parallel sorts do not promise an
+/// order of equal keys.
+pub(super) fn build_binary(bounds: &[Bounds], within: Bounds, max_leaf: u32) -> Bvh2 {
     let corners = |b: &Bounds| Aabb::new(b.min.into(), b.max.into());
     let build = || {
         let count = bounds.len();
@@ -39,7 +39,7 @@ pub(super) fn build_binary(bounds: &[Bounds], within: Bounds) -> Bvh2 {
         );
         let mut reinsertion = ReinsertionOptimizer::default();
         reinsertion.run(&mut tree, REINSERTED, None);
-        collapse(&mut tree, MAX_LEAF, LEVEL_COST);
+        collapse(&mut tree, max_leaf, LEVEL_COST);
         reinsertion.run(&mut tree, 2.0 * REINSERTED, None);
         tree
     };

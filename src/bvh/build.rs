@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{parallel, split};
+use super::{parallel, split, widen};
 use crate::layout::{BVH_STACK, BvhNode, Normals, Primitive, SPHERE_BIT, octahedral};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
@@ -37,7 +37,7 @@ impl Bvh {
             primitives.map(|(id, primitive)| Primitive { id: id as u32, ..primitive }).collect();
         primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
         let (bounds, of_bounds) = split::pieces(&primitives, primitives.par_iter().map(bounds).collect());
-        let (nodes, order) = parallel::tree(&bounds);
+        let (nodes, order) = widen::widen(&parallel::tree(&bounds));
         let normals = |primitive: &Primitive| {
             scene.triangles.get(primitive.id as usize).map_or(Normals::default(), corner_normals)
         };

@@ -155,7 +155,6 @@ impl Converter<'_> {
 }
 
 /// Height of the whole tree: interior nodes on the longest path from the root.
-#[cfg(test)]
 pub(super) fn height(tree: &Bvh2) -> usize {
     measure(tree)[0].height as usize
 }

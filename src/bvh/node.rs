@@ -70,20 +70,6 @@ impl BvhNode {
         node
     }
 
-    /// The node in a tree whose nodes and primitives have moved on by so many places.
-    ///
-    /// # Panics
-    /// If an index becomes 2^28 or more.
-    #[must_use]
-    pub(super) fn moved(mut self, nodes: u32, primitives: u32) -> Self {
-        for (word, by) in [(&mut self.low[3], nodes), (&mut self.high[3], primitives)] {
-            let before = *word >> BVH_INDEX_BITS;
-            *word += by;
-            assert!(*word >> BVH_INDEX_BITS == before, "a tree of more than 2^28 nodes or primitives");
-        }
-        self
-    }
-
     /// Unpacks the children, in the order in which they were packed.
     pub fn children(&self) -> impl Iterator<Item = BvhChild> + use<> {
         let Self { grid: [x, y, z, shape], low, high } = *self;

@@ -2,19 +2,24 @@
 //! are built each by one thread and joined below common nodes.
 //!
 //! Parts follow from the primitives alone, so that the tree is the same on any number of threads.
-//! Large primitives, as the walls around a fine mesh, are a part of their own, for they would make
-//! any other much larger.
+//! Large primitives, as the walls around a fine mesh, are leaves among the parts, for they would
+//! make any of these much larger.
 
 use std::{
+    ops::Range,
     panic::resume_unwind,
     sync::atomic::{AtomicUsize, Ordering},
     thread,
 };
 
+use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use super::{WIDTH, binary::build_binary, convert, widen};
-use crate::layout::{BVH_STACK, BvhNode};
+use super::{
+    BvhChild, MAX_LEAF,
+    binary::build_binary,
+    convert::{Binary, MAX_HEIGHT, convert, height},
+};
 use crate::scene::Bounds;
 
 /// Number of primitives from which on they are divided.
@@ -23,19 +28,21 @@ pub(super) const LARGE: usize = 100_000;
 /// what is divided at least: there are hardly more than three times as many parts.
 const PARTS: usize = 32;
 const SMALLER_SIDE: usize = 3;
-/// Fraction of the area of the scene's box from which on a primitive's box is large.
+/// Fraction of the area of the scene's box from which on a primitive's box is large, and maximum
+/// number of those that are in no part.
 const LARGE_BOX: f32 = 1.0 / 128.0;
+const MAX_APART: usize = 256;
 /// Intervals along an axis between which primitives are divided.
 const BINS: usize = 32;
 /// Levels of the common nodes at most.
-const LEVELS: u32 = 5;
-const _: () = assert!(2 * PARTS * SMALLER_SIDE < capacity(0));
+const LEVELS: u32 = 11;
+const _: () = assert!(2 * PARTS * SMALLER_SIDE + MAX_APART < capacity(0));
 /// Primitives that decide about a division.
 const SAMPLE: usize = 1 << 15;
 
-/// Nodes, parents before children, and the indices of the boxes in leaf order.
-pub(super) fn tree(bounds: &[Bounds]) -> (Vec<BvhNode>, Vec<u32>) {
-    if bounds.len() < LARGE { subtree(bounds, BVH_STACK as u32, Curve::Whole) } else { joined(bounds) }
+/// The tree over two or more boxes.
+pub(super) fn tree(bounds: &[Bounds]) -> Binary {
+    if bounds.len() < LARGE { part(bounds, MAX_HEIGHT, Curve::Whole) } else { joined(bounds) }
 }
 
 /// Box through which the curve runs along which the builder sorts.
@@ -48,38 +55,46 @@ pub(super) enum Curve {
     Cube,
 }
 
-/// The tree by one thread. A traversal defers `room` children at most.
-pub(super) fn subtree(bounds: &[Bounds], room: u32, curve: Curve) -> (Vec<BvhNode>, Vec<u32>) {
+/// The tree by one thread, of `height` levels at most.
+pub(super) fn part(bounds: &[Bounds], height: u32, curve: Curve) -> Binary {
     let all = bounds.iter().copied().fold(Bounds::EMPTY, Bounds::union);
     let within = match curve {
         Curve::Whole => all,
         Curve::Cube => Bounds { max: all.min + (all.max - all.min).max_element(), ..all },
     };
-    widen::widen(&convert::convert(&build_binary(bounds, within), bounds, widen::height_for(room)), room)
+    convert(&build_binary(bounds, within, MAX_LEAF), bounds, height)
 }
 
-fn joined(bounds: &[Bounds]) -> (Vec<BvhNode>, Vec<u32>) {
-    let parts = divide(bounds);
-    let mut top = Top { nodes: vec![BvhNode::default()], places: vec![Place::default(); parts.len()] };
-    top.node(0, boxes_of(bounds, &parts), 0, BVH_STACK as u32);
-    let Top { mut nodes, places } = top;
-    let built = on_all_cores(parts.len(), |part| {
-        let indices = &parts[part];
+fn joined(bounds: &[Bounds]) -> Binary {
+    let (parts, apart) = divide(bounds);
+    let of = |indices: &[u32], height: u32| {
         let own: Vec<Bounds> = indices.iter().map(|i| bounds[*i as usize]).collect();
-        let (nodes, mut order) = subtree(&own, places[part].room, Curve::Cube);
-        order.iter_mut().for_each(|i| *i = indices[*i as usize]);
-        (nodes, order)
-    });
-    nodes.reserve_exact(built.iter().map(|(below, _)| below.len() - 1).sum());
-    let mut order = Vec::with_capacity(bounds.len());
-    for ((below, own), place) in built.into_iter().zip(places) {
-        // The root of a part lies beside its siblings, all others behind each other.
-        let (before, first) = (nodes.len() as u32 - 1, order.len() as u32);
-        nodes[place.root] = below[0].moved(before, first);
-        nodes.extend(below[1..].iter().map(|node| node.moved(before, first)));
-        order.extend(own);
+        let mut tree = part(&own, height, Curve::Cube);
+        tree.order.iter_mut().for_each(|i| *i = indices[*i as usize]);
+        tree
+    };
+    let apart = if apart.is_empty() { Binary { nodes: Vec::new(), order: Vec::new() } } else { of(&apart, MAX_HEIGHT) };
+    let leaves = apart.nodes.iter().flatten().filter(|child| child.count > 0);
+    let mut all = entries(bounds, &parts);
+    all.extend(leaves.map(|leaf| Entry {
+        bounds: leaf.bounds,
+        primitives: leaf.count as usize,
+        content: Content::Leaf(*leaf),
+    }));
+    let Top { mut nodes, places } = Top::new(&all, parts.len());
+    let built = on_all_cores(parts.len(), |i| of(&parts[i], MAX_HEIGHT - places[i].depth));
+    nodes.reserve_exact(built.iter().map(|tree| tree.nodes.len()).sum());
+    let mut order = apart.order;
+    order.reserve_exact(bounds.len() - order.len());
+    for (tree, place) in built.into_iter().zip(places) {
+        let (before, first) = (nodes.len() as u32, order.len() as u32);
+        let moved =
+            |child: BvhChild| BvhChild { first: child.first + if child.count > 0 { first } else { before }, ..child };
+        nodes[place.parent][place.side].first = before;
+        nodes.extend(tree.nodes.into_iter().map(|children| children.map(moved)));
+        order.extend(tree.order);
     }
-    (nodes, order)
+    Binary { nodes, order }
 }
 
 /// Results of `work` for 0 to `count`, in their order.
@@ -101,19 +116,17 @@ fn on_all_cores<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<
     done.into_iter().map(|(_, result)| result).collect()
 }
 
-/// The parts, each the indices of its primitives, two or more.
-fn divide(bounds: &[Bounds]) -> Vec<Vec<u32>> {
+/// The parts, each the indices of two or more primitives, and the large primitives that are in
+/// none: two or more, or none.
+fn divide(bounds: &[Bounds]) -> (Vec<Vec<u32>>, Vec<u32>) {
     let all = bounds.par_iter().copied().reduce(|| Bounds::EMPTY, Bounds::union);
-    let most = bounds.len().div_ceil(PARTS);
     let area = |i: &u32| bounds[*i as usize].half_area();
     let is_large = |i: &u32| area(i) > LARGE_BOX * all.half_area();
-    let (mut large, mut rest): (Vec<u32>, Vec<u32>) = (0..bounds.len() as u32).into_par_iter().partition(is_large);
-    large.sort_by(|a, b| area(b).total_cmp(&area(a)));
-    let kept = if large.len() < 2 { 0 } else { large.len().min(most) };
-    rest.extend(large.drain(kept..));
-    let mut parts = split(bounds, rest, most);
-    parts.extend((!large.is_empty()).then_some(large));
-    parts
+    let (mut apart, mut rest): (Vec<u32>, Vec<u32>) = (0..bounds.len() as u32).into_par_iter().partition(is_large);
+    apart.sort_by(|a, b| area(b).total_cmp(&area(a)));
+    let kept = if apart.len() < 2 { 0 } else { apart.len().min(MAX_APART) };
+    rest.extend(apart.drain(kept..));
+    (split(bounds, rest, bounds.len().div_ceil(PARTS)), apart)
 }
 
 fn split(bounds: &[Bounds], indices: Vec<u32>, most: usize) -> Vec<Vec<u32>> {
@@ -175,80 +188,120 @@ fn halves(bounds: &[Bounds], mut indices: Vec<u32>) -> [Vec<u32>; 2] {
     }
 }
 
-/// A part as the common nodes know it.
+/// A part, by its index, or a leaf of large primitives.
+#[derive(Clone, Copy)]
+enum Content {
+    Part(usize),
+    Leaf(BvhChild),
+}
+
+/// What lies below the common nodes.
 #[derive(Clone, Copy)]
 struct Entry {
     bounds: Bounds,
     primitives: usize,
-    part: usize,
+    content: Content,
 }
 
-fn boxes_of(bounds: &[Bounds], parts: &[Vec<u32>]) -> Vec<Entry> {
+fn entries(bounds: &[Bounds], parts: &[Vec<u32>]) -> Vec<Entry> {
     let of_part = |(part, indices): (usize, &Vec<u32>)| Entry {
         bounds: indices.iter().map(|i| bounds[*i as usize]).fold(Bounds::EMPTY, Bounds::union),
         primitives: indices.len(),
-        part,
+        content: Content::Part(part),
     };
     parts.par_iter().enumerate().map(of_part).collect()
 }
 
-/// Place of the root of a part among the nodes, and number of children that a traversal may defer
-/// from there on.
+/// The child of a common node that a part is, and the number of common nodes above it.
 #[derive(Clone, Copy, Default)]
 struct Place {
-    root: usize,
-    room: u32,
+    parent: usize,
+    side: usize,
+    depth: u32,
 }
 
 /// The common nodes.
 struct Top {
-    nodes: Vec<BvhNode>,
+    nodes: Vec<[BvhChild; 2]>,
     places: Vec<Place>,
 }
 
 impl Top {
-    /// Writes the node above `entries`, and all common nodes below it.
-    fn node(&mut self, at: usize, entries: Vec<Entry>, level: u32, room: u32) {
-        let groups = groups(entries, level);
-        let room = room - (groups.len() - 1) as u32;
-        let boxes: Vec<Bounds> = groups.iter().map(|group| around(group).0).collect();
-        let first = self.nodes.len();
-        self.nodes[at] = BvhNode::new(&boxes, &[], first as u32, 0);
-        self.nodes.resize(first + groups.len(), BvhNode::default());
-        for (slot, group) in (first..).zip(groups) {
-            match group[..] {
-                [Entry { part, .. }] => self.places[part] = Place { root: slot, room },
-                _ => self.node(slot, group, level + 1, room),
+    /// The nodes above all entries, as the builder of the parts arranges them if that is not too
+    /// high.
+    fn new(entries: &[Entry], parts: usize) -> Self {
+        let boxes: Vec<Bounds> = entries.iter().map(|entry| entry.bounds).collect();
+        let all = boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union);
+        let tree = build_binary(&boxes, all, 1);
+        let mut top = Self { nodes: Vec::new(), places: vec![Place::default(); parts] };
+        if height(&tree) <= LEVELS as usize {
+            top.copy(&tree, entries, 0, 0);
+        } else {
+            top.node(entries.to_vec(), 0);
+        }
+        top
+    }
+
+    /// Appends an interior node of a tree over the entries, and all below it.
+    fn copy(&mut self, tree: &Bvh2, entries: &[Entry], index: u32, depth: u32) -> usize {
+        let first = tree.nodes[index as usize].first_index;
+        let parent = self.push();
+        for side in 0..2 {
+            let node = &tree.nodes[first as usize + side];
+            if node.is_leaf() {
+                let entry = entries[tree.primitive_indices[node.first_index as usize] as usize];
+                self.put(entry, Place { parent, side, depth: depth + 1 });
+            } else {
+                let child = self.copy(tree, entries, first + side as u32, depth + 1);
+                let [left, right] = self.nodes[child].map(|below| below.bounds);
+                self.nodes[parent][side] = BvhChild { bounds: left.union(right), first: child as u32, count: 0 };
             }
         }
+        parent
     }
-}
 
-/// Entries that fit below a common node of that level.
-const fn capacity(level: u32) -> usize {
-    WIDTH.pow(LEVELS - level)
-}
+    fn push(&mut self) -> usize {
+        self.nodes.push([BvhChild { bounds: Bounds::EMPTY, first: 0, count: 0 }; 2]);
+        self.nodes.len() - 1
+    }
 
-/// The contents of the children of a node: the group of the largest area is divided while there is
-/// room; evenly where that would lead too deep.
-fn groups(entries: Vec<Entry>, level: u32) -> Vec<Vec<Entry>> {
-    let divided = |halve: fn(Vec<Entry>) -> [Vec<Entry>; 2]| {
-        let mut groups = vec![entries.clone()];
-        while groups.len() < WIDTH {
-            let many = (0..groups.len()).filter(|i| groups[*i].len() > 1);
-            let area = |i: &usize| around(&groups[*i]).0.half_area();
-            let Some(largest) = many.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
-            let halves = halve(std::mem::take(&mut groups[largest]));
-            groups.splice(largest..=largest, halves);
+    /// Makes an entry a child of a node.
+    fn put(&mut self, entry: Entry, place: Place) {
+        let child = match entry.content {
+            Content::Part(part) => {
+                self.places[part] = place;
+                BvhChild { bounds: entry.bounds, first: 0, count: 0 }
+            }
+            Content::Leaf(leaf) => leaf,
+        };
+        self.nodes[place.parent][place.side] = child;
+    }
+
+    /// Appends the node above two or more entries, and all common nodes below it.
+    fn node(&mut self, entries: Vec<Entry>, depth: u32) -> usize {
+        let most = capacity(depth + 1);
+        let mut halves = halved(&entries, 1..entries.len());
+        if halves.iter().any(|half| half.len() > most) {
+            halves = halved(&entries, entries.len() / 2..entries.len() / 2 + 1);
         }
-        groups
-    };
-    let groups = divided(|group| halved(group, false));
-    if groups.iter().all(|group| group.len() == 1 || group.len() <= capacity(level + 1)) {
-        return groups;
+        let parent = self.push();
+        for (side, half) in halves.into_iter().enumerate() {
+            match half[..] {
+                [entry] => self.put(entry, Place { parent, side, depth: depth + 1 }),
+                _ => {
+                    let bounds = around(&half).0;
+                    let first = self.node(half, depth + 1) as u32;
+                    self.nodes[parent][side] = BvhChild { bounds, first, count: 0 };
+                }
+            }
+        }
+        parent
     }
-    let halves = halved(entries, true);
-    halves.into_iter().flat_map(|half| if half.len() > 1 { halved(half, true).to_vec() } else { vec![half] }).collect()
+}
+
+/// Entries that fit below a common node at that depth.
+const fn capacity(depth: u32) -> usize {
+    1 << (LEVELS - depth)
 }
 
 /// Box around entries, and their primitives.
@@ -257,11 +310,11 @@ fn around(entries: &[Entry]) -> (Bounds, usize) {
     entries.iter().fold((Bounds::EMPTY, 0), add)
 }
 
-/// Two or more entries divided where the surface area heuristic says, or in the middle.
-fn halved(entries: Vec<Entry>, evenly: bool) -> [Vec<Entry>; 2] {
-    let borders = if evenly { entries.len() / 2..entries.len() / 2 + 1 } else { 1..entries.len() };
+/// Two or more entries divided where the surface area heuristic says, at one of the `borders`
+/// between them in the order along an axis.
+fn halved(entries: &[Entry], borders: Range<usize>) -> [Vec<Entry>; 2] {
     let along = |axis: usize| {
-        let mut sorted = entries.clone();
+        let mut sorted = entries.to_vec();
         sorted.sort_by(|a, b| middle(&a.bounds)[axis].total_cmp(&middle(&b.bounds)[axis]));
         sorted
     };
@@ -272,10 +325,9 @@ fn halved(entries: Vec<Entry>, evenly: bool) -> [Vec<Entry>; 2] {
     };
     let choices = (0..3).flat_map(|axis| borders.clone().map(move |border| (axis, border)));
     let best = choices.min_by(|a, b| cost(a).total_cmp(&cost(b)));
-    let (axis, border) = best.unwrap_or((0, entries.len() / 2));
-    let mut left = sorted[axis].clone();
-    let right = left.split_off(border);
-    [left, right]
+    let (axis, border) = best.unwrap_or((0, borders.start));
+    let (left, right) = sorted[axis].split_at(border);
+    [left.to_vec(), right.to_vec()]
 }
 
 #[cfg(test)]
@@ -286,8 +338,8 @@ mod tests {
 
     #[test]
     fn boxes_in_one_place_are_divided_too() {
-        let parts = divide(&vec![Bounds { min: Vec3::ZERO, max: Vec3::ONE }; LARGE + 7]);
-        let mut all = parts.concat();
+        let (parts, apart) = divide(&vec![Bounds { min: Vec3::ZERO, max: Vec3::ONE }; LARGE + 7]);
+        let mut all = [parts.concat(), apart].concat();
         all.sort_unstable();
         assert!(all.into_iter().eq(0..LARGE as u32 + 7));
         assert!(parts.iter().all(|part| part.len() > 1 && part.len() <= LARGE / PARTS + 1), "{}", parts.len());

@@ -7,7 +7,9 @@ use super::{
     Bvh, BvhChild, MAX_LEAF, WIDTH,
     binary::build_binary,
     build::bounds,
-    parallel::{Curve, LARGE, subtree},
+    convert::MAX_HEIGHT,
+    parallel::{Curve, LARGE, part},
+    widen::widen,
 };
 use crate::layout::{BVH_STACK, BvhNode, Primitive, SPHERE_BIT};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
@@ -263,7 +265,7 @@ fn deferred_children_fit_on_the_stack() {
         scene.triangles.push(triangle([Vec3::ZERO, Vec3::new(s, 0.0, s), Vec3::new(0.0, s, s)]));
     }
     let boxes: Vec<Bounds> = Bvh::build(&scene).primitives.iter().map(bounds).collect();
-    let deep = build_binary(&boxes, boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union));
+    let deep = build_binary(&boxes, boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union), MAX_LEAF);
     assert!(
         super::convert::height(&deep) > super::convert::MAX_HEIGHT as usize,
         "the scene must need the limit: {}",
@@ -336,7 +338,8 @@ fn trees_in_parts_are_whole_and_as_good() {
         assert_eq!(mismatches(&bvh, 100), 0);
         let boxes: Vec<Bounds> =
             (scene.triangles.iter().map(Bounds::from)).chain(scene.spheres.iter().map(Bounds::from)).collect();
-        let ratio = cost(&bvh.nodes) / cost(&subtree(&boxes, BVH_STACK as u32, Curve::Whole).0);
+        let ratio = cost(&bvh.nodes) / cost(&widen(&part(&boxes, MAX_HEIGHT, Curve::Whole)).0);
+        println!("{ratio:.4} of the cost of a tree without parts");
         assert!(ratio < 1.03, "{ratio} of the cost of a tree without parts");
         for threads in [1, 2, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");

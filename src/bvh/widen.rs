@@ -7,16 +7,15 @@ use crate::scene::Bounds;
 // Two levels of the binary tree make one wide node, which defers all children but one.
 const _: () = assert!(max_deferred(MAX_HEIGHT) <= BVH_STACK as u32 && WIDTH == 4);
 
-/// Returns the nodes, parents before children, and the primitive indices in leaf order. A traversal
-/// defers `room` children at most; the tree is no higher than [`height_for`] it.
-pub(super) fn widen(binary: &Binary, room: u32) -> (Vec<BvhNode>, Vec<u32>) {
+/// Returns the nodes, parents before children, and the primitive indices in leaf order.
+pub(super) fn widen(binary: &Binary) -> (Vec<BvhNode>, Vec<u32>) {
     let mut widener = Widener {
         binary,
         heights: heights(binary),
         nodes: vec![BvhNode::default()],
         order: Vec::with_capacity(binary.order.len()),
     };
-    widener.node(0, 0, room);
+    widener.node(0, 0, BVH_STACK as u32);
     (widener.nodes, widener.order)
 }
 
@@ -34,11 +33,6 @@ fn heights(binary: &Binary) -> Vec<u32> {
 /// levels are always collapsed.
 const fn max_deferred(height: u32) -> u32 {
     (WIDTH as u32 - 1) * height.div_ceil(2)
-}
-
-/// Height of the highest binary tree of which a traversal never has to defer more children.
-pub(super) const fn height_for(room: u32) -> u32 {
-    2 * (room / (WIDTH as u32 - 1))
 }
 
 struct Widener<'a> {
