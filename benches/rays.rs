@@ -31,7 +31,7 @@ fn main() {
     let gpu = Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("benches need an adapter");
     println!("{} ({}), {} CPU threads, {RAYS} incoherent rays", gpu.name, gpu.driver, rayon::current_num_threads());
     println!("{:>10} {:>14} {:>14} {:>8}", "triangles", "caustica/s", "obvhs BVH2/s", "ratio");
-    for side in [10, 100, 500] {
+    for side in [10, 100, 500, 708] {
         compare(&gpu, &room(side));
     }
 }

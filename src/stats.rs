@@ -35,6 +35,21 @@ pub struct MapStats {
     pub emitted: u64,
     /// Photons in the map.
     pub stored: u64,
+    /// Those that the camera sees; `None` where nobody asks
+    /// ([`counts_seen`](crate::settings::Settings::counts_seen)).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seen: Option<SeenStats>,
+}
+
+/// Photons of a sample of a map that the camera sees: those in the picture, on a side of a surface
+/// that faces the camera, with nothing opaque between. What mirrors show does not count; glass,
+/// panes and surfaces with holes hide nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SeenStats {
+    /// Photons that were looked at: the first of the map, in the order of their paths.
+    pub sampled: u64,
+    /// Those of them that the camera sees.
+    pub seen: u64,
 }
 
 impl MapStats {
@@ -42,6 +57,11 @@ impl MapStats {
     pub fn add(&mut self, other: Self) {
         self.emitted += other.emitted;
         self.stored += other.stored;
+        if let Some(more) = other.seen {
+            let all = self.seen.get_or_insert_default();
+            all.sampled += more.sampled;
+            all.seen += more.seen;
+        }
     }
 }
 
@@ -219,7 +239,10 @@ mod tests {
     fn passes_add_up_and_warnings_are_told_once() {
         let of = |n: u64| Stats {
             rays: n,
-            photons: PhotonStats { global: MapStats { emitted: n, stored: 1 }, ..PhotonStats::default() },
+            photons: PhotonStats {
+                global: MapStats { emitted: n, stored: 1, seen: Some(SeenStats { sampled: n, seen: 1 }) },
+                ..PhotonStats::default()
+            },
             warnings: vec![format!("{n} rays were given up"), "the same".to_owned()],
             peak_device_bytes: n,
             ..Stats::default()
@@ -227,6 +250,7 @@ mod tests {
         let mut sum = of(3);
         sum.add(&Stats { warnings: vec!["7 rays were given up".into(), "another".into()], ..of(5) });
         assert_eq!((sum.rays, sum.peak_device_bytes, sum.photons.global.emitted), (8, 5, 8));
+        assert_eq!(sum.photons.global.seen, Some(SeenStats { sampled: 8, seen: 2 }));
         assert_eq!(sum.warnings, ["3 rays were given up", "the same", "another"]);
     }
 }

@@ -1,15 +1,10 @@
-//! Building: primitives, the binary tree and its conversion.
+//! Building: primitives in the order of the tree over them.
 
 use glam::Vec3;
-use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 
 use super::node::MAX_LEAF;
-use super::{convert, split, widen};
+use super::{convert, parallel, split, widen};
 use crate::layout::{
     BVH_STACK, BvhNode, INSTANCE, INSTANCED_STACK, Instance, NOTHING_LEFT, Normals, Primitive, SPHERE_BIT,
     TREE_HEIGHTS, even_height, octahedral,
@@ -35,7 +30,8 @@ pub struct Bvh {
 impl Bvh {
     /// Builds the tree over all triangles and spheres: PLOC with reinsertion (Meister and Bittner
     /// 2018, 2021). Large primitives among many that cross are listed several times, in smaller
-    /// boxes. Equal scenes give equal trees on any number of threads.
+    /// boxes. Large scenes are divided into parts that are built on all cores. Equal scenes give
+    /// equal trees on any number of threads.
     ///
     /// A mesh that instances share has a tree of its own, in its own coordinates, and instances are
     /// boxes in the tree of the scene (Wald et al. 2003, "Distributed Interactive Ray Tracing of
@@ -45,17 +41,14 @@ impl Bvh {
     /// If there are 2^28 triangles and spheres or more. The loader refuses such files earlier.
     #[must_use]
     pub fn build(scene: &Scene) -> Self {
+        let triangles = scene.triangles.par_iter().map(triangle_primitive);
+        let primitives = triangles.chain(scene.spheres.par_iter().map(sphere_primitive)).enumerate();
         let mut primitives: Vec<Primitive> =
-            Vec::with_capacity(scene.triangles.len() + scene.spheres.len() + scene.instances.len());
-        primitives.extend(scene.triangles.iter().map(triangle_primitive));
-        primitives.extend(scene.spheres.iter().map(sphere_primitive));
-        for (id, primitive) in primitives.iter_mut().enumerate() {
-            primitive.id = id as u32;
-        }
+            primitives.map(|(id, primitive)| Primitive { id: id as u32, ..primitive }).collect();
         let boxes = instance_bounds(&scene.meshes, &scene.instances);
         primitives.extend(boxes.iter().zip(1..).map(|(bounds, number)| instance_primitive(bounds, number)));
         let heights = Heights::new(primitives.len(), scene);
-        let mut bvh = Self::of(primitives, scene.triangles.iter(), heights.scene);
+        let mut bvh = Self::of(primitives, &scene.triangles, heights.scene);
         let mut first_of_mesh = (scene.triangles.len() + scene.spheres.len()) as u32;
         let firsts = scene.meshes.iter().map(|mesh| {
             first_of_mesh += mesh.triangles.len() as u32;
@@ -65,7 +58,7 @@ impl Bvh {
         let of_mesh = |(mesh, first): (&SharedMesh, &u32)| {
             let numbered = mesh.triangles.iter().zip(*first..);
             let primitives = numbered.map(|(triangle, id)| Primitive { id, ..triangle_primitive(triangle) });
-            Self::of(primitives.collect(), mesh.triangles.iter(), heights.mesh)
+            Self::of(primitives.collect(), &mesh.triangles, heights.mesh)
         };
         let meshes: Vec<Self> = scene.meshes.par_iter().zip(&firsts).map(of_mesh).collect();
         let places: Vec<Place> = meshes.into_iter().map(|mesh| bvh.append(mesh)).collect();
@@ -75,26 +68,21 @@ impl Bvh {
 
     /// A tree over primitives, whose triangles are those, the first of which is the first
     /// primitive.
-    fn of<'t>(
-        mut primitives: Vec<Primitive>,
-        triangles: impl ExactSizeIterator<Item = &'t Triangle>,
-        max_height: u32,
-    ) -> Self {
+    fn of(mut primitives: Vec<Primitive>, triangles: &[Triangle], max_height: u32) -> Self {
         let first = primitives.first().map_or(0, |primitive| primitive.id);
         primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
-        let whole: Vec<Bounds> = primitives.iter().map(bounds).collect();
+        let whole: Vec<Bounds> = primitives.par_iter().map(bounds).collect();
         let (bounds, of_bounds) = match split::pieces(&primitives, whole.clone()) {
             pieces if even_height(pieces.0.len()) <= max_height => pieces,
             _ => (whole, (0..primitives.len() as u32).collect()),
         };
-        let binary = convert::convert(&build_binary(&bounds), &bounds, max_height);
-        let (nodes, order) = widen::widen(&binary, max_height);
-        let of_triangles: Vec<Normals> = triangles.map(corner_normals).collect();
+        let (nodes, order) = widen::widen(&parallel::tree(&bounds, max_height), max_height);
         let normals = |primitive: &Primitive| {
-            of_triangles.get(primitive.id.wrapping_sub(first) as usize).copied().unwrap_or_default()
+            triangles.get(primitive.id.wrapping_sub(first) as usize).map_or(Normals::default(), corner_normals)
         };
-        let primitives: Vec<Primitive> = order.iter().map(|i| primitives[of_bounds[*i as usize] as usize]).collect();
-        Self { normals: primitives.iter().map(normals).collect(), nodes, primitives, instances: Vec::new() }
+        let primitives: Vec<Primitive> =
+            order.par_iter().map(|i| primitives[of_bounds[*i as usize] as usize]).collect();
+        Self { normals: primitives.par_iter().map(normals).collect(), nodes, primitives, instances: Vec::new() }
     }
 
     /// Appends the tree of a shared mesh.
@@ -237,27 +225,4 @@ fn corner_normals(triangle: &Triangle) -> Normals {
     let [n0, n1, n2] = triangle.normals.map(octahedral);
     let is_flat = triangle.normals.iter().all(|normal| (*normal - flat).length() < FLAT_TOLERANCE);
     Normals { n0, n1, n2, attributes: (triangle.attributes << 1) | u32::from(is_flat) }
-}
-
-/// Builds the tree before conversion. Runs on one thread: the parallel sorts do not promise an
-/// order of equal keys.
-pub(super) fn build_binary(bounds: &[Bounds]) -> Bvh2 {
-    let boxes: Vec<Aabb> = bounds.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
-    let parameters = BvhBuildParams {
-        pre_split: false,
-        ploc_search_distance: PlocSearchDistance::Medium,
-        search_depth_threshold: 3,
-        reinsertion_batch_ratio: 0.05,
-        post_collapse_reinsertion_batch_ratio_multiplier: 2.0,
-        sort_precision: SortPrecision::U64,
-        max_prims_per_leaf: MAX_LEAF,
-        // Cost of one level of the binary tree, in primitive tests.
-        collapse_traversal_cost: 1.5,
-    };
-    let build = || build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
-    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
-        Ok(pool) => pool.install(build),
-        // Falls back to the pool of this thread if no thread can be started.
-        Err(_) => build(),
-    }
 }

@@ -39,8 +39,11 @@ impl Search<'_> {
 
     /// What lies in the surface of a primitive of the scene, but for the patch `apart`.
     pub fn touching(&self, primitive: &Primitive, apart: Option<u32>) -> Vec<Touched> {
-        let shape = Shape::new(primitive);
         let is_apart = |patch: Option<u32>| patch.is_some() && patch == apart;
+        if is_apart(self.of_nodes[0]) {
+            return Vec::new();
+        }
+        let shape = Shape::new(primitive);
         let (mut found, mut waiting) = (Vec::new(), vec![0]);
         while let Some(node) = waiting.pop() {
             for child in self.bvh.nodes[node as usize].children() {

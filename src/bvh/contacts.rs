@@ -52,8 +52,14 @@ impl Patches {
         let triangles = scene.triangles.iter().map(|t| ((t.object, t.material), t.area()));
         let spheres = scene.spheres.iter().map(|s| ((s.object, s.material), s.area()));
         let (mut all, mut known) = (Vec::new(), HashMap::new());
+        // Those of a mesh follow each other.
+        let mut last = None;
         let number = |(key, area): ((u32, u32), f64)| {
-            let number = *known.entry(key).or_insert(all.len());
+            let number = match last {
+                Some((same, number)) if same == key => number,
+                _ => *known.entry(key).or_insert(all.len()),
+            };
+            last = Some((key, number));
             if number == all.len() {
                 all.push(Patch { object: key.0, material: key.1, area: 0.0 });
             }

@@ -1,5 +1,5 @@
-//! Conversion of a binary tree of any depth to one of few levels, whose nodes store the boxes of
-//! both children.
+//! Conversion of a binary tree of any depth to one of a limited number of levels, whose nodes store
+//! the boxes of both children.
 
 use obvhs::bvh2::Bvh2;
 
@@ -7,7 +7,7 @@ use super::{BvhChild, MAX_LEAF};
 use crate::layout::even_height;
 use crate::scene::Bounds;
 
-/// Maximum height of a converted tree: interior nodes on the longest path from the root.
+/// Maximum height of the tree of a whole scene: interior nodes on the longest path from the root.
 pub(super) const MAX_HEIGHT: u32 = 32;
 
 /// A binary tree. [`BvhChild::first`] of a leaf is an index into `order`.
@@ -19,10 +19,10 @@ pub(super) struct Binary {
 }
 
 /// Converts `tree`, which holds at least two primitives with the given bounds, to one of at most
-/// `max_height` levels.
-pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds], max_height: u32) -> Binary {
+/// `limit` levels.
+pub(super) fn convert(tree: &Bvh2, bounds: &[Bounds], limit: u32) -> Binary {
     let made = Binary { nodes: Vec::new(), order: Vec::with_capacity(bounds.len()) };
-    let mut converter = Converter { tree, bounds, max_height, subtrees: measure(tree), made };
+    let mut converter = Converter { tree, bounds, limit, subtrees: measure(tree), made };
     let root = converter.tree_node(0, 0);
     if root.count > 0 {
         // All primitives fit in one leaf, but the root needs two children.
@@ -67,14 +67,15 @@ fn measure(tree: &Bvh2) -> Vec<Subtree> {
 struct Converter<'a> {
     tree: &'a Bvh2,
     bounds: &'a [Bounds],
-    max_height: u32,
+    limit: u32,
     subtrees: Vec<Subtree>,
     made: Binary,
 }
 
 impl Converter<'_> {
     /// Converts the subtree of a node that lies below `depth` interior nodes. A subtree that is too
-    /// deep keeps its upper nodes as long as an even split of the children still fits.
+    /// deep keeps its upper nodes as long as an even split of the children still fits into the
+    /// limit.
     fn tree_node(&mut self, index: u32, depth: u32) -> BvhChild {
         let node = &self.tree.nodes[index as usize];
         if node.is_leaf() {
@@ -83,9 +84,9 @@ impl Converter<'_> {
             return self.leaf(&leaf);
         }
         let children = [node.first_index, node.first_index + 1];
-        let fits = depth + self.subtrees[index as usize].height <= self.max_height;
+        let fits = depth + self.subtrees[index as usize].height <= self.limit;
         let least = |child: u32| even_height(self.subtrees[child as usize].primitives as usize);
-        let fits_later = |child: u32| depth + 1 + least(child) <= self.max_height;
+        let fits_later = |child: u32| depth + 1 + least(child) <= self.limit;
         if !fits && !children.into_iter().all(fits_later) {
             let mut below = self.primitives_below(index);
             return self.even_node(&mut below, depth);
@@ -151,7 +152,6 @@ impl Converter<'_> {
 }
 
 /// Height of the whole tree: interior nodes on the longest path from the root.
-#[cfg(test)]
 pub(super) fn height(tree: &Bvh2) -> usize {
     measure(tree)[0].height as usize
 }

@@ -6,6 +6,7 @@
 //! binary tree, is padded with degenerate triangles that no ray hits. A traversal defers the
 //! farther children and keeps at most [`BVH_STACK`](crate::layout::BVH_STACK) of them on its stack.
 
+mod binary;
 mod build;
 mod contact_search;
 mod contacts;
@@ -13,6 +14,7 @@ mod convert;
 mod media;
 mod node;
 mod overlap;
+mod parallel;
 mod ray;
 mod split;
 #[cfg(test)]

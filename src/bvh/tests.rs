@@ -3,7 +3,14 @@
 
 use glam::Vec3;
 
-use super::{Bvh, BvhChild, MAX_LEAF, WIDTH, build::bounds, build::build_binary};
+use super::{
+    Bvh, BvhChild, MAX_LEAF, WIDTH,
+    binary::build_binary,
+    build::bounds,
+    convert::MAX_HEIGHT,
+    parallel::{Curve, LARGE, part},
+    widen::widen,
+};
 use crate::layout::{BVH_STACK, BvhNode, Primitive, SPHERE_BIT};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
@@ -257,7 +264,8 @@ fn deferred_children_fit_on_the_stack() {
         let s = 1.02_f32.powi(i - 2000);
         scene.triangles.push(triangle([Vec3::ZERO, Vec3::new(s, 0.0, s), Vec3::new(0.0, s, s)]));
     }
-    let deep = build_binary(&Bvh::build(&scene).primitives.iter().map(bounds).collect::<Vec<_>>());
+    let boxes: Vec<Bounds> = Bvh::build(&scene).primitives.iter().map(bounds).collect();
+    let deep = build_binary(&boxes, boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union), MAX_LEAF);
     assert!(
         super::convert::height(&deep) > super::convert::MAX_HEIGHT as usize,
         "the scene must need the limit: {}",
@@ -280,9 +288,65 @@ fn same_tree_on_any_number_of_threads() {
     let (one, four) = (on(1), on(4));
     assert_eq!(one.nodes, four.nodes);
     assert_eq!(one.primitives, four.primitives);
+    assert!(scene.triangles.len() < LARGE);
     // Control: another scene gives another tree.
     scene.triangles[0].positions[0].x += 1.0;
     assert_ne!(one.nodes, Bvh::build(&scene).nodes);
+}
+
+/// A wavy ground of `side` x `side` quads, and walls around it.
+fn ground(side: i32) -> Scene {
+    let mut scene = Scene::default();
+    let at = |i: i32, j: i32| {
+        let [x, z] = [i, j].map(|k| 2.0 * k as f32 / side as f32 - 1.0);
+        Vec3::new(x, 0.15 * (7.0 * x).sin() * (5.0 * z).cos() + 0.02 * (61.0 * x * z).sin(), z)
+    };
+    let mut quad = |corners: [Vec3; 4]| {
+        let [a, b, c, d] = corners;
+        scene.triangles.extend([triangle([a, b, c]), triangle([a, c, d])]);
+    };
+    for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
+        quad([at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)]);
+    }
+    let c = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+    quad([c(-1., 2., -1.), c(1., 2., -1.), c(1., 2., 1.), c(-1., 2., 1.)]);
+    quad([c(-1., -1., -1.), c(1., -1., -1.), c(1., 2., -1.), c(-1., 2., -1.)]);
+    quad([c(-1., -1., 1.), c(-1., 2., 1.), c(1., 2., 1.), c(1., -1., 1.)]);
+    quad([c(-1., -1., -1.), c(-1., 2., -1.), c(-1., 2., 1.), c(-1., -1., 1.)]);
+    scene
+}
+
+/// Expected cost of a ray (MacDonald and Booth 1990), in primitive tests, of which a node costs
+/// one and a half.
+fn cost(nodes: &[BvhNode]) -> f64 {
+    let root = nodes[0].children().fold(Bounds::EMPTY, |all, child| all.union(child.bounds));
+    let each = |child: &BvhChild| if child.count > 0 { f64::from(child.count) } else { 1.5 };
+    let of = |child: BvhChild| f64::from(child.bounds.half_area()) * each(&child);
+    nodes.iter().flat_map(BvhNode::children).map(of).sum::<f64>() / f64::from(root.half_area())
+}
+
+#[test]
+fn trees_in_parts_are_whole_and_as_good() {
+    let mut scenes = [ground(240), random_scene(110_000, 20_000, 0.01, 9)];
+    // Equal triangles, and one that is larger than all others.
+    scenes[1].triangles.extend_from_within(..2000);
+    scenes[1].triangles.push(triangle([Vec3::splat(-1.0), Vec3::ONE, Vec3::new(1.0, -1.0, 0.5)]));
+    for scene in scenes {
+        let bvh = Bvh::build(&scene);
+        assert!(bvh.primitives.len() >= LARGE);
+        assert_eq!(fault(&bvh), None);
+        assert_eq!(mismatches(&bvh, 100), 0);
+        let boxes: Vec<Bounds> =
+            (scene.triangles.iter().map(Bounds::from)).chain(scene.spheres.iter().map(Bounds::from)).collect();
+        let ratio = cost(&bvh.nodes) / cost(&widen(&part(&boxes, MAX_HEIGHT, Curve::Whole)).0);
+        println!("{ratio:.4} of the cost of a tree without parts");
+        assert!(ratio < 1.03, "{ratio} of the cost of a tree without parts");
+        for threads in [1, 2, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let other = pool.install(|| Bvh::build(&scene));
+            assert!(other.nodes == bvh.nodes && other.primitives == bvh.primitives, "{threads} threads");
+        }
+    }
 }
 
 #[test]

@@ -214,6 +214,7 @@ impl RenderArgs {
             s.picture.layers = self.layers.iter().map(|layer| (*layer).into()).collect();
             s.picture.layers.sort();
             s.picture.layers.dedup();
+            s.counts_seen = self.stats.is_some();
         })
     }
 

@@ -198,8 +198,9 @@ impl SharedOptions {
     /// Converts the arguments to the library's settings. Mode, photons and neighbours stay at those
     /// of `base`.
     pub fn settings(&self, base: Settings) -> Settings {
-        let Settings { photons, estimate, picture, .. } = base;
+        let Settings { photons, estimate, picture, counts_seen, .. } = base;
         Settings {
+            counts_seen,
             lights: LightSettings {
                 sampling: self.light_sampling.into(),
                 photon_weights: self.light_photons.clone(),

@@ -24,7 +24,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     layout::{self, LightChoice},
-    scene::{LUMENS_PER_WATT, LightKind, Scene, spot_heights},
+    scene::{LUMENS_PER_WATT, LightKind, Scene, hidden_backs, spot_heights},
     settings::{LightSampling, LightSettings, LightUnit},
 };
 
@@ -62,7 +62,7 @@ pub struct LightTable {
     pub is_varied: bool,
     /// Materials that shine nowhere, one line each.
     pub warnings: Vec<String>,
-    /// Power of each light, W, mean of the channels.
+    /// Power of each light that may reach what is seen, W, mean of the channels.
     powers: Vec<f64>,
     /// Index of the first light of each emissive primitive, by its index in the scene.
     emitters: BTreeMap<u32, u32>,
@@ -163,7 +163,7 @@ impl LightTable {
         self.trees.nodes.iter().take(self.sampled_roots as usize).any(|root| root.intensity() > 0.0)
     }
 
-    /// Power of all lights, W, mean of the channels.
+    /// Power of all lights that may reach what is seen, W, mean of the channels.
     #[must_use]
     pub fn power(&self) -> f64 {
         self.powers.iter().sum()
@@ -245,6 +245,7 @@ impl LightTable {
             }
         }
         let surfaces = SurfaceLights::new(scene);
+        let hidden = hidden_backs(scene);
         for (material, primitives) in of_materials {
             let is_varied = surfaces.is_varied(material);
             let material = &scene.materials[material as usize];
@@ -254,12 +255,18 @@ impl LightTable {
             let first = self.lights.len();
             for primitive in primitives {
                 let own = self.lights.len() as u32;
+                // Nothing starts where it would stay unseen. The lamp's power is that of both
+                // sides.
+                let sent = if hidden.get(primitive) == Some(&true) { 0.5 } else { 1.0 };
+                let sent_angle = sent * solid_angle;
                 for SurfaceLight { light, emitted } in surfaces.of(primitive) {
                     let power = emission.as_dvec3() * f64::from(light.area) * solid_angle;
                     let light = layout::Light { emission: emission.to_array(), ..light };
-                    self.add(layout::Light { solid_angle: solid_angle as f32, ..light }, power * emitted.mean);
+                    self.add(layout::Light { solid_angle: sent_angle as f32, ..light }, power * emitted.mean);
+                    let own_power = self.powers.last_mut();
+                    own_power.into_iter().for_each(|power| *power *= sent);
                     if emitted.is_lit {
-                        let least = MIN_FRACTION * power.element_sum() / 3.0;
+                        let least = sent * MIN_FRACTION * power.element_sum() / 3.0;
                         self.powers.last_mut().into_iter().for_each(|power| *power = power.max(least));
                     }
                     self.emitters.insert(primitive as u32, own);

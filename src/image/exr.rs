@@ -240,7 +240,10 @@ mod tests {
     }
 
     fn stats() -> Stats {
-        let maps = [MapStats { emitted: 5_000_000_000, stored: 7 }, MapStats { emitted: 11, stored: 3 }];
+        let maps = [
+            MapStats { emitted: 5_000_000_000, stored: 7, seen: None },
+            MapStats { emitted: 11, stored: 3, seen: None },
+        ];
         Stats {
             device: DeviceStats { name: "Große Karte".into(), driver: "1.2".into() },
             photons: PhotonStats { global: maps[0], caustic: maps[1], ..PhotonStats::default() },

@@ -29,10 +29,7 @@ impl<'a> LightGroups<'a> {
     pub fn open(gpu: &'a Gpu, scene: &'a Scene, settings: &Settings, progress: &dyn Progress) -> Result<Self> {
         let asked = settings.picture.layers.contains(&ExtraLayers::Lights);
         let names = if asked { scene.light_groups()? } else { Vec::new() };
-        if names.is_empty() {
-            return Ok(Self { sessions: vec![Session::open(gpu, scene, &settings.lights, progress)?], names });
-        }
-        Ok(Self { sessions: Session::open_groups(gpu, scene, &settings.lights, &names, progress)?, names })
+        Ok(Self { sessions: Session::open_groups(gpu, scene, settings, &names, progress)?, names })
     }
 
     /// The sessions, one for each group.

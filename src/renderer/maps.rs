@@ -1,7 +1,7 @@
 //! First pass: traces photons from the lights and stores them in maps, with the settings of the
 //! tracing.
 
-use super::tally;
+use super::{seen::Viewer, tally};
 use crate::{
     error::Result,
     gpu::Gpu,
@@ -64,12 +64,12 @@ impl PhotonMaps {
 }
 
 /// Traces the photons of a scene and sorts them into maps. `caustics`: the scene has a specular
-/// surface. `paths`: indices of the photons' paths.
+/// surface. `paths`: indices of the photons' paths. `viewer`: counts the photons that it sees.
 pub(super) fn trace_maps(
     gpu: &Gpu,
     (scene, session): (&SceneBuffers, u64),
     settings: &PhotonSettings,
-    (caustics, paths): (bool, &PathRanges),
+    (caustics, paths, viewer): (bool, &PathRanges, Option<Viewer<'_>>),
     mut stats: Stats,
     progress: &dyn Progress,
 ) -> Result<PhotonMaps> {
@@ -83,6 +83,10 @@ pub(super) fn trace_maps(
     stats.rays += traced.rays;
     stats.photons.global = tally::map_stats(&traced.maps.global);
     stats.photons.caustic = tally::map_stats(&traced.maps.caustic);
+    if let Some(viewer) = viewer {
+        stats.photons.global.seen = Some(viewer.count(gpu, &traced.maps.global)?);
+        stats.photons.caustic.seen = Some(viewer.count(gpu, &traced.maps.caustic)?);
+    }
     stats.photons.lost_to_bounce_limit = traced.lost;
     stats.photons.lights = tally::light_stats(scene, &traced.of_lights);
     tally::count_faults(&mut stats, traced.media_overflows, traced.unfinished);

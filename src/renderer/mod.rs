@@ -9,6 +9,7 @@ mod maps;
 mod progressive;
 mod ray_start;
 mod render;
+mod seen;
 mod session;
 mod size;
 mod tally;

@@ -118,8 +118,8 @@ mod tests {
     #[test]
     fn paths_of_passes_follow_each_other() {
         let first = ByKind {
-            global: MapStats { emitted: 50_000, stored: 100_000 },
-            caustic: MapStats { emitted: 10_000_000, stored: 70 },
+            global: MapStats { emitted: 50_000, stored: 100_000, seen: None },
+            caustic: MapStats { emitted: 10_000_000, stored: 70, seen: None },
         };
         let settings = PhotonSettings::default();
         let [one, two, three] = [1, 2, 3].map(|index| path_ranges(&settings, &first, index));
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn small_maps_keep_half_of_their_paths() {
-        assert_eq!(paths_that_fit(MapStats { emitted: 10, stored: 10 }, 10), 5);
-        assert_eq!(paths_that_fit(MapStats { emitted: 10, stored: 0 }, 10), 10);
+        assert_eq!(paths_that_fit(MapStats { emitted: 10, stored: 10, seen: None }, 10), 5);
+        assert_eq!(paths_that_fit(MapStats { emitted: 10, stored: 0, seen: None }, 10), 10);
     }
 }

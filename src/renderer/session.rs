@@ -8,6 +8,8 @@ use std::sync::{
 use super::{
     gatherer::{MapGatherer, Observer, gather_for},
     maps::{PhotonMaps, trace_maps},
+    seen::Viewer,
+    size::picture_size,
     tally,
     tiles::{CameraPass, Gatherer},
 };
@@ -53,6 +55,8 @@ pub struct Session<'a> {
     buffers: SceneBuffers,
     /// Media that contain each of the scene's cameras.
     camera_media: Vec<Media>,
+    /// The hierarchy, and what pictures show of the scene, where photons that are seen are counted.
+    viewed: Option<(Arc<Bvh>, PictureSettings)>,
     stats: Stats,
     /// Number among the sessions of the process.
     id: u64,
@@ -68,25 +72,27 @@ impl<'a> Session<'a> {
     /// # Errors
     /// As [`super::render`].
     pub fn open(gpu: &'a Gpu, scene: &'a Scene, lights: &LightSettings, progress: &dyn Progress) -> Result<Self> {
-        Ok(Self::open_lit(gpu, scene, lights, None, progress)?.remove(0))
+        Ok(Self::open_lit(gpu, scene, (lights, None), None, progress)?.remove(0))
     }
 
-    /// Variant of [`Self::open`], once for each group of the scene's lights, of which there is one
-    /// at least.
+    /// Variant of [`Self::open`] for the settings of a picture; once for each group of the scene's
+    /// lights, if there are any groups.
     pub(super) fn open_groups(
         gpu: &'a Gpu,
         scene: &'a Scene,
-        lights: &LightSettings,
+        settings: &Settings,
         groups: &[String],
         progress: &dyn Progress,
     ) -> Result<Vec<Self>> {
-        Self::open_lit(gpu, scene, lights, Some(groups), progress)
+        let viewed = settings.counts_seen.then_some(&settings.picture);
+        let groups = (!groups.is_empty()).then_some(groups);
+        Self::open_lit(gpu, scene, (&settings.lights, viewed), groups, progress)
     }
 
     fn open_lit(
         gpu: &'a Gpu,
         scene: &'a Scene,
-        lights: &LightSettings,
+        (lights, viewed): (&LightSettings, Option<&PictureSettings>),
         groups: Option<&[String]>,
         progress: &dyn Progress,
     ) -> Result<Vec<Self>> {
@@ -118,11 +124,12 @@ impl<'a> Session<'a> {
         let probe = MediaProbe::new(scene, &bvh, solids);
         let camera_media: Vec<Media> =
             scene.cameras.iter().map(|camera| probe.at(camera.position.as_dvec3())).collect();
+        let viewed = viewed.map(|picture| (Arc::new(bvh), picture.clone()));
         let session = |buffers: SceneBuffers| {
             let mut stats = stats.clone();
             stats.warnings.extend(buffers.lights.warnings.iter().cloned());
             let id = SESSIONS.fetch_add(1, Ordering::Relaxed);
-            Self { gpu, scene, buffers, camera_media: camera_media.clone(), stats, id }
+            Self { gpu, scene, buffers, camera_media: camera_media.clone(), viewed: viewed.clone(), stats, id }
         };
         Ok(buffers.into_iter().map(session).collect())
     }
@@ -169,8 +176,14 @@ impl<'a> Session<'a> {
         progress: &dyn Progress,
     ) -> Result<PhotonMaps> {
         settings.check()?;
-        let photons = (self.scene.has_specular(), paths);
+        let photons = (self.scene.has_specular(), paths, self.viewer()?);
         trace_maps(self.gpu, (&self.buffers, self.id), settings, photons, self.stats.clone(), progress)
+    }
+
+    fn viewer(&self) -> Result<Option<Viewer<'_>>> {
+        let Some((bvh, picture)) = &self.viewed else { return Ok(None) };
+        let camera = self.scene.camera(picture.camera.as_deref())?;
+        Ok(Some(Viewer { scene: self.scene, bvh, camera, size: picture_size(camera, picture)? }))
     }
 
     /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode,

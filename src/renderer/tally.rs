@@ -10,7 +10,7 @@ use crate::{
 };
 
 pub(super) fn map_stats(map: &RawMap) -> MapStats {
-    MapStats { emitted: map.emitted, stored: map.stored }
+    MapStats { emitted: map.emitted, stored: map.stored, seen: None }
 }
 
 pub(super) fn light_stats(buffers: &SceneBuffers, photons: &[u32]) -> Vec<LightStats> {

@@ -19,6 +19,10 @@ pub struct Settings {
     pub estimate: EstimateSettings,
     /// Camera, pixels and samples.
     pub picture: PictureSettings,
+    /// The statistics say how many photons the camera sees
+    /// ([`SeenStats`](crate::stats::SeenStats)). The picture does not depend on it.
+    #[serde(skip)]
+    pub counts_seen: bool,
 }
 
 impl Settings {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bytemuck::Pod;
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::{light_buffers::LightBuffers, material_buffers::MaterialBuffers};
 use crate::{
@@ -261,5 +262,5 @@ fn marked(
         let id = p.id | rank.unwrap_or(0) << RANK_SHIFT;
         Primitive { emitter: lights.emitter(p.id), material, id, ..*p }
     };
-    primitives.iter().zip(contacts).map(mark).collect()
+    primitives.par_iter().zip(contacts).map(mark).collect()
 }

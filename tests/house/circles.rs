@@ -209,6 +209,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "size",
             "ray_start",
             "tally",
+            "seen",
             "maps",
             "tiles",
             "gatherer",

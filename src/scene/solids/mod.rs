@@ -6,12 +6,14 @@
 //! larger one, or to displace it. The set is a bit mask, in which solids that never meet share a
 //! bit, a slot.
 
+mod closed_lamps;
 mod rank;
 mod repair;
 mod shells;
 mod solid;
 mod table;
 
+pub(crate) use closed_lamps::hidden_backs;
 pub(crate) use repair::{MeshRange, repair};
 pub use solid::NO_SLOT;
 pub use table::Solids;

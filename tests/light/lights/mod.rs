@@ -2,6 +2,7 @@
 
 mod aimed;
 mod closed_forms;
+mod closed_lamps;
 mod many;
 mod photons;
 mod textured;
