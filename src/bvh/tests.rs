@@ -338,7 +338,7 @@ fn trees_in_parts_are_whole_and_as_good() {
         assert_eq!(mismatches(&bvh, 100), 0);
         let boxes: Vec<Bounds> =
             (scene.triangles.iter().map(Bounds::from)).chain(scene.spheres.iter().map(Bounds::from)).collect();
-        let ratio = cost(&bvh.nodes) / cost(&widen(&part(&boxes, MAX_HEIGHT, Curve::Whole)).0);
+        let ratio = cost(&bvh.nodes) / cost(&widen(&part(&boxes, MAX_HEIGHT, Curve::Whole), MAX_HEIGHT).0);
         println!("{ratio:.4} of the cost of a tree without parts");
         assert!(ratio < 1.03, "{ratio} of the cost of a tree without parts");
         for threads in [1, 2, 3] {
