@@ -3,7 +3,7 @@
 //! `cargo bench --bench importance [-- ROUNDS]`, 3 rounds by default. Renders the light that comes
 //! over other surfaces, with final gathering and without, in scenes of which the camera sees a
 //! small part, with `--emission aimed`, which knows what the cameras see, and with
-//! `--emission unaimed`, which does not. The relMSE is against a picture of twenty times the
+//! `--emission unaimed`, which does not. The relMSE is against a picture of fifty times the
 //! photons. The last column is the product of relMSE and seconds with aimed emission over that
 //! without: the squared error at equal time. The aim is a tenth.
 
