@@ -48,7 +48,7 @@ impl Search<'_> {
         while let Some(node) = waiting.pop() {
             for child in self.bvh.nodes[node as usize].children() {
                 if child.count == 0 {
-                    if !is_apart(self.of_nodes[child.first as usize]) && shape.meets(&child.bounds) {
+                    if !is_apart(self.of_nodes[child.first as usize]) && shape.may_meet(&child.bounds) {
                         waiting.push(child.first);
                     }
                     continue;

@@ -50,22 +50,34 @@ impl Shape {
     /// Whether it reaches into a box, up to the tolerance (Akenine-Möller 2001, "Fast 3D
     /// Triangle-Box Overlap Testing"); for a sphere, whether its own box does.
     pub fn meets(&self, other: &Bounds) -> bool {
+        let Some(grown) = self.grown(other) else { return false };
+        let Some((corners, [normal, edges @ ..])) = &self.triangle else { return true };
+        let across = |edge: &DVec3| DVec3::AXES.iter().all(|axis| reaches(corners, edge.cross(*axis), grown));
+        reaches(corners, *normal, grown) && edges.iter().all(across)
+    }
+
+    /// The same at a lower price, true for some boxes beside the edges of a triangle too.
+    pub fn may_meet(&self, other: &Bounds) -> bool {
+        let Some(grown) = self.grown(other) else { return false };
+        let Some((corners, [normal, ..])) = &self.triangle else { return true };
+        reaches(corners, *normal, grown)
+    }
+
+    /// Middle and half size of a box that is larger by the tolerance, if its own box meets it.
+    fn grown(&self, other: &Bounds) -> Option<[DVec3; 2]> {
         let largest = |bounds: &Bounds| f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
         let slack = 2.0 * TOLERANCE * largest(&self.bounds).max(largest(other)).max(self.reach);
         let [low, high] = [other.min.as_dvec3() - slack, other.max.as_dvec3() + slack];
-        if !(self.bounds.min.as_dvec3().cmple(high).all() && low.cmple(self.bounds.max.as_dvec3()).all()) {
-            return false;
-        }
-        let Some((corners, [normal, edges @ ..])) = &self.triangle else { return true };
-        let (center, half) = (0.5 * (low + high), 0.5 * (high - low));
-        let reaches = |axis: DVec3| {
-            let radius = half.dot(axis.abs());
-            let [a, b, c] = corners.map(|corner| (corner - center).dot(axis));
-            a.min(b).min(c) <= radius && a.max(b).max(c) >= -radius
-        };
-        let across = |edge: &DVec3| DVec3::AXES.iter().all(|axis| reaches(edge.cross(*axis)));
-        reaches(*normal) && edges.iter().all(across)
+        let meets = self.bounds.min.as_dvec3().cmple(high).all() && low.cmple(self.bounds.max.as_dvec3()).all();
+        meets.then(|| [0.5 * (low + high), 0.5 * (high - low)])
     }
+}
+
+/// Whether an axis separates neither side of a box, by its middle and half size, from a triangle.
+fn reaches(corners: &[DVec3; 3], axis: DVec3, [center, half]: [DVec3; 2]) -> bool {
+    let radius = half.dot(axis.abs());
+    let [a, b, c] = corners.map(|corner| (corner - center).dot(axis));
+    a.min(b).min(c) <= radius && a.max(b).max(c) >= -radius
 }
 
 /// Largest coordinate that a primitive is computed from, metres.
