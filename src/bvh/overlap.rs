@@ -56,8 +56,12 @@ impl Shape {
         reaches(corners, *normal, grown) && edges.iter().all(across)
     }
 
-    /// The same at a lower price, true for some boxes beside the edges of a triangle too.
+    /// The same at a lower price, true for some boxes beside the edges of a triangle too: of those
+    /// that are not smaller than it, few are beside it.
     pub fn may_meet(&self, other: &Bounds) -> bool {
+        if other.diagonal() < self.bounds.diagonal() {
+            return self.meets(other);
+        }
         let Some(grown) = self.grown(other) else { return false };
         let Some((corners, [normal, ..])) = &self.triangle else { return true };
         reaches(corners, *normal, grown)
