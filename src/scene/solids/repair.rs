@@ -84,8 +84,7 @@ pub(crate) fn repair(
         let pane = pane_of(materials, solid);
         shell.triangles.iter().for_each(|i| triangles[*i as usize].material = pane);
     }
-    let crossing = found.crossing(triangles);
-    for i in 0..found.shells.len() {
+    for (i, crosses_itself) in found.crossing(triangles).into_iter().enumerate() {
         let shell = &found.shells[i];
         if shell.is_cover {
             continue;
@@ -93,7 +92,7 @@ pub(crate) fn repair(
         let fault = &mut faults[mesh(shell)];
         fault.holes += usize::from(!shell.is_closed());
         fault.t_junctions += usize::from(shell.has_t_junctions);
-        fault.crossings += usize::from(crossing[i]);
+        fault.crossings += usize::from(crosses_itself);
         if shell.volume < 0.0 {
             match found.around(triangles, shell) {
                 // A bubble is of the glass around it, whatever its own material.
