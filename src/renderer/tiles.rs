@@ -14,7 +14,7 @@ use crate::{
     },
     layout::{ArrivingLight, FirstHit, Gathered, VisiblePoint},
     map_kind::MapKind,
-    passes::{CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
+    passes::{BrightPlaces, CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::{Crop, EstimateSettings, ExtraLayers, PhotonSettings, PictureSettings},
@@ -44,6 +44,11 @@ pub(crate) trait Gatherer {
     /// Width of what is seen blurred from which on this gatherer has light for it, metres; 0: none.
     fn blur(&self) -> f32 {
         0.0
+    }
+
+    /// Places that rays of final gathering are aimed at.
+    fn bright_places(&self) -> BrightPlaces {
+        BrightPlaces::default()
     }
 
     /// Receives a pass over a picture that is coarser by `spacing`, before the picture, to keep
@@ -153,6 +158,12 @@ impl<'a> CameraPass<'a> {
     /// Makes the rays of final gathering of all points one set of numbers.
     pub fn with_joint_rays(self) -> Self {
         Self { final_gather: self.final_gather.map(FinalGather::joint), ..self }
+    }
+
+    /// Aims a part of the rays of final gathering at bright places.
+    pub fn aiming_at(mut self, bright: &BrightPlaces) -> Result<Self> {
+        self.final_gather = self.final_gather.map(|gather| gather.aimed(self.gpu, bright)).transpose()?;
+        Ok(self)
     }
 
     /// Renders tile by tile: camera rays to visible points, direct light, the light of photons,
