@@ -12,8 +12,8 @@ use crate::{
     layout::{Gathered, RecordGrid, VisiblePoint},
     map_kind::MapKind,
     passes::{
-        BrightPlaces, EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
-        PhotonMap, RayEnd, Records, StepCount, Tile, filter_footprint, record_spacing,
+        BrightPlaces, EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache,
+        IrradianceRecords, PhotonMap, RayEnd, Records, StepCount, Tile, filter_footprint, record_spacing,
     },
     progress::{Progress, Stage},
     reference::{Estimate, KdMap},
@@ -21,6 +21,9 @@ use crate::{
     stats::{Stats, timed},
     upload::SceneBuffers,
 };
+
+/// Ends of the preview's rays at most by whose light bright places are found.
+const LIT_ENDS: usize = 1 << 16;
 
 /// Receives the results of a map's estimates at the visible points of a tile.
 pub(crate) trait Observer {
@@ -77,7 +80,17 @@ impl<'a> MapGatherer<'a> {
         // they stand.
         let stretched = GatherSettings::from(estimate).neighbors as f32 / estimate.neighbors as f32;
         let sharing = EstimateSharing::new(gpu, estimate.share_reach / stretched.sqrt());
-        Ok(Self { maps, search, sharing, estimate, observer, cache: None, records: None, bright: BrightPlaces::default(), rays_per_pixel: None })
+        Ok(Self {
+            maps,
+            search,
+            sharing,
+            estimate,
+            observer,
+            cache: None,
+            records: None,
+            bright: BrightPlaces::default(),
+            rays_per_pixel: None,
+        })
     }
 
     /// Adds the light of one map at the tile's visible points. `index` is the index in the photon
@@ -165,7 +178,7 @@ impl Gatherer for MapGatherer<'_> {
     /// Fills the cache of irradiance about the ends of the preview's final-gather rays, and finds bright places
     /// among them.
     fn prepare(&mut self, preview: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
-        let (marks, mut light, rays) = ends_of_rays(preview, stats, progress)?;
+        let (marks, rays) = ends_of_rays(preview, stats, progress)?;
         let pixels = f64::from(preview.size.0) * f64::from(preview.size.1);
         self.rays_per_pixel = Some(rays as f64 / pixels);
         let Self { maps, search, estimate, .. } = self;
@@ -176,11 +189,17 @@ impl Gatherer for MapGatherer<'_> {
         let fill = || IrradianceCache::build(preview.gpu, &marks, estimate.irradiance_cells, &mut irradiances);
         self.cache = timed(&mut stats.seconds.gather, fill)?;
         let Some(cache) = &self.cache else { return Ok(()) };
-        let (gpu, count) = (preview.gpu, marks.len() as u32);
-        let points = gpu.storage_with("ends of the preview's rays", &marks)?;
-        let radiance = gpu.storage_with("light of the preview's rays", &light)?;
+        let some: Vec<_> = marks.iter().step_by(marks.len().div_ceil(LIT_ENDS) | 1).copied().collect();
+        let fraction = some.len() as f64 / marks.len() as f64;
+        let (gpu, count) = (preview.gpu, some.len() as u32);
+        let points = gpu.storage_with("ends of the preview's rays", &some)?;
+        let radiance = gpu.storage_with("light of the preview's rays", &vec![[0.0_f32; 4]; some.len()])?;
+        let direct = || preview.light_ends_directly((&points, &radiance, count));
+        let done = timed(&mut stats.seconds.direct, direct)?;
+        stats.non_finite.direct += done.non_finite;
+        tally::add_step(stats, done);
         cache.light(gpu, &points, count, &radiance);
-        light = gpu.read(&radiance, 0, count.into())?;
+        let light: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into())?;
         // Each ray carries π over their number.
         let scale = f64::from(preview.final_rays()) / std::f64::consts::PI;
         let end = |(mark, light): (&VisiblePoint, &[f32; 4])| RayEnd {
@@ -188,8 +207,8 @@ impl Gatherer for MapGatherer<'_> {
             normal: mark.ng.into(),
             radiance: scale * light[..3].iter().map(|x| f64::from(*x)).sum::<f64>(),
         };
-        let ends: Vec<_> = marks.iter().zip(&light).map(end).collect();
-        self.bright = BrightPlaces::find(&ends, rays, cache.width());
+        let ends: Vec<_> = some.iter().zip(&light).map(end).collect();
+        self.bright = BrightPlaces::find(&ends, fraction * rays as f64, cache.width());
         Ok(())
     }
 
@@ -305,28 +324,19 @@ fn bare(point: &VisiblePoint) -> VisiblePoint {
     VisiblePoint { weight: [1.0; 3], above: 0, ..*point }
 }
 
-/// The ends of all final-gather rays of a pass as if all it sees were white, the direct light there, and the
-/// number of its rays.
-fn ends_of_rays(
-    pass: &CameraPass,
-    stats: &mut Stats,
-    progress: &dyn Progress,
-) -> Result<(Vec<VisiblePoint>, Vec<[f32; 4]>, u64)> {
-    let (mut ends, mut lights, mut count_of_rays) = (Vec::new(), Vec::new(), 0);
+/// The ends of all final-gather rays of a pass, weighed as if all that it sees were white, and the number of its
+/// rays.
+fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<(Vec<VisiblePoint>, u64)> {
+    let (mut ends, mut count_of_rays) = (Vec::new(), 0);
     pass.for_each_tile(Some(Stage::Cells), stats, progress, &mut |tile, stats| {
         let gather = || {
             let points: Vec<_> = pass.points(tile)?.iter().map(bare).collect();
             pass.set_points(&points);
             pass.gather_finally(tile, progress, &mut |gather, rays, _| {
-                let done = gather.light_directly(pass.gpu, pass.scene, &pass.tracer, tile, rays)?;
                 let found: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
                 count_of_rays += u64::from(rays.all());
-                let light: Vec<[f32; 4]> = pass.gpu.read(&gather.found, 0, rays.all().into())?;
-                let lit = found.into_iter().zip(light).filter(|(point, _)| point.next_map != 0);
-                let (new_ends, new_lights): (Vec<_>, Vec<_>) = lit.unzip();
-                ends.extend(new_ends);
-                lights.extend(new_lights);
-                Ok(done)
+                ends.extend(found.into_iter().filter(|point| point.next_map != 0));
+                Ok(StepCount::default())
             })
         };
         let count = timed(&mut stats.seconds.gather, gather)?;
@@ -334,7 +344,7 @@ fn ends_of_rays(
         tally::add_step(stats, count);
         Ok(())
     })?;
-    Ok((ends, lights, count_of_rays))
+    Ok((ends, count_of_rays))
 }
 
 impl Searches<'_> {

@@ -6,7 +6,7 @@ use super::{ray_start::ray_start, size::picture_size, tally};
 use crate::{
     bvh::Media,
     error::Result,
-    gpu::Gpu,
+    gpu::{Buffer, Gpu},
     image::{
         Film,
         cryptomatte::hash,
@@ -331,6 +331,14 @@ impl<'a> CameraPass<'a> {
             gather.add(self.gpu, &self.tracer, rays);
         }
         Ok(done)
+    }
+
+    /// Adds direct light at ends of rays from all over the picture to their radiance.
+    pub fn light_ends_directly(&self, (ends, radiance, count): (&Buffer, &Buffer, u32)) -> Result<StepCount> {
+        let (Some(gather), Some(tile)) = (&self.final_gather, self.tracer.tiles().first().cloned()) else {
+            return Ok(StepCount::default());
+        };
+        gather.light_ends(self.gpu, self.scene, &self.tracer, &tile, (ends, radiance, count))
     }
 
     /// Reads the tile's visible points; some slots have no point.

@@ -13,7 +13,10 @@ const MAX_PATCHES: usize = 16;
 /// Radiance of a bright end, in units of the mean over all rays.
 const BRIGHT: f64 = 8.0;
 /// Fraction of the rays' variance that bright ends must cause for any ray to be aimed.
-const LEAST_PART: f64 = 0.25;
+const LEAST_PART: f64 = 0.7;
+/// Widths of cells that are tried, in units of the narrowest: few ends are spread over few wide
+/// cells.
+const WIDTHS: [f32; 4] = [1.0, 2.0, 4.0, 8.0];
 /// Ends that make a patch.
 const MIN_ENDS: f64 = 3.0;
 
@@ -47,11 +50,16 @@ struct Sums {
 }
 
 impl BrightPlaces {
-    /// Finds places in cells of that width by the ends of `rays` rays from all over the picture;
-    /// those that met nothing are left out.
+    /// Finds places in cells of at least that width by the ends of `rays` rays from all over the
+    /// picture; those that met nothing are left out.
     #[must_use]
-    pub fn find(ends: &[RayEnd], rays: u64, width: f32) -> Self {
-        let mean = ends.iter().map(|end| end.radiance).sum::<f64>() / rays.max(1) as f64;
+    pub fn find(ends: &[RayEnd], rays: f64, width: f32) -> Self {
+        WIDTHS.iter().find_map(|factor| Self::in_cells(ends, rays, width * factor)).unwrap_or_default()
+    }
+
+    /// The same by cells of one width; `None` if too little of the light comes from the places.
+    fn in_cells(ends: &[RayEnd], rays: f64, width: f32) -> Option<Self> {
+        let mean = ends.iter().map(|end| end.radiance).sum::<f64>() / rays.max(1.0);
         let is_bright = |end: &&RayEnd| end.radiance > BRIGHT * mean;
         let mut cells: BTreeMap<[i32; 4], Sums> = BTreeMap::new();
         for end in ends.iter().filter(is_bright) {
@@ -74,14 +82,11 @@ impl BrightPlaces {
         cells.truncate(MAX_PATCHES);
         let of_patches = |of: fn(&Sums) -> f64| cells.iter().map(of).sum::<f64>();
         let all = ends.iter().map(|end| end.radiance.powi(2)).sum::<f64>();
-        if of_patches(|sums| sums.squares) <= LEAST_PART * all {
-            return Self::default();
-        }
-        let other = mean - of_patches(|sums| sums.light) / rays as f64;
-        Self {
+        let other = mean - of_patches(|sums| sums.light) / rays;
+        Some(Self {
             patches: cells.iter().filter_map(Sums::patch).collect(),
             other_light: (std::f64::consts::PI * other.max(0.0)) as f32,
-        }
+        })
     }
 }
 
@@ -112,19 +117,19 @@ mod tests {
 
     #[test]
     fn a_bright_place_is_found_where_it_is() {
-        let bright = BrightPlaces::find(&ends(500.0), 10_000, 1.0);
+        let bright = BrightPlaces::find(&ends(500.0), 10_000.0, 1.0);
         let [patch] = bright.patches[..] else { panic!("one patch: {bright:?}") };
         assert!((Vec3::from(patch.position) - Vec3::new(0.31, 0.0, 0.29)).length() < 0.01, "{patch:?}");
         assert!(patch.radius > 0.1 && patch.radius < 0.16 && patch.normal == [0.0, 1.0, 0.0], "{patch:?}");
         assert!((patch.power / (500.0 * 0.01 * std::f32::consts::PI) - 1.0).abs() < 0.1, "{patch:?}");
         assert!((bright.other_light / std::f32::consts::PI - 1.0).abs() < 0.02, "{bright:?}");
-        let narrow = BrightPlaces::find(&ends(500.0), 10_000, 0.1).patches;
+        let narrow = BrightPlaces::find(&ends(500.0), 10_000.0, 0.1).patches;
         assert!(narrow.len() > 3 && narrow.len() <= MAX_PATCHES, "{narrow:?}");
     }
 
     #[test]
     fn even_light_has_none() {
-        assert_eq!(BrightPlaces::find(&ends(7.0), 10_000, 1.0), BrightPlaces::default());
-        assert_eq!(BrightPlaces::find(&[], 0, 1.0), BrightPlaces::default());
+        assert_eq!(BrightPlaces::find(&ends(7.0), 10_000.0, 1.0), BrightPlaces::default());
+        assert_eq!(BrightPlaces::find(&[], 0.0, 1.0), BrightPlaces::default());
     }
 }

@@ -192,8 +192,35 @@ impl FinalGather {
         tile: &Tile,
         rays: FinalRays,
     ) -> Result<StepCount> {
+        self.light(gpu, scene, tracer, (tile, rays), (&self.ends, &self.found))
+    }
+
+    /// Adds direct light at the first ends of a buffer, each of a ray of another point, to what they found.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn light_ends(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        tracer: &CameraTracer,
+        tile: &Tile,
+        (ends, found, count): (&Buffer, &Buffer, u32),
+    ) -> Result<StepCount> {
+        let rays = FinalRays { first: 0, count: 1, chosen: count };
+        self.light(gpu, scene, tracer, (tile, rays), (ends, found))
+    }
+
+    fn light(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        tracer: &CameraTracer,
+        (tile, rays): (&Tile, FinalRays),
+        (ends, found): (&Buffer, &Buffer),
+    ) -> Result<StepCount> {
         let view = rays_as_samples(&tracer.tile_view(tile), rays);
-        tracer.light_points(gpu, scene, &self.kernels.direct, &view, (&self.ends, &self.found, rays.all()))
+        tracer.light_points(gpu, scene, &self.kernels.direct, &view, (ends, found, rays.all()))
     }
 
     /// Adds what the rays of a step found to the radiance of their points.
