@@ -175,8 +175,8 @@ impl<'a> MapGatherer<'a> {
 }
 
 impl Gatherer for MapGatherer<'_> {
-    /// Fills the cache of irradiance about the ends of the preview's final-gather rays, and finds bright places
-    /// among them.
+    /// Fills the cache of irradiance about the ends of the preview's final-gather rays, and finds
+    /// bright places among them.
     fn prepare(&mut self, preview: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
         let (marks, rays) = ends_of_rays(preview, stats, progress)?;
         let pixels = f64::from(preview.size.0) * f64::from(preview.size.1);
@@ -324,8 +324,8 @@ fn bare(point: &VisiblePoint) -> VisiblePoint {
     VisiblePoint { weight: [1.0; 3], above: 0, ..*point }
 }
 
-/// The ends of all final-gather rays of a pass, weighed as if all that it sees were white, and the number of its
-/// rays.
+/// The ends of all final-gather rays of a pass, weighed as if all that it sees were white, and the
+/// number of its rays.
 fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<(Vec<VisiblePoint>, u64)> {
     let (mut ends, mut count_of_rays) = (Vec::new(), 0);
     pass.for_each_tile(Some(Stage::Cells), stats, progress, &mut |tile, stats| {

@@ -82,6 +82,9 @@ impl BrightPlaces {
         cells.truncate(MAX_PATCHES);
         let of_patches = |of: fn(&Sums) -> f64| cells.iter().map(of).sum::<f64>();
         let all = ends.iter().map(|end| end.radiance.powi(2)).sum::<f64>();
+        if of_patches(|sums| sums.squares) <= LEAST_PART * all {
+            return None;
+        }
         let other = mean - of_patches(|sums| sums.light) / rays;
         Some(Self {
             patches: cells.iter().filter_map(Sums::patch).collect(),

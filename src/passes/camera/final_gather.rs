@@ -195,7 +195,8 @@ impl FinalGather {
         self.light(gpu, scene, tracer, (tile, rays), (&self.ends, &self.found))
     }
 
-    /// Adds direct light at the first ends of a buffer, each of a ray of another point, to what they found.
+    /// Adds direct light at the first ends of a buffer, each of a ray of another point, to what
+    /// they found.
     ///
     /// # Errors
     /// Faults of the driver.
