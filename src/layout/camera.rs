@@ -162,9 +162,25 @@ pub struct FinalStep {
     /// 1: the rays of all points of the picture are one set of numbers, those of neighbours follow
     /// each other. 0: the rays of a pixel are a set.
     pub joint: u32,
+    /// Bright patches that rays are aimed at.
+    pub patches: u32,
+    /// Irradiance by all but these patches on average, in the units of [`BrightPatch::power`].
+    pub other_light: f32,
     pub pad0: u32,
-    pub pad1: u32,
-    pub pad2: u32,
+}
+
+/// A small part of a surface from which much light comes: a disc.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct BrightPatch {
+    /// Centre, metres.
+    pub position: [f32; 3],
+    /// Metres.
+    pub radius: f32,
+    /// Unit, on the bright side.
+    pub normal: [f32; 3],
+    /// Radiance times area.
+    pub power: f32,
 }
 
 /// Sums over the rays of final gathering of a point, by the directions from which light arrives.

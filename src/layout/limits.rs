@@ -14,7 +14,7 @@ pub const INSTANCED_STACK: usize = 63;
 /// Levels of such two binary trees together, of the scene and of a mesh: two levels defer three
 /// children, a leaf of the scene up to four instances, and the way back takes one entry.
 pub const TREE_HEIGHTS: u32 = 38;
-const _: () = assert!(3 * (TREE_HEIGHTS as usize / 2) + 4 + 1 <= INSTANCED_STACK);
+const _: () = assert!(3 * (TREE_HEIGHTS as usize / 2) + 4 < INSTANCED_STACK);
 /// Levels of an evenly split tree over so many primitives, at least 1, four in a leaf.
 #[must_use]
 pub fn even_height(primitives: usize) -> u32 {

@@ -6,7 +6,7 @@ pub mod maps;
 pub mod photons;
 pub mod wavefront;
 
-pub use camera::{CameraKernels, CameraTracer, FinalGather, FinalRays, StepCount, Tile};
+pub use camera::{BrightPlaces, CameraKernels, CameraTracer, FinalGather, FinalRays, RayEnd, StepCount, Tile};
 pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
     Records, SharedPoints, filter_footprint, record_spacing,

@@ -6,7 +6,7 @@ use super::{ray_start::ray_start, size::picture_size, tally};
 use crate::{
     bvh::Media,
     error::Result,
-    gpu::Gpu,
+    gpu::{Buffer, Gpu},
     image::{
         Film,
         cryptomatte::hash,
@@ -14,7 +14,7 @@ use crate::{
     },
     layout::{ArrivingLight, FirstHit, Gathered, VisiblePoint},
     map_kind::MapKind,
-    passes::{CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
+    passes::{BrightPlaces, CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
     settings::{Crop, EstimateSettings, ExtraLayers, PhotonSettings, PictureSettings},
@@ -44,6 +44,11 @@ pub(crate) trait Gatherer {
     /// Width of what is seen blurred from which on this gatherer has light for it, metres; 0: none.
     fn blur(&self) -> f32 {
         0.0
+    }
+
+    /// Places that rays of final gathering are aimed at.
+    fn bright_places(&self) -> BrightPlaces {
+        BrightPlaces::default()
     }
 
     /// Receives a pass over a picture that is coarser by `spacing`, before the picture, to keep
@@ -153,6 +158,12 @@ impl<'a> CameraPass<'a> {
     /// Makes the rays of final gathering of all points one set of numbers.
     pub fn with_joint_rays(self) -> Self {
         Self { final_gather: self.final_gather.map(FinalGather::joint), ..self }
+    }
+
+    /// Aims a part of the rays of final gathering at bright places.
+    pub fn aiming_at(mut self, bright: &BrightPlaces) -> Result<Self> {
+        self.final_gather = self.final_gather.map(|gather| gather.aimed(self.gpu, bright)).transpose()?;
+        Ok(self)
     }
 
     /// Renders tile by tile: camera rays to visible points, direct light, the light of photons,
@@ -320,6 +331,14 @@ impl<'a> CameraPass<'a> {
             gather.add(self.gpu, &self.tracer, rays);
         }
         Ok(done)
+    }
+
+    /// Adds direct light at ends of rays from all over the picture to their radiance.
+    pub fn light_ends_directly(&self, (ends, radiance, count): (&Buffer, &Buffer, u32)) -> Result<StepCount> {
+        let (Some(gather), Some(tile)) = (&self.final_gather, self.tracer.tiles().first().cloned()) else {
+            return Ok(StepCount::default());
+        };
+        gather.light_ends(self.gpu, self.scene, &self.tracer, &tile, (ends, radiance, count))
     }
 
     /// Reads the tile's visible points; some slots have no point.

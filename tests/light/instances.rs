@@ -205,8 +205,8 @@ fn instances_far_away_have_no_gaps() {
 #[test]
 fn flat_and_stretched_copies_are_held_for_themselves() {
     let mut all = places();
-    all[3] = all[3] * Mat4::from_scale(vec3(1.0, 0.0, 1.0));
-    all[4] = all[4] * Mat4::from_scale(vec3(1.0, 1e-6, 1.0));
+    all[3] *= Mat4::from_scale(vec3(1.0, 0.0, 1.0));
+    all[4] *= Mat4::from_scale(vec3(1.0, 1e-6, 1.0));
     all.push(all[7]);
     let [shared, copied] = both(&file(knob(), lambert([0.7; 3]), &all));
     assert_eq!(shared.instances.len(), 23, "two of 26 for themselves, one is there twice");

@@ -2,14 +2,19 @@
 //!
 //! | scene | right | negative control |
 //! |---|---|---|
-//! | a ball on the floor, leaves, a slit, mirrors that face each other, a glass ball before all | final gathering with many rays at every sample | the estimate from the photons around the point |
+//! | a ball on the floor, a small one with its contact shadow, a torus, leaves, a slit, mirrors that face each other, a glass ball before all | final gathering with many rays at every sample | the estimate from the photons around the point |
+//! | a lamp 3 cm from a wall that faces away | the same | the same |
+//! | a lamp 3 cm from a wall that it faces, a strip below a shelf, a small caustic as the source of indirect light | the same, by blocks of pixels | the same |
+//! | a part of a picture of 4096 x 4096 | the same | the same |
 //! | a floor whose interpolated normals lean | the same | the floor without them |
 //! | a wall of rough metal | estimates at all that it shows, in place of cells | smooth metal has the same bits without cells |
 //! | a crop | the bits of the whole | another seed |
 
+use std::f32::consts::TAU;
+
 use caustica::{
     renderer::Render,
-    scene::{Material, Scene, Surface},
+    scene::{Material, Scene, Surface, Triangle},
     settings::{Crop, ExtraLayers, Mode, Settings},
 };
 use glam::{Vec3, vec3};
@@ -46,10 +51,72 @@ fn leaves(scene: &mut Scene) {
     }
 }
 
-fn scenes() -> [(&'static str, Scene); 5] {
+/// A torus that lies about `middle`, with interpolated normals.
+fn torus(scene: &mut Scene, middle: Vec3, (major, minor): (f32, f32)) {
+    let (around, across) = (24, 12);
+    let at = |i: u32, j: u32| {
+        let (a, b) = (TAU * i as f32 / around as f32, TAU * j as f32 / across as f32);
+        let outwards = vec3(a.cos(), 0.0, -a.sin());
+        let normal = b.cos() * outwards + b.sin() * Vec3::Y;
+        (middle + major * outwards + minor * normal, normal)
+    };
+    for (i, j) in (0..around).flat_map(|i| (0..across).map(move |j| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        for corners in [[a, b, c], [a, c, d]] {
+            scene.triangles.push(Triangle::new(corners.map(|c| c.0), corners.map(|c| c.1), MATT));
+        }
+    }
+}
+
+/// A plate 3 cm from the wall opposite the camera, in place of the lamp. It shines on the wall, or
+/// away from it.
+fn sconce(scene: &mut Scene, faces_wall: bool) {
+    scene.lights.clear();
+    scene.materials.push(emissive("lamp", 0.0, 300.0, false));
+    let lamp = scene.materials.len() as u32 - 1;
+    let (x, y) = (0.08 * Vec3::X, 0.12 * Vec3::Y);
+    let corner = vec3(-0.24, 0.1, -0.97);
+    let (a, b) = if faces_wall { (y, x) } else { (x, y) };
+    add_quad(scene, corner, a, b, lamp);
+    let behind = if faces_wall { 0.002 } else { -0.002 } * Vec3::Z;
+    add_quad(scene, corner + behind, b, a, MATT);
+}
+
+fn shelf(scene: &mut Scene) {
+    scene.lights.clear();
+    scene.materials.push(emissive("strip", 0.0, 300.0, false));
+    let strip = scene.materials.len() as u32 - 1;
+    add_box(scene, vec3(-0.5, 0.2, -1.0), vec3(0.3, 0.23, -0.8), MATT);
+    add_quad(scene, vec3(-0.45, 0.195, -0.97), 0.7 * Vec3::X, 0.01 * Vec3::Z, strip);
+}
+
+/// A concave mirror that throws the light of a lamp on a small part of the floor.
+fn caustic(scene: &mut Scene) {
+    let (rings, sides, radius, middle) = (8, 24, 0.8, vec3(0.0, 0.0, -0.3));
+    let at = |i: u32, j: u32| {
+        let (polar, a) = (0.5 * i as f32 / rings as f32, TAU * j as f32 / sides as f32);
+        let out = vec3(polar.sin() * a.cos(), polar.cos(), polar.sin() * a.sin());
+        (middle + radius * out, -out)
+    };
+    for (i, j) in (0..rings).flat_map(|i| (0..sides).map(move |j| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        for corners in [[a, b, c], [a, c, d]] {
+            scene.triangles.push(Triangle::new(corners.map(|c| c.0), corners.map(|c| c.1), MIRROR));
+        }
+    }
+    // The conjugate of the floor's height.
+    scene.lights[0] = point_light(vec3(0.0, 0.26, -0.3), 3.0);
+    // Keeps its light off the floor.
+    add_box(scene, vec3(-0.05, 0.2, -0.35), vec3(0.05, 0.22, -0.25), MATT);
+}
+
+fn scenes() -> [(&'static str, Scene); 8] {
     let ball = |center, radius, material| with(|s| s.spheres.push(sphere(center, radius, material)));
     [
         ("a ball on the floor", ball(vec3(0.1, -0.7, -0.2), 0.3, MATT)),
+        ("a contact shadow of eight pixels", ball(vec3(0.1, -0.88, -0.2), 0.12, MATT)),
+        ("a torus", with(|s| torus(s, vec3(0.1, -0.6, -0.2), (0.35, 0.15)))),
+        ("a lamp that faces away from a wall", with(|s| sconce(s, false))),
         ("leaves", with(leaves)),
         (
             "a slit",
@@ -112,6 +179,55 @@ fn spaced_points_light_every_sample() {
         assert!(found < 0.75 * control, "{name}: {found}, and {control} by the photons around each point");
         assert!(within(mean(&spaced), mean(&right), 0.03), "{name}: {} instead of {}", mean(&spaced), mean(&right));
     }
+}
+
+/// Mean of squared differences over squared values, by blocks of 8 x 8 pixels of a square
+/// picture.
+fn error_of_blocks(found: &Render, right: &Render) -> f64 {
+    let blocks = |render: &Render| {
+        let side = (render.frame.radiance().len() as f64).sqrt() as usize;
+        let mut sums = vec![[0.0_f64; 3]; (side / 8).pow(2)];
+        for (i, pixel) in render.frame.radiance().iter().enumerate() {
+            let block = i / side / 8 * (side / 8) + i % side / 8;
+            (0..3).for_each(|c| sums[block][c] += f64::from(pixel[c]) / 64.0);
+        }
+        sums
+    };
+    let (found, right) = (blocks(found), blocks(right));
+    let pairs = found.iter().flatten().zip(right.iter().flatten());
+    pairs.map(|(a, b)| (a - b).powi(2) / (b * b + 0.01)).sum::<f64>() / (3 * right.len()) as f64
+}
+
+#[test]
+fn small_bright_places_leave_no_spots() {
+    for (name, scene) in [
+        ("a lamp that faces a wall", with(|s| sconce(s, true))),
+        ("a strip below a shelf", with(shelf)),
+        ("a small caustic", with(caustic)),
+    ] {
+        let sized = |settings: Settings| settings.with(|s| s.picture.size = Some((128, 128)));
+        let right = render_scene(&scene, &sized(converged(64)));
+        let spaced = render_scene(&scene, &sized(gathering(64, 2)));
+        let classic = render_scene(&scene, &sized(plain()));
+        let (found, control) = (error_of_blocks(&spaced, &right), error_of_blocks(&classic, &right));
+        assert!(found < 0.5 * control, "{name}: {found}, and {control} by the photons around each point");
+        assert!(within(mean(&spaced), mean(&right), 0.02), "{name}: {} instead of {}", mean(&spaced), mean(&right));
+    }
+}
+
+#[test]
+fn a_part_of_a_large_picture_is_right() {
+    let scene = with(|s| s.spheres.push(sphere(vec3(0.1, -0.7, -0.2), 0.3, MATT)));
+    // The floor below the ball, near where both touch.
+    let part = |settings: Settings| {
+        let crop = Crop { column: 2250, row: 3190, width: 64, height: 64 };
+        render_scene(&scene, &settings.with(|s| (s.picture.size, s.picture.crop) = (Some((4096, 4096)), Some(crop))))
+    };
+    let right = part(converged(64));
+    let (spaced, control) = (part(gathering(32, 2)), part(plain()));
+    let (found, control) = (error(&spaced, &right), error(&control, &right));
+    assert!(found < 0.75 * control, "{found}, and {control} by the photons around each point");
+    assert!(within(mean(&spaced), mean(&right), 0.03), "{} instead of {}", mean(&spaced), mean(&right));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! `trace_camera`, `light_lobes`, `sum_final_gather`.
 
 use super::{
+    bright_places::BrightPlaces,
     camera_tracer::CameraTracer,
     direct_light::DirectLighting,
     tile::{StepCount, Tile},
@@ -11,7 +12,7 @@ use super::{
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{ArrivingLight, CameraTile, FinalStep, VisiblePoint},
+    layout::{ArrivingLight, BrightPatch, CameraTile, FinalStep, VisiblePoint},
     passes::wavefront::Step,
     reference::mix,
     settings::Sampler,
@@ -57,7 +58,11 @@ pub struct FinalGather {
     pub ends: Buffer,
     /// Light that each ray finds, `vec4f`.
     pub found: Buffer,
-    /// Direction of each ray, octahedral.
+    /// Bright patches that rays are aimed at, their number, and the irradiance by all else.
+    patches: Buffer,
+    patch_count: u32,
+    other_light: f32,
+    /// Direction of each ray, octahedral, and the bits of its weight.
     directions: Buffer,
     /// An [`ArrivingLight`] for each visible point. Rays add to what is there.
     pub arriving: Buffer,
@@ -95,7 +100,10 @@ impl FinalGather {
             chosen: gpu.storage::<u32>("points of final gathering", tracer.room())?,
             ends: gpu.storage::<VisiblePoint>("ends of final-gather rays", tracer.room())?,
             found: gpu.storage::<[f32; 4]>("light of final-gather rays", tracer.room())?,
-            directions: gpu.storage::<u32>("directions of final-gather rays", tracer.room())?,
+            patches: gpu.storage::<BrightPatch>("bright patches", 1)?,
+            patch_count: 0,
+            other_light: 0.0,
+            directions: gpu.storage::<[u32; 2]>("directions of final-gather rays", tracer.room())?,
             arriving: gpu.storage::<ArrivingLight>("arriving light", tracer.room())?,
             waiting: WaitingPoints::new(gpu, tracer.room())?,
         })
@@ -111,6 +119,18 @@ impl FinalGather {
     #[must_use]
     pub fn joint(self) -> Self {
         Self { joint: true, ..self }
+    }
+
+    /// Aims a part of the rays at bright patches.
+    ///
+    /// # Errors
+    /// Limits of the adapter.
+    pub fn aimed(self, gpu: &Gpu, bright: &BrightPlaces) -> Result<Self> {
+        if bright.patches.is_empty() {
+            return Ok(self);
+        }
+        let patches = gpu.storage_with("bright patches", &bright.patches)?;
+        Ok(Self { patches, patch_count: bright.patches.len() as u32, other_light: bright.other_light, ..self })
     }
 
     /// Rays of each visible point.
@@ -147,6 +167,7 @@ impl FinalGather {
             ("seen", &self.ends),
             ("chosen", &self.chosen),
             ("directions", &self.directions),
+            ("patches", &self.patches),
         ];
         let followed = [("tile", &own), ("points", &self.ends)];
         let start = Step { kernel: &self.kernels.start, buffers: &started };
@@ -171,8 +192,36 @@ impl FinalGather {
         tile: &Tile,
         rays: FinalRays,
     ) -> Result<StepCount> {
+        self.light(gpu, scene, tracer, (tile, rays), (&self.ends, &self.found))
+    }
+
+    /// Adds direct light at the first ends of a buffer, each of a ray of another point, to what
+    /// they found.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn light_ends(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        tracer: &CameraTracer,
+        tile: &Tile,
+        (ends, found, count): (&Buffer, &Buffer, u32),
+    ) -> Result<StepCount> {
+        let rays = FinalRays { first: 0, count: 1, chosen: count };
+        self.light(gpu, scene, tracer, (tile, rays), (ends, found))
+    }
+
+    fn light(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        tracer: &CameraTracer,
+        (tile, rays): (&Tile, FinalRays),
+        (ends, found): (&Buffer, &Buffer),
+    ) -> Result<StepCount> {
         let view = rays_as_samples(&tracer.tile_view(tile), rays);
-        tracer.light_points(gpu, scene, &self.kernels.direct, &view, (&self.ends, &self.found, rays.all()))
+        tracer.light_points(gpu, scene, &self.kernels.direct, &view, (ends, found, rays.all()))
     }
 
     /// Adds what the rays of a step found to the radiance of their points.
@@ -199,6 +248,8 @@ impl FinalGather {
             rays: self.rays,
             chosen: rays.chosen,
             joint: self.joint.into(),
+            patches: self.patch_count,
+            other_light: self.other_light,
             ..Default::default()
         };
         gpu.uniform("final step", &step)

@@ -1,5 +1,6 @@
 //! Second pass: camera paths to visible points, direct light there, rays of final gathering.
 
+pub mod bright_places;
 pub mod camera_tracer;
 mod direct_light;
 pub mod final_gather;
@@ -7,6 +8,7 @@ pub mod tile;
 mod view;
 mod waiting_points;
 
+pub use bright_places::{BrightPlaces, RayEnd};
 pub use camera_tracer::{CameraKernels, CameraTracer};
 pub use final_gather::{FinalGather, FinalRays};
 pub use tile::{StepCount, Tile};

@@ -43,8 +43,7 @@ impl Shared {
         let linear = DMat3::from_mat4(to_scene);
         let norm = |m: DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
         let condition = norm(linear) * norm(linear.inverse());
-        // Also refuses what is no number.
-        if !(condition <= MAX_CONDITION) {
+        if condition.is_nan() || condition > MAX_CONDITION {
             return None;
         }
         let is_mirrored = linear.determinant() < 0.0;
