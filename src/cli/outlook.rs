@@ -59,6 +59,8 @@ struct Pace {
     /// Time and units of the first report of units that are done: before, kernels may still be
     /// compiled.
     warm: Option<(f64, u64)>,
+    /// Units of the last report.
+    done: u64,
 }
 
 /// Estimates the time that is left.
@@ -83,14 +85,16 @@ impl Outlook {
     pub fn left(&mut self, stage: Stage, done: u64, total: u64, now: f64) -> Option<f64> {
         let pace = match self.pace {
             Some(pace) if pace.stage == stage => pace,
-            _ => Pace { stage, began: now, warm: None },
+            _ => Pace { stage, began: now, warm: None, done: 0 },
         };
         let begins = self.pace.is_none_or(|before| before.stage != stage);
         if begins && stage == Stage::Photons {
             (self.groups, self.group_began) = (self.groups + 1, now);
         }
-        self.pace = Some(Pace { warm: pace.warm.or((done > 0).then_some((now, done))), ..pace });
-        if let Some(left) = self.measured(pace, done, total, now) {
+        self.pace = Some(Pace { warm: pace.warm.or((done > 0).then_some((now, done))), done, ..pace });
+        // A report of nothing new says nothing of the pace.
+        let measured = if done > pace.done { self.measured(pace, done, total, now) } else { None };
+        if let Some(left) = measured {
             let groups_left = self.plan.groups.saturating_sub(self.groups.max(1));
             let of_group = now - self.group_began + left;
             self.left = Some((left + groups_left as f64 * of_group, now));
