@@ -101,7 +101,7 @@ fn instances_give_the_picture_of_copies() {
     moved[12] = Mat4::from_translation(vec3(0.005, 0.0, 0.0)) * moved[12];
     let [aside, _] = both(&file_at(&moved));
     let [_, nudged] = both(&file_at(&nudged()));
-    for mode in [Mode::DirectRays, Mode::Hybrid, Mode::Photons] {
+    for mode in [Mode::DirectRays, Mode::Hybrid] {
         let right = picture(&copied, mode);
         let [found, rounding, control] =
             [&shared, &nudged, &aside].map(|scene| difference(&picture(scene, mode), &right));

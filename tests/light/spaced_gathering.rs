@@ -220,7 +220,7 @@ fn a_part_of_a_large_picture_is_right() {
     let scene = with(|s| s.spheres.push(sphere(vec3(0.1, -0.7, -0.2), 0.3, MATT)));
     // The floor below the ball, near where both touch.
     let part = |settings: Settings| {
-        let crop = Crop { column: 2250, row: 3190, width: 64, height: 64 };
+        let crop = Crop { column: 2250, row: 3190, width: 32, height: 32 };
         render_scene(&scene, &settings.with(|s| (s.picture.size, s.picture.crop) = (Some((4096, 4096)), Some(crop))))
     };
     let right = part(converged(64));
