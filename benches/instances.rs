@@ -16,7 +16,7 @@ use caustica::{
     settings::{Mode, Settings},
 };
 use glam::{Mat3, Quat, Vec3, vec3};
-use support::{add_quad, camera, diffuse, emissive, gpu, meshes::Mesh, scene};
+use support::{add_quad, camera, diffuse, emissive, gpu, meshes::Mesh, scene, with_copies};
 
 const RINGS: u32 = 50;
 const SEGMENTS: u32 = 41;
@@ -101,14 +101,4 @@ fn pots_on_a_floor(pots: u32, factor: f32) -> Scene {
     scene.instances = (0..pots).map(instance).collect();
     scene.cameras = vec![camera(vec3(0.0, 0.5 * half, 1.1 * half), vec3(0.0, 0.0, 0.2 * half), 50.0)];
     scene
-}
-
-/// The same with triangles for each pot.
-fn with_copies(shared: &Scene) -> Scene {
-    let of_instance = |instance: &Instance| {
-        let own = &shared.meshes[instance.mesh as usize].triangles;
-        own.iter().map(|triangle| instance.triangle(triangle)).collect::<Vec<_>>()
-    };
-    let triangles = shared.triangles.iter().copied().chain(shared.instances.iter().flat_map(of_instance)).collect();
-    Scene { triangles, instances: Vec::new(), meshes: Vec::new(), ..shared.clone() }
 }

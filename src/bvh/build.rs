@@ -3,16 +3,14 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::node::MAX_LEAF;
+use super::instance::{Place, instance_primitive, instances};
+use super::node::{FILLER, MAX_LEAF};
 use super::{convert, parallel, split, widen};
 use crate::layout::{
-    BVH_STACK, BvhNode, INSTANCE, INSTANCED_STACK, Instance, NOTHING_LEFT, Normals, Primitive, SPHERE_BIT,
-    TREE_HEIGHTS, even_height, octahedral,
+    BVH_STACK, BvhNode, INSTANCED_STACK, Instance, Normals, Primitive, SPHERE_BIT, TREE_HEIGHTS, even_height,
+    octahedral,
 };
-use crate::scene::{self, Bounds, Scene, SharedMesh, Sphere, Triangle, instance_bounds};
-
-/// [`Primitive::id`] of a padding triangle, and of the box of an instance.
-pub const FILLER: u32 = u32::MAX;
+use crate::scene::{Bounds, Scene, SharedMesh, Sphere, Triangle, instance_bounds};
 
 /// Nodes and primitives in device layout.
 #[derive(Clone, Debug, Default)]
@@ -35,7 +33,7 @@ impl Bvh {
     ///
     /// A mesh that instances share has a tree of its own, in its own coordinates, and instances are
     /// boxes in the tree of the scene (Wald et al. 2003, "Distributed Interactive Ray Tracing of
-    /// Dynamic Scenes"): see [`INSTANCE`].
+    /// Dynamic Scenes"): see [`INSTANCE`](crate::layout::INSTANCE).
     ///
     /// # Panics
     /// If there are 2^28 triangles and spheres or more. The loader refuses such files earlier.
@@ -143,46 +141,6 @@ impl Heights {
         let spare = TREE_HEIGHTS.checked_sub(top + mesh).expect("the loader shares no mesh of a tree that is too high");
         let mesh = (mesh + (spare / 2).next_multiple_of(2)).min(convert::MAX_HEIGHT);
         Self { scene: (TREE_HEIGHTS - mesh).min(convert::MAX_HEIGHT), mesh }
-    }
-}
-
-/// Where the tree of a shared mesh lies among all, and the number of its primitives.
-struct Place {
-    root: u32,
-    stored: u32,
-    primitives: u32,
-}
-
-/// Instances in device layout, whose primitives are numbered after the `stored` ones.
-fn instances(instances: &[scene::Instance], places: &[Place], stored: usize) -> Vec<Instance> {
-    if instances.is_empty() {
-        return Vec::new();
-    }
-    let mut next = u32::try_from(stored).expect("fewer than 2^28 primitives");
-    let head = Instance { first: next, stored: instances.len() as u32, ..Instance::default() };
-    let instance = |instance: &scene::Instance| {
-        let Place { root, stored, primitives } = places[instance.mesh as usize];
-        let first = next;
-        next += primitives;
-        assert!(next < NOTHING_LEFT, "2^28 primitives or more with those of all instances");
-        let (rows, inverse) = (instance.linear.transpose(), instance.linear.inverse().transpose());
-        let row = |axis: usize| rows.col(axis).extend(instance.offset[axis]).to_array();
-        let [from_scene_x, from_scene_y, from_scene_z] = [0, 1, 2].map(|axis| inverse.col(axis).to_array());
-        Instance { to_scene: [row(0), row(1), row(2)], from_scene_x, first, from_scene_y, stored, from_scene_z, root }
-    };
-    let of_all: Vec<Instance> = instances.iter().map(instance).collect();
-    [vec![head], of_all].concat()
-}
-
-/// Stands in a tree for instance `number`, counted from 1.
-fn instance_primitive(bounds: &Bounds, number: u32) -> Primitive {
-    Primitive {
-        v0: bounds.min.to_array(),
-        material: number,
-        e1: (bounds.max - bounds.min).to_array(),
-        id: FILLER,
-        emitter: INSTANCE,
-        ..Primitive::default()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Search of the hierarchy for surfaces that lie in each other.
 
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
@@ -94,7 +94,7 @@ impl Search<'_> {
                 for stored in &self.bvh.primitives[child.first as usize..(child.first + child.count) as usize] {
                     let Some(patch) = self.patch(stored) else { continue };
                     let touched = Touched { patch, of_instance: Some(stored.id) };
-                    let other = to_scene(stored, instance);
+                    let other = instance.primitive(stored);
                     if !found.contains(&touched) && shape.is_parallel(&other) && coincide(primitive, &other) {
                         found.push(touched);
                     }
@@ -126,7 +126,7 @@ impl Search<'_> {
             let (small, other) = if size(a) <= size(b) { (a, b) } else { (b, a) };
             let (instance, its_box) = (&self.bvh.instances[small.material as usize], bounds(other));
             let of_one = |stored: &Primitive| {
-                let own = to_scene(stored, instance);
+                let own = instance.primitive(stored);
                 let mut found = Vec::new();
                 if self.patch(stored).is_some() && touch(&bounds(&own), &its_box) {
                     self.touching_instance(&own, other.material, &mut found);
@@ -158,11 +158,10 @@ impl Search<'_> {
 
 /// A primitive of the scene, in whose box the tree of an instance's mesh is searched.
 fn shape_in_mesh(primitive: &Primitive, instance: &Instance) -> Shape {
-    let rows = [instance.from_scene_x, instance.from_scene_y, instance.from_scene_z].map(Vec3::from);
-    let linear = |v: Vec3| Vec3::from(rows.map(|row| row.dot(v)));
-    let offset = Vec3::from(instance.to_scene.map(|row| row[3]));
+    let offset = instance.offset();
+    let linear = |v: Vec3| instance.vector_from_scene(v);
     let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(Vec3::from);
-    let stretch = rows.iter().map(|row| row.length_squared()).sum::<f32>().sqrt();
+    let stretch = instance.inverse_rows().iter().map(|row| row.length_squared()).sum::<f32>().sqrt();
     let in_mesh = Primitive {
         v0: linear(v0 - offset).to_array(),
         e1: linear(e1).to_array(),
@@ -170,14 +169,6 @@ fn shape_in_mesh(primitive: &Primitive, instance: &Instance) -> Shape {
         ..*primitive
     };
     Shape::new(&in_mesh).widened(reach(primitive).max(f64::from(offset.abs().max_element())) * f64::from(stretch))
-}
-
-/// A primitive of a mesh as an instance shows it.
-fn to_scene(stored: &Primitive, instance: &Instance) -> Primitive {
-    let rows = instance.to_scene.map(Vec4::from);
-    let vector = |v: [f32; 3]| rows.map(|row| row.truncate().dot(v.into()));
-    let v0 = Vec3::from(vector(stored.v0)) + Vec3::from(rows.map(|row| row.w));
-    Primitive { v0: v0.to_array(), e1: vector(stored.e1), e2: vector(stored.e2), ..*stored }
 }
 
 fn touch(a: &Bounds, b: &Bounds) -> bool {

@@ -138,8 +138,7 @@ impl Converter<'_> {
     /// centres.
     fn even_halves(&mut self, primitives: &mut [u32], depth: u32) -> BvhChild {
         let middle = |i: u32| self.bounds[i as usize].min + self.bounds[i as usize].max;
-        let centers =
-            primitives.iter().map(|i| middle(*i)).fold(Bounds::EMPTY, |b, p| b.union(Bounds { min: p, max: p }));
+        let centers = Bounds::around(primitives.iter().map(|i| middle(*i)));
         let axis = (centers.max - centers.min).max_position();
         // Fills whole leaves on the left, so that neither half is higher than `even_height`
         // predicts.

@@ -11,6 +11,7 @@ mod build;
 mod contact_search;
 mod contacts;
 mod convert;
+mod instance;
 mod media;
 mod node;
 mod overlap;
@@ -21,8 +22,8 @@ mod split;
 mod tests;
 mod widen;
 
-pub use build::{Bvh, FILLER};
+pub use build::Bvh;
 pub use contacts::{Contacts, contacts};
 pub use media::{Media, MediaProbe};
-pub use node::{BvhChild, MAX_LEAF, WIDTH};
+pub use node::{BvhChild, FILLER, MAX_LEAF, WIDTH};
 pub use ray::RayHit;

@@ -10,6 +10,10 @@ use crate::scene::Bounds;
 /// Maximum number of children of a node.
 pub const WIDTH: usize = 4;
 
+/// [`Primitive::id`](crate::layout::Primitive::id) of a padding triangle, and of the box of an
+/// instance.
+pub const FILLER: u32 = u32::MAX;
+
 /// Maximum number of primitives of a leaf.
 pub const MAX_LEAF: u32 = 4;
 

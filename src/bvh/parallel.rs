@@ -150,7 +150,7 @@ fn middle(bounds: &Bounds) -> glam::Vec3 {
 fn halves(bounds: &[Bounds], mut indices: Vec<u32>) -> [Vec<u32>; 2] {
     let step = indices.len().div_ceil(SAMPLE);
     let sample: Vec<Bounds> = indices.iter().step_by(step).map(|i| bounds[*i as usize]).collect();
-    let centers = sample.iter().map(middle).fold(Bounds::EMPTY, |all, p| all.union(Bounds { min: p, max: p }));
+    let centers = Bounds::around(sample.iter().map(middle));
     let scale = BINS as f32 / (centers.max - centers.min);
     // Not a number without an extent: 0.
     let bin = |b: &Bounds, axis: usize| (((middle(b)[axis] - centers.min[axis]) * scale[axis]) as usize).min(BINS - 1);

@@ -33,11 +33,7 @@ impl Bvh {
             let position = origin + distance * direction;
             let normal = match instance {
                 None => normal_at(primitive, position),
-                Some(instance) => {
-                    let [x, y, z] = normal_at(primitive, position).to_array();
-                    let rows = [instance.from_scene_x, instance.from_scene_y, instance.from_scene_z].map(Vec3::from);
-                    (x * rows[0] + y * rows[1] + z * rows[2]).normalize_or(Vec3::Y)
-                }
+                Some(instance) => instance.normal_to_scene(normal_at(primitive, position)).normalize_or(Vec3::Y),
             };
             let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
             RayHit { position, normal, material: primitive.material & MATERIAL_MASK }
@@ -66,7 +62,10 @@ impl Bvh {
                 for primitive in &self.primitives[child.first as usize..(child.first + child.count) as usize] {
                     if primitive.emitter == INSTANCE {
                         let instance = &self.instances[primitive.material as usize];
-                        let ray = ray_of_instance(instance, origin, direction);
+                        let ray = (
+                            instance.vector_from_scene(origin - instance.offset()),
+                            instance.vector_from_scene(direction),
+                        );
                         self.search((instance.root, Some(instance)), ray, least, nearest);
                         continue;
                     }
@@ -85,14 +84,6 @@ struct Nearest<'b> {
     distance: f32,
     primitive: &'b Primitive,
     instance: Option<&'b Instance>,
-}
-
-/// A ray in the coordinates of an instance's mesh.
-fn ray_of_instance(instance: &Instance, origin: Vec3, direction: Vec3) -> (Vec3, Vec3) {
-    let rows = [instance.from_scene_x, instance.from_scene_y, instance.from_scene_z].map(Vec3::from);
-    let linear = |v: Vec3| Vec3::from(rows.map(|row| row.dot(v)));
-    let offset = Vec3::from(instance.to_scene.map(|row| row[3]));
-    (linear(origin - offset), linear(direction))
 }
 
 fn is_met(bounds: &Bounds, origin: Vec3, direction: Vec3, reach: f32) -> bool {

@@ -120,8 +120,7 @@ fn best_cut(tree: &[Cluster], cluster: usize) -> (f64, Vec<Target>) {
 /// Items on either side of the middle of the longest extent of their centres; `None` if one side is
 /// empty, as when all centres coincide.
 fn split(items: Vec<Item>) -> Option<[Vec<Item>; 2]> {
-    let middles = items.iter().map(Item::middle);
-    let box_ = middles.fold(Bounds::EMPTY, |b, p| b.union(Bounds { min: p, max: p }));
+    let box_ = Bounds::around(items.iter().map(Item::middle));
     let axis = (box_.max - box_.min).max_position();
     let plane = 0.5 * (box_.min[axis] + box_.max[axis]);
     let (left, right): (Vec<_>, Vec<_>) = items.into_iter().partition(|item| item.middle()[axis] < plane);

@@ -6,6 +6,7 @@
 mod gatherer;
 mod light_groups;
 mod maps;
+mod preview;
 mod progressive;
 mod ray_start;
 mod render;

@@ -34,18 +34,6 @@ impl Instance {
     pub fn position(&self, point: Vec3) -> Vec3 {
         self.linear * point + self.offset
     }
-
-    /// A triangle of the mesh in scene coordinates.
-    #[must_use]
-    pub fn triangle(&self, triangle: &Triangle) -> Triangle {
-        let to_normal = self.linear.inverse().transpose();
-        Triangle {
-            positions: triangle.positions.map(|position| self.position(position)),
-            normals: triangle.normals.map(|normal| (to_normal * normal).normalize_or_zero()),
-            object: self.object,
-            ..*triangle
-        }
-    }
 }
 
 /// Boxes of instances, scene coordinates.
@@ -53,7 +41,7 @@ pub(crate) fn instance_bounds(meshes: &[SharedMesh], instances: &[Instance]) -> 
     let vertices: Vec<Vec<Vec3>> = meshes.par_iter().map(vertices).collect();
     let bounds = |instance: &Instance| {
         let points = vertices[instance.mesh as usize].iter().map(|vertex| instance.position(*vertex));
-        let box_ = points.fold(Bounds::EMPTY, |b, p| b.union(Bounds { min: p, max: p }));
+        let box_ = Bounds::around(points);
         // Covers the rounding of the transform, there and back.
         let slack = 8.0 * f32::EPSILON * (box_.min.abs().max(box_.max.abs()) + (box_.max - box_.min));
         Bounds { min: box_.min - slack, max: box_.max + slack }

@@ -84,6 +84,12 @@ impl Bounds {
     /// Empty box: the identity of [`Bounds::union`].
     pub const EMPTY: Bounds = Bounds { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
+    /// Smallest box that contains points.
+    #[must_use]
+    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Bounds {
+        points.into_iter().fold(Self::EMPTY, |all, point| all.union(Bounds { min: point, max: point }))
+    }
+
     /// Smallest box that contains both.
     #[must_use]
     pub fn union(self, other: Bounds) -> Bounds {

@@ -76,16 +76,6 @@ fn by_brute_force(scene: &Scene, ray: &Row) -> f64 {
     triangles.chain(spheres).fold(f64::INFINITY, f64::min)
 }
 
-/// The scene with the triangles of its instances.
-fn with_copies(scene: &Scene) -> Scene {
-    let of_instance = |instance: &Instance| {
-        let own = &scene.meshes[instance.mesh as usize].triangles;
-        own.iter().map(|triangle| instance.triangle(triangle)).collect::<Vec<_>>()
-    };
-    let all = scene.triangles.iter().copied().chain(scene.instances.iter().flat_map(of_instance));
-    Scene { triangles: all.collect(), ..scene.clone() }
-}
-
 /// Möller and Trumbore 1997.
 fn hit_triangle([a, b, c]: [DVec3; 3], o: DVec3, d: DVec3) -> Option<f64> {
     let (e1, e2, s) = (b - a, c - a, o - a);

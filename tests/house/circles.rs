@@ -212,6 +212,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "seen",
             "maps",
             "tiles",
+            "preview",
             "gatherer",
             "session",
             "light_groups",

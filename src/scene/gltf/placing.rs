@@ -7,8 +7,8 @@ use glam::{DMat3, DMat4, DVec3, Vec3, Vec4};
 use super::fault::{Notes, Read, fault};
 use super::mesh_cache::MeshInstance;
 use super::meshes::MeshPrimitive;
-use super::shared_meshes::Shared;
-use crate::scene::{Attributes, Triangle, vertex_bits};
+use super::shared_meshes::{Lists, Shared};
+use crate::scene::{Attributes, Bounds, Triangle, vertex_bits};
 
 /// Maximum size of a scene, metres.
 pub(super) const MAX_EXTENT: f64 = 1e18;
@@ -77,8 +77,7 @@ pub(super) fn measure(instances: &[MeshInstance<'_>], bounds: &mut WorldBounds) 
 
 /// Corners of the box around a primitive.
 fn corners_of_box(primitive: &MeshPrimitive) -> [DVec3; 8] {
-    let (min, max) = (primitive.positions.iter())
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), position| (min.min(*position), max.max(*position)));
+    let Bounds { min, max } = Bounds::around(primitive.positions.iter().copied());
     std::array::from_fn(|i| {
         let side = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };
         Vec3::new(side(0), side(1), side(2)).as_dvec3()
@@ -118,16 +117,16 @@ pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut N
             let to_scene = DMat4::from_translation(-center) * instance.world(i)?;
             let first = placed.triangles.len();
             let is_shared = instance.shared.contains(&true);
-            let added = if is_shared { placed.shared.add(instance, to_scene, &place_own) } else { None };
+            let added = if is_shared { placed.shared.add(instance, to_scene, &place_rigid) } else { None };
             of_instances += added.unwrap_or(0);
             for (primitive, shared) in instance.primitives.iter().zip(instance.shared) {
                 if *shared && added.is_some() {
                     continue;
                 }
                 if primitive.influences.is_empty() {
-                    place_rigid(primitive, to_scene, &mut placed);
+                    place_rigid(primitive, to_scene, (&mut placed.triangles, &mut placed.attributes));
                 } else {
-                    place_skinned(instance, primitive, center, &mut placed);
+                    place_skinned(instance, primitive, center, (&mut placed.triangles, &mut placed.attributes));
                 }
             }
             placed.triangles[first..].iter_mut().for_each(|triangle| triangle.object = instance.node as u32);
@@ -239,21 +238,8 @@ impl Move {
     }
 }
 
-/// Triangles of a primitive of a shared mesh.
-fn place_own(
-    primitive: &MeshPrimitive,
-    to_own: DMat4,
-    triangles: &mut Vec<Triangle>,
-    attributes: &mut Vec<Attributes>,
-) {
-    let mut own =
-        Placed { triangles: std::mem::take(triangles), attributes: std::mem::take(attributes), ..Placed::default() };
-    place_rigid(primitive, to_own, &mut own);
-    (*triangles, *attributes) = (own.triangles, own.attributes);
-}
-
 /// Triangles of one primitive with non-zero area.
-fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, placed: &mut Placed) {
+fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, into: Lists<'_>) {
     let all = Move::new(to_scene);
     let positions: Vec<Vec3> = primitive.positions.iter().map(|position| all.position(*position)).collect();
     let normals: Option<Vec<Vec3>> =
@@ -262,11 +248,11 @@ fn place_rigid(primitive: &MeshPrimitive, to_scene: DMat4, placed: &mut Placed) 
         let normals = normals.as_ref();
         (corners.map(|corner| positions[corner]), normals.map(|normals| corners.map(|corner| normals[corner])))
     };
-    add_triangles(primitive, |_| &all, of, placed);
+    add_triangles(primitive, |_| &all, of, into);
 }
 
 /// The same for a skin, whose joints transform each vertex separately.
-fn place_skinned(instance: &MeshInstance<'_>, primitive: &MeshPrimitive, center: DVec3, placed: &mut Placed) {
+fn place_skinned(instance: &MeshInstance<'_>, primitive: &MeshPrimitive, center: DVec3, into: Lists<'_>) {
     let vertices = 0..primitive.positions.len();
     let to_scene = |v| DMat4::from_translation(-center) * instance.matrix(primitive, v, DMat4::IDENTITY);
     let moves: Vec<Move> = vertices.map(|v| Move::new(to_scene(v))).collect();
@@ -275,7 +261,7 @@ fn place_skinned(instance: &MeshInstance<'_>, primitive: &MeshPrimitive, center:
         let normals = primitive.normals.as_deref();
         (corners.map(position), normals.map(|normals| corners.map(|v| moves[v].normal(normals[v]))))
     };
-    add_triangles(primitive, |v| &moves[v], of, placed);
+    add_triangles(primitive, |v| &moves[v], of, into);
 }
 
 /// Adds the triangles of a primitive with non-zero area. `of` gives their corners' positions and
@@ -284,7 +270,7 @@ fn add_triangles<'m>(
     primitive: &MeshPrimitive,
     moved: impl Fn(usize) -> &'m Move,
     of: impl Fn([usize; 3]) -> ([Vec3; 3], Option<[Vec3; 3]>),
-    placed: &mut Placed,
+    (triangles, attributes_of_corners): Lists<'_>,
 ) {
     for (i, corners) in primitive.corners.iter().enumerate() {
         // A mirroring transform reverses the winding; swapping two corners preserves the front
@@ -304,10 +290,10 @@ fn add_triangles<'m>(
             if let Some(tangents) = own.tangents(i, corners, order) {
                 attributes.tangents = [0, 1, 2].map(|k| moved(corners[k]).tangent(tangents[k], triangle.normals[k]));
             }
-            placed.attributes.push(attributes);
-            triangle.attributes = placed.attributes.len() as u32;
+            attributes_of_corners.push(attributes);
+            triangle.attributes = attributes_of_corners.len() as u32;
         }
-        placed.triangles.push(triangle);
+        triangles.push(triangle);
     }
 }
 

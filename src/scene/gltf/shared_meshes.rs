@@ -2,18 +2,21 @@
 
 use std::collections::{HashMap, HashSet};
 
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3};
 
 use super::mesh_cache::MeshInstance;
 use super::meshes::MeshPrimitive;
-use crate::scene::{Attributes, Instance, SharedMesh, Triangle};
+use crate::scene::{Attributes, Bounds, Instance, SharedMesh, Triangle};
 
 /// Largest product of the norms of a transform and its inverse: rounding of a ray on the way to the
 /// mesh is less than this many times that of its origin.
 const MAX_CONDITION: f64 = 1e4;
 
-/// Appends the triangles of a primitive, moved by a transform, and their attributes.
-type Place<'p> = &'p dyn Fn(&MeshPrimitive, DMat4, &mut Vec<Triangle>, &mut Vec<Attributes>);
+/// Triangles, and the attributes to which they refer by index plus one.
+pub(super) type Lists<'l> = (&'l mut Vec<Triangle>, &'l mut Vec<Attributes>);
+
+/// Appends the triangles of a primitive, moved by a transform.
+type Place<'p> = &'p dyn Fn(&MeshPrimitive, DMat4, Lists<'_>);
 
 /// Shared meshes and their places.
 #[derive(Debug, Default)]
@@ -37,8 +40,7 @@ struct Known {
 
 impl Shared {
     /// Adds a copy of a mesh and returns the number of its triangles; `None` if a transform like
-    /// that leaves too few digits. `place` appends the triangles of a primitive and their
-    /// attributes.
+    /// that leaves too few digits.
     pub(super) fn add(&mut self, copy: &MeshInstance<'_>, to_scene: DMat4, place: Place<'_>) -> Option<usize> {
         let linear = DMat3::from_mat4(to_scene);
         let norm = |m: DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -71,14 +73,11 @@ impl Shared {
             return *known;
         }
         let shown = || copy.primitives.iter().zip(copy.shared).filter(|(_, shared)| **shared).map(|(p, _)| p);
-        let positions = || shown().flat_map(|primitive| &primitive.positions);
-        let (min, max) = positions().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), position| {
-            (min.min(*position), max.max(*position))
-        });
+        let Bounds { min, max } = Bounds::around(shown().flat_map(|primitive| primitive.positions.iter().copied()));
         let center = if min.x <= max.x { 0.5 * (min.as_dvec3() + max.as_dvec3()) } else { DVec3::ZERO };
         let to_own = DMat4::from_scale(mirror) * DMat4::from_translation(-center);
         let mut triangles = Vec::new();
-        shown().for_each(|primitive| place(primitive, to_own, &mut triangles, &mut self.attributes));
+        shown().for_each(|primitive| place(primitive, to_own, (&mut triangles, &mut self.attributes)));
         let known = Known { index: self.meshes.len(), center };
         self.meshes.push(SharedMesh { triangles });
         self.known.insert((copy.mesh, is_mirrored), known);

@@ -9,6 +9,7 @@ use crate::{
 
 /// Triangles from which on a copy takes less memory than a mesh of its own.
 const MIN_TRIANGLES: usize = 64;
+
 /// Whether surfaces of a material may belong to instances. Lights and the surfaces of solids are
 /// listed one by one.
 pub(super) fn is_sharable(material: &Material) -> bool {

@@ -16,7 +16,7 @@ use caustica::{
     gpu::Gpu,
     progress::Silent,
     renderer::{Render, Session, render},
-    scene::{Camera, Light, LightKind, Material, Projection, Scene, Sphere, Surface, Triangle},
+    scene::{Camera, Instance, Light, LightKind, Material, Projection, Scene, Sphere, Surface, Triangle},
     settings::{EstimateSettings, Mode, Settings},
 };
 use glam::Vec3;
@@ -86,6 +86,22 @@ pub fn add_quad(scene: &mut Scene, corner: Vec3, a: Vec3, b: Vec3, material: u32
     for positions in [[corner, corner + a, corner + a + b], [corner, corner + a + b, corner + b]] {
         scene.triangles.push(Triangle::new(positions, normals, material));
     }
+}
+
+/// The scene with triangles for each of its instances.
+pub fn with_copies(scene: &Scene) -> Scene {
+    let of_instance = |instance: &Instance| {
+        let to_normal = instance.linear.inverse().transpose();
+        let copy = |triangle: &Triangle| Triangle {
+            positions: triangle.positions.map(|position| instance.position(position)),
+            normals: triangle.normals.map(|normal| (to_normal * normal).normalize_or_zero()),
+            object: instance.object,
+            ..*triangle
+        };
+        scene.meshes[instance.mesh as usize].triangles.iter().map(copy).collect::<Vec<_>>()
+    };
+    let all = scene.triangles.iter().copied().chain(scene.instances.iter().flat_map(of_instance));
+    Scene { triangles: all.collect(), instances: Vec::new(), meshes: Vec::new(), ..scene.clone() }
 }
 
 /// An axis-aligned box of six quads with outward normals.
