@@ -15,11 +15,13 @@ pub const INSTANCED_STACK: usize = 63;
 /// children, a leaf of the scene up to four instances, and the way back takes one entry.
 pub const TREE_HEIGHTS: u32 = 38;
 const _: () = assert!(3 * (TREE_HEIGHTS as usize / 2) + 4 < INSTANCED_STACK);
-/// Levels of an evenly split tree over so many primitives, at least 1, four in a leaf.
+
+/// Levels of an evenly split tree over so many primitives, four in a leaf; 0 for a single leaf.
 #[must_use]
 pub fn even_height(primitives: usize) -> u32 {
     primitives.div_ceil(4).next_power_of_two().trailing_zeros()
 }
+
 // The stacks of a workgroup's traversals fit the workgroup memory that every adapter has, 16 KiB.
 const _: () = assert!((INSTANCED_STACK + 1) * WORKGROUP_SIZE as usize * 4 <= 16 << 10 && BVH_STACK < INSTANCED_STACK);
 /// Maximum of the weight by which an interpolated normal changes flux; it grows without bound

@@ -163,6 +163,7 @@ fn assemble(
     warnings.into_iter().for_each(|warning| notes.add(warning));
     (scene.triangles, scene.attributes, scene.shells) = (triangles, attributes, shells);
     (scene.meshes, scene.instances) = (shared.meshes, shared.instances);
+    sharing::check_heights(&scene)?;
     name_objects(root, &mut scene);
     doubled_lamps::remove(&mut scene, &mut notes);
     placing::turn_tangents(&scene.triangles, &mut scene.attributes);

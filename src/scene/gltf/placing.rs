@@ -5,6 +5,7 @@ use std::{collections::HashMap, ops::Range};
 use glam::{DMat3, DMat4, DVec3, Vec3, Vec4};
 
 use super::fault::{Notes, Read, fault};
+use super::memory;
 use super::mesh_cache::MeshInstance;
 use super::meshes::MeshPrimitive;
 use super::shared_meshes::{Lists, Shared};
@@ -119,6 +120,9 @@ pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut N
             let is_shared = instance.shared.contains(&true);
             let added = if is_shared { placed.shared.add(instance, to_scene, &place_rigid) } else { None };
             of_instances += added.unwrap_or(0);
+            if is_shared && added.is_none() {
+                check_copy(instance, &placed)?;
+            }
             for (primitive, shared) in instance.primitives.iter().zip(instance.shared) {
                 if *shared && added.is_some() {
                     continue;
@@ -140,6 +144,19 @@ pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut N
         notes.add(format!("{dropped} of {claimed} triangles have no area and are not drawn"));
     }
     Ok(placed.without_copies(notes))
+}
+
+/// Refuses a copy of a shared mesh that has to have triangles of its own, if there is no memory for
+/// them: room was made for the others alone.
+fn check_copy(copy: &MeshInstance<'_>, placed: &Placed) -> Read<()> {
+    let sum = |of: fn(&MeshPrimitive) -> bool| -> usize {
+        copy.primitives.iter().filter(|p| of(p)).map(|p| p.corners.len()).sum()
+    };
+    let triangles = placed.triangles.len() + sum(|_| true);
+    if triangles <= placed.triangles.capacity() {
+        return Ok(());
+    }
+    memory::check(triangles, placed.attributes.len() + sum(|p| p.attributes.is_some()))
 }
 
 impl Placed {
