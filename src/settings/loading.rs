@@ -37,7 +37,7 @@ impl Default for LoadOptions {
             scene: None,
             variant: None,
             texture_size: None,
-            caustic_roughness: 0.35,
+            caustic_roughness: 0.45,
             single_scattering: false,
             allow_outside: false,
             ignore_required: Vec::new(),
