@@ -14,9 +14,13 @@ use crate::{
     scene::Bounds,
 };
 
-/// Boxes that a ray through the scene meets on average, at which splitting begins: the sum of the
-/// areas of all boxes over that of the box around them.
-const CROWDED: f32 = 500.0;
+/// Boxes of triangles that hold the middle of a triangle on average, at which splitting begins.
+/// Meshes have a handful. Where these are all that a ray meets, however large the rest of the scene
+/// is, a ray that leaves one of them visits as many.
+const CROWDED: f32 = 200.0;
+/// Triangles whose middles are looked at, and boxes that are, at most.
+const MIDDLES: usize = 256;
+const BOXES: usize = 1 << 14;
 /// Largest number of boxes of a primitive on average, and of all that splitting adds.
 const PIECES: usize = 32;
 const MAX_ADDED: usize = 2_000_000;
@@ -50,10 +54,8 @@ impl Ord for Piece {
 
 /// The boxes of all primitives, whose whole boxes are given, each with the index of its primitive.
 pub(super) fn pieces(primitives: &[Primitive], whole: Vec<Bounds>) -> (Vec<Bounds>, Vec<u32>) {
-    let all = whole.iter().copied().fold(Bounds::EMPTY, Bounds::union);
-    let crowd = whole.iter().map(|bounds| bounds.half_area()).sum::<f32>() / all.half_area();
     let mut indices: Vec<u32> = (0..primitives.len() as u32).collect();
-    if !crowd.is_finite() || crowd < CROWDED {
+    if crowd(primitives, &whole) < CROWDED {
         return (whole, indices);
     }
     let piece = |(bounds, primitive): (&Bounds, &u32)| Piece {
@@ -82,10 +84,24 @@ pub(super) fn pieces(primitives: &[Primitive], whole: Vec<Bounds>) -> (Vec<Bound
     (done.iter().map(|piece| piece.bounds).collect(), indices)
 }
 
+/// Mean number of boxes of triangles that hold the middle of the box of one, by a sample of both.
+fn crowd(primitives: &[Primitive], whole: &[Bounds]) -> f32 {
+    let all: Vec<&Bounds> = primitives.iter().zip(whole).filter(|(p, _)| is_triangle(p)).map(|(_, b)| b).collect();
+    let spread = |most: usize| all.iter().step_by(all.len().div_ceil(most).max(1));
+    let boxes: Vec<&Bounds> = spread(BOXES).copied().collect();
+    let holding = |middle: Vec3| boxes.iter().filter(|b| b.min.cmple(middle).all() && b.max.cmpge(middle).all()).count();
+    let found: usize = spread(MIDDLES).map(|b| holding(0.5 * (b.min + b.max))).sum();
+    found as f32 / spread(MIDDLES).len().max(1) as f32 * (all.len() as f32 / boxes.len().max(1) as f32)
+}
+
+fn is_triangle(primitive: &Primitive) -> bool {
+    primitive.material & SPHERE_BIT == 0 && primitive.emitter != INSTANCE
+}
+
 /// The boxes of the parts of a triangle on both sides of the middle of its box; `None` where that
 /// gains nothing.
 fn halves(piece: &Piece, primitive: &Primitive) -> Option<[Piece; 2]> {
-    if primitive.material & SPHERE_BIT != 0 || primitive.emitter == INSTANCE {
+    if !is_triangle(primitive) {
         return None;
     }
     let size = piece.bounds.max - piece.bounds.min;

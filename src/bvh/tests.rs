@@ -208,6 +208,10 @@ fn crossing_needles_are_split_and_all_found() {
     ids.dedup();
     assert_eq!(ids.len(), scene.triangles.len());
     assert_eq!(mismatches(&bvh, 300), 0);
+    let mut on_a_floor = scene.clone();
+    on_a_floor.triangles.push(triangle([Vec3::new(-99.0, -1.0, -99.0), Vec3::new(99.0, -1.0, -99.0), Vec3::NEG_Y]));
+    let with_floor = Bvh::build(&on_a_floor).primitives.len();
+    assert!(with_floor > 10 * scene.triangles.len(), "{with_floor} pieces on a large floor");
     let few = Bvh::build(&needles(100));
     assert_eq!(few.primitives.len(), 100, "control: where little crosses nothing is split");
 }

@@ -148,8 +148,10 @@ fn memory_is_bounded_by_photons_alone() {
     assert!(few <= bound(1000), "{few} bytes for 1 k photons");
     assert!(many <= bound(500_000), "{many} bytes for 500 k photons");
     assert!(many > per_photon * 500_000 / 10, "control: {many} bytes are too few to be true");
-    let full_tile = peak(1000, 200, 1);
-    let (large, deep) = (peak(1000, 300, 1), peak(1000, 64, 16));
+    // Pictures that fill a tile.
+    let side = |of_small_tiles: f64| (of_small_tiles * (gpu.batch as f64 / 65_536.0).sqrt()) as u32;
+    let full_tile = peak(1000, side(200.0), 1);
+    let (large, deep) = (peak(1000, side(300.0), 1), peak(1000, side(64.0), 16));
     assert!(large <= full_tile && deep <= full_tile, "device memory grows: {large} by --size, {deep} by --spp");
     assert!(full_tile <= bound(1000), "{full_tile} bytes for 1 k photons");
 }
