@@ -89,7 +89,8 @@ fn crowd(primitives: &[Primitive], whole: &[Bounds]) -> f32 {
     let all: Vec<&Bounds> = primitives.iter().zip(whole).filter(|(p, _)| is_triangle(p)).map(|(_, b)| b).collect();
     let spread = |most: usize| all.iter().step_by(all.len().div_ceil(most).max(1));
     let boxes: Vec<&Bounds> = spread(BOXES).copied().collect();
-    let holding = |middle: Vec3| boxes.iter().filter(|b| b.min.cmple(middle).all() && b.max.cmpge(middle).all()).count();
+    let holding =
+        |middle: Vec3| boxes.iter().filter(|b| b.min.cmple(middle).all() && b.max.cmpge(middle).all()).count();
     let found: usize = spread(MIDDLES).map(|b| holding(0.5 * (b.min + b.max))).sum();
     found as f32 / spread(MIDDLES).len().max(1) as f32 * (all.len() as f32 / boxes.len().max(1) as f32)
 }

@@ -135,6 +135,13 @@ impl Gpu {
         })
     }
 
+    /// Has rays stop after that many nodes and primitives, to go on in later dispatches: for tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_trace_budget(self, visits: u32) -> Self {
+        Self { trace_budget: visits, ..self }
+    }
+
     /// Number of dispatches recorded so far; each chunk of a cut one counts.
     #[must_use]
     pub fn dispatches(&self) -> u64 {

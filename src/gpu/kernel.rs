@@ -63,6 +63,16 @@ impl Kernel {
         self
     }
 
+    /// The kernel with another value of one of its `override` constants.
+    #[must_use]
+    pub fn with_constant(&self, gpu: &Gpu, name: &'static str, value: f64) -> Self {
+        let others = self.program.constants.iter().filter(|(n, _)| *n != name);
+        let constants = others.copied().chain([(name, value)]).collect();
+        let layout = &gpu.submissions.chunks.layout;
+        let program = gpu.compiler.program(&gpu.device, layout, self.program.shader, constants);
+        Self { program, tables: self.tables.clone() }
+    }
+
     /// Binds buffers by the names of the shader's variables. Names that only other kernels use are
     /// passed over, so that one list serves several kernels.
     ///

@@ -13,7 +13,7 @@ use super::{
 #[derive(Debug)]
 pub(super) struct Program {
     pub shader: &'static Shader,
-    constants: Vec<(&'static str, f64)>,
+    pub constants: Vec<(&'static str, f64)>,
     device: wgpu::Device,
     chunk_layout: wgpu::BindGroupLayout,
     compiled: OnceLock<Compiled>,

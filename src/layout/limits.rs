@@ -32,3 +32,14 @@ pub const MAX_NORMAL_WEIGHT: f32 = 8.0;
 pub const OFFSET_SCALE: f32 = 1.907_348_6e-6;
 /// Words of a set of media, one bit for each slot of [`crate::scene::Solids`].
 pub const MEDIA_WORDS: usize = 4;
+
+/// Words before the list of paths or points with late rays, the first two of which are the first
+/// entry of the slice that goes on, and its number of entries.
+pub const LATE_HEADER: u32 = 4;
+/// Entries of a slice at most.
+pub const LATE_SLICE: u32 = 1024;
+/// Words that are kept of a late ray: where it stopped, and its stack.
+pub const LATE_RAY: u32 = 80;
+/// Words that are kept of an entry: whether it is done, and two rays.
+pub const LATE_WORDS: u32 = 1 + 2 * LATE_RAY;
+const _: () = assert!(INSTANCED_STACK + 16 <= LATE_RAY as usize);

@@ -2,6 +2,7 @@
 //! paths is compacted between dispatches. It traces photons, camera paths and rays of final
 //! gathering. Kernel: `advance_queue`.
 
+use super::late_rays::LateRays;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
@@ -26,6 +27,8 @@ pub struct Wavefront {
     /// One [`Counters`], cleared by each run.
     pub counters: Buffer,
     dispatch_arguments: Buffer,
+    /// Paths whose rays need more than one dispatch.
+    late_rays: LateRays,
 }
 
 /// A kernel and the buffers that it uses besides the scene and those of the wavefront, by name.
@@ -36,23 +39,25 @@ pub struct Step<'b> {
 }
 
 impl Wavefront {
-    /// Room for `slots` paths; `name` is in the labels of its buffers.
+    /// Room for `slots` paths in a scene; `name` is in the labels of its buffers.
     ///
     /// # Errors
     /// Limits of the adapter.
-    pub fn new(gpu: &Gpu, name: &str, slots: u64) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, name: &str, slots: u64) -> Result<Self> {
         Ok(Self {
             advance: Kernel::new(gpu, "advance_queue", &[]),
             paths: gpu.storage::<Path>(&format!("{name} paths"), slots)?,
             queues: gpu.storage::<u32>(&format!("{name} queues"), 2 * slots)?,
             counters: gpu.storage::<Counters>(&format!("{name} counters"), 1)?,
             dispatch_arguments: gpu.storage::<[u32; 3]>(&format!("{name} dispatch arguments"), 1)?,
+            late_rays: LateRays::new(gpu, scene, slots)?,
         })
     }
 
     /// Starts paths by `start` in that many invocations, then moves them on by `steps`, one after
     /// the other over the same paths, until none is left or each has met the second number of
     /// surfaces; few are expected to meet more than the first. At most `most_paths` live at once.
+    /// [`Counters::unfinished`] of the result are the rays that are given up.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -71,7 +76,7 @@ impl Wavefront {
         let mut encoder = gpu.encoder();
         encoder.clear_buffer(&self.counters, 0, None);
         start.kernel.dispatch(&mut encoder, &bind(start), invocations);
-        let mut surfaces = 0;
+        let (mut surfaces, mut given_up) = (0, 0);
         loop {
             let until = if surfaces < expected_surfaces { expected_surfaces } else { most_surfaces };
             let most = if surfaces == 0 { FIRST_SURFACES } else { SURFACES_PER_SUBMISSION };
@@ -85,7 +90,14 @@ impl Wavefront {
             gpu.submit(encoder);
             let counters: Counters = gpu.read(&self.counters, 0, 1)?[0];
             if counters.next == 0 || surfaces >= most_surfaces {
-                return Ok(counters);
+                if counters.unfinished == 0 {
+                    return Ok(Counters { unfinished: given_up, ..counters });
+                }
+                // Late paths go on where they are; the bound of surfaces is that of each of them.
+                let late = |step: &Step| LateRays::kernel(gpu, step.kernel, &self.bindings(scene, step.buffers));
+                let kernels: Vec<_> = steps.iter().map(late).collect();
+                given_up += self.late_rays.finish(gpu, &self.counters, counters.unfinished, &kernels)?;
+                surfaces = 0;
             }
             encoder = gpu.encoder();
         }
@@ -98,6 +110,7 @@ impl Wavefront {
             ("queues", &self.queues),
             ("counters", &self.counters),
             ("dispatch_arguments", &self.dispatch_arguments),
+            self.late_rays.binding(),
         ];
         scene.with(&[&own, others].concat())
     }

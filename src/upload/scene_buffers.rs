@@ -23,6 +23,9 @@ use crate::{
     settings::{LightSettings, Sampler},
 };
 
+/// Kernels of which an invocation traces two rays, each by half of the loops.
+const TWO_RAYS: [&str; 2] = ["light_lobes", "sample_emitters"];
+
 /// The scene's buffers.
 #[derive(Debug)]
 pub struct SceneBuffers {
@@ -38,6 +41,7 @@ pub struct SceneBuffers {
     stack: usize,
     /// Nodes and primitives: no ray visits more.
     visits: u32,
+    no_late_rays: Arc<Buffer>,
     /// Ranks of primitives that lie in each other.
     contacts: Arc<Contacts>,
     /// Some solid absorbs light.
@@ -121,6 +125,7 @@ impl SceneBuffers {
             instances: Table::new(gpu, "instances", &bvh.instances)?,
             has_instances: !bvh.instances.is_empty(),
             visits: visits(bvh),
+            no_late_rays: Arc::new(gpu.storage::<u32>("no late rays", 1)?),
             contacts,
             has_lobes: scene.has_lobes(),
             splits: scene
@@ -151,9 +156,16 @@ impl SceneBuffers {
             instances: self.instances.clone(),
             solids: self.solids.clone(),
             contacts: Arc::clone(&self.contacts),
+            no_late_rays: Arc::clone(&self.no_late_rays),
             lights,
             ..*self
         })
+    }
+
+    /// Whether a ray may visit more than an invocation can.
+    #[must_use]
+    pub fn has_late_rays(&self, gpu: &Gpu) -> bool {
+        self.visits > gpu.trace_budget / 2
     }
 
     /// Compiles a kernel that uses the scene.
@@ -194,8 +206,9 @@ impl SceneBuffers {
         overrides.extend_from_slice(others);
         // After those of the caller, which has the say. Few values, so that few kernels are
         // compiled.
-        let budget = self.visits.next_power_of_two().clamp(SHORT_LOOPS, gpu.trace_budget);
-        overrides.push(("TRACE_BUDGET", f64::from(budget)));
+        let budget = self.visits.next_power_of_two().max(SHORT_LOOPS).min(gpu.trace_budget);
+        let rays = if TWO_RAYS.contains(&shader.stem) { 2 } else { 1 };
+        overrides.push(("TRACE_BUDGET", f64::from(budget / rays)));
         let [light_nodes, pixels, cells, rows] = self.lights.tables();
         let own = [("normals", &self.normals), ("media_table", &self.media), ("instances", &self.instances)];
         let high = [("nodes_high", &self.nodes.high), ("primitives_high", &self.primitives.high)];
@@ -204,12 +217,15 @@ impl SceneBuffers {
         Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }
 
-    /// The scene's variables, followed by others.
+    /// The scene's variables, followed by others. Kernels of which nobody finishes late rays list
+    /// them nowhere.
     #[must_use]
     pub fn with<'a>(&'a self, others: &[(&'a str, &'a Buffer)]) -> Vec<(&'a str, &'a Buffer)> {
         let mut all = vec![("nodes", &self.nodes.low), ("primitives", &self.primitives.low)];
         all.extend(self.lights.bindings());
         all.extend_from_slice(others);
+        // The first of a name is bound.
+        all.push(("late_rays", &self.no_late_rays));
         all
     }
 }

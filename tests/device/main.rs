@@ -8,6 +8,7 @@ mod faults;
 mod fresnel;
 mod gloss;
 mod kd_tree;
+mod late_rays;
 mod layers;
 mod light_sampling;
 mod light_tree;

@@ -16,6 +16,7 @@ use crate::{
     layout::{self, CameraTile, Counters, FirstHit, Gathered, LobePoint, MARGIN_SAMPLES, PixelSums, VisiblePoint},
     passes::{
         estimate::SharedPoints,
+        late_rays::LateRays,
         wavefront::{Step, Wavefront},
     },
     scene::Camera,
@@ -70,6 +71,8 @@ impl CameraKernels {
 pub struct CameraTracer {
     kernels: CameraKernels,
     wavefront: Wavefront,
+    /// Points whose rays to lights need more than one dispatch.
+    late_points: LateRays,
     /// A [`VisiblePoint`] per path slot; some slots have no point.
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
@@ -116,7 +119,8 @@ impl CameraTracer {
         let slots = samples * u64::from(branches);
         Ok(Self {
             kernels: CameraKernels::new(gpu, scene, photons, picture.light_samples),
-            wavefront: Wavefront::new(gpu, "camera", slots)?,
+            wavefront: Wavefront::new(gpu, scene, "camera", slots)?,
+            late_points: LateRays::new(gpu, scene, slots)?,
             points: gpu.storage::<VisiblePoint>("visible points", slots)?,
             radiance: gpu.storage::<[f32; 4]>("radiance", slots)?,
             gathered: gpu.storage::<Gathered>("gathered", room)?,
@@ -308,18 +312,25 @@ impl CameraTracer {
         (points, radiance, count): (&Buffer, &Buffer, u32),
     ) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", view);
-        let counters = ("counters", &self.wavefront.counters);
-        let buffers = [("tile", &uniform), ("points", points), ("radiance", radiance), counters];
+        let (counters, late) = (("counters", &self.wavefront.counters), &self.late_points);
+        let buffers = [("tile", &uniform), ("points", points), ("radiance", radiance), counters, late.binding()];
         let (steps, points) = (direct.steps(scene), count);
         let mut count = StepCount::default();
-        for first in (0..steps).step_by(DIRECT_STEPS_PER_READ as usize) {
+        let at_once = if scene.has_late_rays(gpu) { 1 } else { DIRECT_STEPS_PER_READ };
+        for first in (0..steps).step_by(at_once as usize) {
             let mut encoder = gpu.encoder();
             encoder.clear_buffer(&self.wavefront.counters, 0, None);
-            for step in first..steps.min(first + DIRECT_STEPS_PER_READ) {
+            for step in first..steps.min(first + at_once) {
                 direct.add(gpu, scene, &mut encoder, (step, points), &buffers);
             }
             gpu.submit(encoder);
-            let counters: Counters = gpu.read(&self.wavefront.counters, 0, 1)?[0];
+            let mut counters: Counters = gpu.read(&self.wavefront.counters, 0, 1)?[0];
+            if counters.unfinished > 0 {
+                let kernel = direct.late(gpu, scene, (first, points), &buffers);
+                let given_up = late.finish(gpu, &self.wavefront.counters, counters.unfinished, &[kernel])?;
+                counters = gpu.read(&self.wavefront.counters, 0, 1)?[0];
+                counters.unfinished = given_up;
+            }
             count += StepCount { rays: u64::from(counters.shadow_rays), ..StepCount::from(counters) };
         }
         Ok(count)

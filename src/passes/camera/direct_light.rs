@@ -2,8 +2,9 @@
 //! other lights.
 
 use crate::{
-    gpu::{Buffer, Commands, Gpu, Kernel},
+    gpu::{Bindings, Buffer, Commands, Gpu, Kernel},
     layout::{DirectLight, EmitterSample},
+    passes::late_rays::LateRays,
     settings::Sampler,
     upload::{SceneBuffers, sampler_constant},
 };
@@ -32,7 +33,7 @@ impl DirectLighting {
     }
 
     /// Adds the direct light of one step to the radiance of the points. `buffers` are `tile`,
-    /// `points`, `radiance` and `counters`.
+    /// `points`, `radiance`, `counters` and `late_rays`.
     pub fn add(
         &self,
         gpu: &Gpu,
@@ -41,16 +42,37 @@ impl DirectLighting {
         (step, points): (u32, u32),
         buffers: &[(&str, &Buffer)],
     ) {
-        let table = &scene.lights.table;
-        if let Some(&light) = table.summed.get(step as usize) {
-            let uniform = gpu.uniform("direct light", &DirectLight { light, points, ..Default::default() });
-            let bindings = self.punctual.bind(gpu, &[&scene.with(buffers)[..], &[("direct", &uniform)]].concat());
-            return self.punctual.dispatch(commands, &bindings, u64::from(points));
-        }
-        let Some((kernel, samples)) = &self.sampled else { return };
-        let (sample, samples, roots) = (step - table.summed.len() as u32, *samples, table.sampled_roots);
-        let uniform = gpu.uniform("emitter sample", &EmitterSample { points, sample, samples, roots });
-        let bindings = kernel.bind(gpu, &[&scene.with(buffers)[..], &[("sampling", &uniform)]].concat());
+        let (kernel, uniform) = self.step(gpu, scene, (step, points));
+        let bindings = kernel.bind(gpu, &[&scene.with(buffers)[..], &[(uniform.0, &uniform.1)]].concat());
         kernel.dispatch(commands, &bindings, u64::from(points));
+    }
+
+    /// The kernel of a step that goes on with late rays.
+    pub fn late(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        (step, points): (u32, u32),
+        buffers: &[(&str, &Buffer)],
+    ) -> (Kernel, Bindings) {
+        let (kernel, uniform) = self.step(gpu, scene, (step, points));
+        LateRays::kernel(gpu, kernel, &[&scene.with(buffers)[..], &[(uniform.0, &uniform.1)]].concat())
+    }
+
+    /// The kernel of a step, and its uniform by name.
+    fn step(&self, gpu: &Gpu, scene: &SceneBuffers, (step, points): (u32, u32)) -> (&Kernel, (&'static str, Buffer)) {
+        let table = &scene.lights.table;
+        match (table.summed.get(step as usize), &self.sampled) {
+            (None, Some((kernel, samples))) => {
+                let (sample, samples, roots) = (step - table.summed.len() as u32, *samples, table.sampled_roots);
+                let sampling = EmitterSample { points, sample, samples, roots };
+                (kernel, ("sampling", gpu.uniform("emitter sample", &sampling)))
+            }
+            (light, _) => {
+                let light = *light.expect("one of the steps");
+                let direct = DirectLight { light, points, ..Default::default() };
+                (&self.punctual, ("direct", gpu.uniform("direct light", &direct)))
+            }
+        }
     }
 }

@@ -117,10 +117,10 @@ impl PhotonKernels {
 
 impl BatchBuffers {
     /// Buffers for batches of up to `paths` paths, from `named` named lights.
-    pub fn new(gpu: &Gpu, paths: u64, named: usize) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, paths: u64, named: usize) -> Result<Self> {
         let staging_capacity = (paths * STAGED_PER_PATH).max(2 * u64::from(MAX_BOUNCES));
         Ok(Self {
-            wavefront: Wavefront::new(gpu, "photon", paths)?,
+            wavefront: Wavefront::new(gpu, scene, "photon", paths)?,
             staged: gpu.storage::<Photon>("staged photons", staging_capacity)?,
             staged_keys: gpu.storage::<u32>("keys of staged photons", staging_capacity)?,
             counts: gpu.storage::<u32>("photon counts", paths * u64::from(MAP_KINDS))?,

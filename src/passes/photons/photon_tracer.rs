@@ -145,7 +145,7 @@ impl PhotonTracer {
         let busy = MIN_BATCH.min((BATCH_PER_PHOTON * largest).next_power_of_two());
         let batch_limit = (largest / 4).clamp(busy, MAX_BATCH).min(max_paths.max(1));
         let named = scene.lights.table.named.len();
-        let buffers = BatchBuffers::new(gpu, batch_limit, named)?;
+        let buffers = BatchBuffers::new(gpu, scene, batch_limit, named)?;
         for plan in plans(scene, settings, caustics, paths) {
             let enough =
                 paths_that_matter(scene.lights.enclosure, largest).filter(|_| plan.is_for_little_light(settings));

@@ -1,0 +1,90 @@
+//! Rays that need more than the loop budget of an invocation: they go on in further dispatches.
+//!
+//! A kernel lists the paths or points with such rays. It then runs again for a slice of the list at
+//! a time, as often as its rays take: each is kept where it stopped. What a ray finds does not
+//! depend on where it stopped, nor on the order of the list.
+
+use std::mem::offset_of;
+
+use crate::{
+    error::Result,
+    gpu::{Bindings, Buffer, Gpu, Kernel},
+    layout::{Counters, LATE_HEADER, LATE_SLICE, LATE_WORDS},
+    upload::SceneBuffers,
+};
+
+/// Dispatches of one slice at most. A ray moves on by thousands of nodes in each.
+const MOST_DISPATCHES: u32 = 1 << 16;
+/// Words that are kept for all entries of a slice.
+const KEPT_WORDS: u64 = (LATE_SLICE * LATE_WORDS) as u64;
+const WORD: u64 = size_of::<u32>() as u64;
+
+/// The list, and what is kept of the rays of a slice.
+#[derive(Debug)]
+pub struct LateRays {
+    buffer: Buffer,
+    /// Number of entries that the list has room for.
+    room: u64,
+}
+
+impl LateRays {
+    /// Room for as many paths or points, if rays of the scene can be late.
+    ///
+    /// # Errors
+    /// Limits of the adapter.
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, room: u64) -> Result<Self> {
+        let (room, kept) = if scene.has_late_rays(gpu) { (room, KEPT_WORDS) } else { (0, 0) };
+        Ok(Self { buffer: gpu.storage::<u32>("late rays", u64::from(LATE_HEADER) + room + kept)?, room })
+    }
+
+    /// The binding of kernels that list or finish late rays.
+    #[must_use]
+    pub fn binding(&self) -> (&str, &Buffer) {
+        ("late_rays", &self.buffer)
+    }
+
+    /// Traces the rays of the first `listed` entries to their ends: of each slice of the list, those
+    /// of one kernel after the other, as [`Self::kernel`] gives them. Leaves
+    /// [`Counters::unfinished`] 0, and returns how many rays are given up.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn finish(&self, gpu: &Gpu, counters: &Buffer, listed: u32, kernels: &[(Kernel, Bindings)]) -> Result<u32> {
+        let entries = u64::from(listed).min(self.room) as u32;
+        let mut given_up = listed - entries;
+        let unfinished = offset_of!(Counters, unfinished) as u64;
+        for first in (0..entries).step_by(LATE_SLICE as usize) {
+            let count = LATE_SLICE.min(entries - first);
+            gpu.write(&self.buffer, 0, &[first, count]);
+            for (kernel, bindings) in kernels {
+                let mut pending = count;
+                for dispatch in 0..MOST_DISPATCHES {
+                    let mut encoder = gpu.encoder();
+                    if dispatch == 0 {
+                        encoder.clear_buffer(&self.buffer, (u64::from(LATE_HEADER) + self.room) * WORD, None);
+                    }
+                    encoder.clear_buffer(counters, unfinished, Some(WORD));
+                    kernel.dispatch(&mut encoder, bindings, count.into());
+                    gpu.submit(encoder);
+                    pending = gpu.read::<u32>(counters, unfinished / WORD, 1)?[0];
+                    if pending == 0 {
+                        break;
+                    }
+                }
+                given_up += pending;
+            }
+        }
+        let mut encoder = gpu.encoder();
+        encoder.clear_buffer(counters, unfinished, Some(WORD));
+        gpu.submit(encoder);
+        Ok(given_up)
+    }
+
+    /// The variant of a kernel that goes on with late rays, with its buffers.
+    #[must_use]
+    pub fn kernel(gpu: &Gpu, kernel: &Kernel, buffers: &[(&str, &Buffer)]) -> (Kernel, Bindings) {
+        let variant = kernel.with_constant(gpu, "GOES_ON", 1.0);
+        let bindings = variant.bind(gpu, buffers);
+        (variant, bindings)
+    }
+}
