@@ -168,7 +168,7 @@ pub struct Stats {
     pub lost_camera_paths: f64,
     /// Times that more solids met in one place than are told apart.
     pub media_overflows: u64,
-    /// Rays abandoned when the loop budget was spent; their light is lost.
+    /// Rays given up: late ones for which there was no room, none on software; their light is lost.
     pub unfinished_rays: u64,
     /// Infinite or NaN values that were left out.
     #[serde(default)]

@@ -25,11 +25,22 @@ const BOXES: usize = 1 << 14;
 const PIECES: usize = 32;
 const MAX_ADDED: usize = 2_000_000;
 
+/// Triangles that are split for a trial, at most, and by how much that has to thin them out.
+const TRIED: usize = 2048;
+const GAIN: f32 = 4.0;
+
 /// A box of a primitive, ordered by area.
+#[derive(Clone, Copy)]
 struct Piece {
     area: f32,
     bounds: Bounds,
     primitive: u32,
+}
+
+impl Piece {
+    fn new(bounds: Bounds, primitive: u32) -> Self {
+        Self { area: bounds.half_area(), bounds, primitive }
+    }
 }
 
 impl PartialEq for Piece {
@@ -54,17 +65,44 @@ impl Ord for Piece {
 
 /// The boxes of all primitives, whose whole boxes are given, each with the index of its primitive.
 pub(super) fn pieces(primitives: &[Primitive], whole: Vec<Bounds>) -> (Vec<Bounds>, Vec<u32>) {
-    let mut indices: Vec<u32> = (0..primitives.len() as u32).collect();
-    if crowd(primitives, &whole) < CROWDED {
-        return (whole, indices);
+    let all: Vec<Piece> = whole.iter().zip(0..).map(|(bounds, i)| Piece::new(*bounds, i)).collect();
+    let is_triangle = |piece: &&Piece| is_triangle(&primitives[piece.primitive as usize]);
+    let triangles: Vec<Piece> = all.iter().filter(is_triangle).copied().collect();
+    if crowd(&triangles) < CROWDED || !gains(primitives, &triangles) {
+        return (whole, (0..primitives.len() as u32).collect());
     }
-    let piece = |(bounds, primitive): (&Bounds, &u32)| Piece {
-        area: bounds.half_area(),
-        bounds: *bounds,
-        primitive: *primitive,
-    };
-    let mut heap: BinaryHeap<Piece> = whole.iter().zip(&indices).map(piece).collect();
     let most = whole.len() + (whole.len() * (PIECES - 1)).min(MAX_ADDED);
+    let mut done = split(primitives, all, most);
+    // In the order of the primitives, so that the tree does not depend on that of the heap.
+    done.sort_by(|a, b| {
+        let corner = |piece: &Piece| piece.bounds.min.to_array().map(f32::to_bits);
+        a.primitive.cmp(&b.primitive).then_with(|| corner(a).cmp(&corner(b)))
+    });
+    (done.iter().map(|piece| piece.bounds).collect(), done.iter().map(|piece| piece.primitive).collect())
+}
+
+/// Mean number of boxes that hold the middle of one of them, by a sample of both.
+fn crowd(all: &[Piece]) -> f32 {
+    let spread = |most: usize| all.iter().step_by(all.len().div_ceil(most).max(1)).map(|piece| piece.bounds);
+    let boxes: Vec<Bounds> = spread(BOXES).collect();
+    let holds = |b: &Bounds, middle: Vec3| b.min.cmple(middle).all() && b.max.cmpge(middle).all();
+    let holding = |middle: Vec3| boxes.iter().filter(|b| holds(b, middle)).count();
+    let found: usize = spread(MIDDLES).map(|b| holding(0.5 * (b.min + b.max))).sum();
+    found as f32 / spread(MIDDLES).len().max(1) as f32 * (all.len() as f32 / boxes.len().max(1) as f32)
+}
+
+/// Whether splitting thins out the crowd of triangles, by a sample of these: it does not where they
+/// lie in each other.
+fn gains(primitives: &[Primitive], triangles: &[Piece]) -> bool {
+    let sample: Vec<Piece> = triangles.iter().step_by(triangles.len().div_ceil(TRIED)).copied().collect();
+    let before = crowd(&sample);
+    let most = PIECES * sample.len();
+    crowd(&split(primitives, sample, most)) < before / GAIN
+}
+
+/// Halves the largest boxes until there are `most`.
+fn split(primitives: &[Primitive], boxes: Vec<Piece>, most: usize) -> Vec<Piece> {
+    let mut heap = BinaryHeap::from(boxes);
     let mut done = Vec::new();
     while heap.len() + done.len() < most {
         let Some(largest) = heap.pop() else { break };
@@ -74,25 +112,7 @@ pub(super) fn pieces(primitives: &[Primitive], whole: Vec<Bounds>) -> (Vec<Bound
         }
     }
     done.extend(heap.into_vec());
-    // In the order of the primitives, so that the tree does not depend on that of the heap.
-    done.sort_by(|a, b| {
-        let corner = |piece: &Piece| piece.bounds.min.to_array().map(f32::to_bits);
-        a.primitive.cmp(&b.primitive).then_with(|| corner(a).cmp(&corner(b)))
-    });
-    indices.clear();
-    indices.extend(done.iter().map(|piece| piece.primitive));
-    (done.iter().map(|piece| piece.bounds).collect(), indices)
-}
-
-/// Mean number of boxes of triangles that hold the middle of the box of one, by a sample of both.
-fn crowd(primitives: &[Primitive], whole: &[Bounds]) -> f32 {
-    let all: Vec<&Bounds> = primitives.iter().zip(whole).filter(|(p, _)| is_triangle(p)).map(|(_, b)| b).collect();
-    let spread = |most: usize| all.iter().step_by(all.len().div_ceil(most).max(1));
-    let boxes: Vec<&Bounds> = spread(BOXES).copied().collect();
-    let holding =
-        |middle: Vec3| boxes.iter().filter(|b| b.min.cmple(middle).all() && b.max.cmpge(middle).all()).count();
-    let found: usize = spread(MIDDLES).map(|b| holding(0.5 * (b.min + b.max))).sum();
-    found as f32 / spread(MIDDLES).len().max(1) as f32 * (all.len() as f32 / boxes.len().max(1) as f32)
+    done
 }
 
 fn is_triangle(primitive: &Primitive) -> bool {
@@ -119,8 +139,7 @@ fn halves(piece: &Piece, primitive: &Primitive) -> Option<[Piece; 2]> {
     });
     sides[0].max[axis] = sides[0].max[axis].min(middle);
     sides[1].min[axis] = sides[1].min[axis].max(middle);
-    let areas = sides.map(|side| side.half_area());
     let valid = sides.iter().all(|side| side.min.cmple(side.max).all());
-    let made = |i: usize| Piece { area: areas[i], bounds: sides[i], primitive: piece.primitive };
-    (valid && areas[0] + areas[1] < 0.9 * piece.area).then(|| [made(0), made(1)])
+    let made = sides.map(|side| Piece::new(side, piece.primitive));
+    (valid && made[0].area + made[1].area < 0.9 * piece.area).then_some(made)
 }

@@ -63,7 +63,7 @@ pub struct Counters {
     /// Times that a path met more surfaces in one place, or a ray started inside of more media,
     /// than there is room for.
     pub media_overflows: u32,
-    /// Rays abandoned when the loop budget was spent.
+    /// Paths or points with rays that have not come to their ends within the loop budget.
     pub unfinished: u32,
     /// Infinite or NaN values that were left out, each with its path or sample.
     pub non_finite: u32,

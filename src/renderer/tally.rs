@@ -32,9 +32,10 @@ pub(super) fn count_faults(stats: &mut Stats, media_overflows: u64, unfinished: 
 /// Adds a warning for each counted fault that changes the light of the picture.
 fn warn_of_faults(stats: &mut Stats) {
     if stats.unfinished_rays > 0 {
-        stats
-            .warnings
-            .push(format!("{} rays were given up after their loop budget; their light is lost", stats.unfinished_rays));
+        stats.warnings.push(format!(
+            "{} rays were given up, since they meet too many surfaces; their light is lost",
+            stats.unfinished_rays
+        ));
     }
     if stats.non_finite.total() > 0 {
         let NonFinite { photons, camera, direct, gather, film } = stats.non_finite;

@@ -220,7 +220,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "progressive",
         ],
     ),
-    ("passes", &["maps", "wavefront", "photons", "estimate", "camera"]),
+    ("passes", &["maps", "late_rays", "wavefront", "photons", "estimate", "camera"]),
     (
         "passes/estimate",
         &[
