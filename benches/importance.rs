@@ -1,9 +1,9 @@
 //! Benchmark: photons where the camera needs them, as squared error at equal time.
 //!
-//! `cargo bench --bench importance [-- ROUNDS]`, 3 rounds by default. Renders the light that comes
+//! `cargo bench --bench importance [-- ROUNDS [WORD]]`, 3 rounds by default, of the scenes with that word in their names. Renders the light that comes
 //! over other surfaces, with final gathering and without, in scenes of which the camera sees a
 //! small part, with `--emission aimed`, which knows what the cameras see, and with
-//! `--emission unaimed`, which does not. The relMSE is against a picture of fifty times the
+//! `--emission unaimed`, which does not. The relMSE is against a picture of twenty times the
 //! photons and of another seed. That of photons is against one of the same seed: its camera rays and
 //! rays of final gathering are the same, whose noise no photon changes. The last columns are the
 //! product of either and seconds with aimed emission over that without: the squared error at equal
@@ -21,16 +21,18 @@ use support::{add_box, add_quad, camera, diffuse, emissive, gpu, point_light, sc
 
 const SIZE: u32 = 96;
 const PHOTONS: u32 = 20_000;
-const REFERENCE: u32 = 50 * PHOTONS;
+const REFERENCE: u32 = 20 * PHOTONS;
 
 fn main() {
     let rounds: u32 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(3);
+    let word = std::env::args().skip(1).find(|word| !word.starts_with('-') && word.parse::<u32>().is_err());
     println!("{} ({})", gpu().name, gpu().driver);
     println!(
         "{:>20} {:>10} {:>9} {:>9} {:>10} {:>11} {:>14} {:>11} {:>8}",
         "scene", "estimate", "emission", "seconds", "relMSE", "of photons", "at equal time", "of photons", "seen"
     );
-    for (name, scene) in scenes() {
+    let is_asked = |name: &str| word.as_ref().is_none_or(|word| name.contains(word.as_str()));
+    for (name, scene) in scenes().into_iter().filter(|(name, _)| is_asked(name)) {
         for (estimate, gathers) in [("photons", false), ("gathered", true)] {
             let rendered = |emission, photons, seed| rendered(&scene, gathers, emission, photons, seed);
             let reference = rendered(Emission::Aimed, REFERENCE, 1000);

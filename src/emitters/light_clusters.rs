@@ -18,7 +18,7 @@ pub struct LightCluster {
     /// They lie at infinity.
     pub is_far: bool,
     /// Least and greatest coordinates of where they are.
-    bounds: [Vec3; 2],
+    pub bounds: [Vec3; 2],
 }
 
 impl LightCluster {
