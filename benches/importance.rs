@@ -1,13 +1,13 @@
 //! Benchmark: photons where the camera needs them, as squared error at equal time.
 //!
-//! `cargo bench --bench importance [-- ROUNDS [WORD]]`, 3 rounds by default, of the scenes with that word in their names. Renders the light that comes
-//! over other surfaces, with final gathering and without, in scenes of which the camera sees a
-//! small part, with `--emission aimed`, which knows what the cameras see, and with
-//! `--emission unaimed`, which does not. The relMSE is against a picture of twenty times the
-//! photons and of another seed. That of photons is against one of the same seed: its camera rays and
-//! rays of final gathering are the same, whose noise no photon changes. The last columns are the
-//! product of either and seconds with aimed emission over that without: the squared error at equal
-//! time. The aim is a tenth.
+//! `cargo bench --bench importance [-- ROUNDS [WORD]]`, 3 rounds by default, of the scenes with
+//! that word in their names. Renders the light that comes over other surfaces, with final gathering
+//! and without, in scenes of which the camera sees a small part, with `--emission aimed`, which
+//! knows what the cameras see, and with `--emission unaimed`, which does not. The relMSE is against
+//! a picture of twenty times the photons and of another seed. That of photons is against one of the
+//! same seed: its camera rays and rays of final gathering are the same, whose noise no photon
+//! changes. The last columns are the product of either and seconds with aimed emission over that
+//! without: the squared error at equal time. The aim is a tenth.
 
 use caustica::{
     image::difference::rel_mse,

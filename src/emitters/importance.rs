@@ -1,6 +1,6 @@
-//! How much pictures need the photons of a place: the density of points that the cameras see, and of
-//! those that are seen from there, in an octree. Photons are stored by it (compare Keller and Wald
-//! 2000, "Efficient Importance Sampling Techniques for the Photon Map").
+//! How much pictures need the photons of a place: the density of points that the cameras see, and
+//! of those that are seen from there, in an octree. Photons are stored by it (compare Keller and
+//! Wald 2000, "Efficient Importance Sampling Techniques for the Photon Map").
 
 use glam::{UVec3, Vec3, uvec3};
 

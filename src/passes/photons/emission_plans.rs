@@ -62,7 +62,9 @@ pub(super) fn steered(
     (buffers, batch_limit, max_paths): (&BatchBuffers, u64, u64),
 ) -> Result<Option<Steered>> {
     let lights = &scene.lights;
-    let Some(importance) = lights.importance.as_ref().filter(|_| settings.emission == Emission::Aimed) else {
+    let has_paths = settings.mode.stores_direct() || settings.mode.follows_diffuse();
+    let is_steered = has_paths && settings.emission == Emission::Aimed;
+    let Some(importance) = lights.importance.as_ref().filter(|_| is_steered) else {
         return Ok(None);
     };
     let plan = unsteered(scene, settings);

@@ -2,11 +2,11 @@
 //! where the cameras need it. A pilot of few paths from each light tells where the light goes.
 //!
 //! Of lights that are chosen with the probabilities p, a path brings w/p of importance, and the
-//! variance of the sum is least if p is in proportion to the power times the root of the mean square
-//! of w. Lights keep a part of their photons by power alone: nothing is lost by what the pilot
-//! missed. Photons are stored in proportion to importance up to a bound (compare Suykens and Willems
-//! 2000, "Density Control for Photon Maps"; Keller and Wald 2000), so that where it matters, they
-//! have the flux with which they arrived.
+//! variance of the sum is least if p is in proportion to the power times the root of the mean
+//! square of w. Lights keep a part of their photons by power alone: nothing is lost by what the
+//! pilot missed. Photons are stored in proportion to importance up to a bound (compare Suykens and
+//! Willems 2000, "Density Control for Photon Maps"; Keller and Wald 2000), so that where it
+//! matters, they have the flux with which they arrived.
 
 use crate::emitters::light_clusters::LightCluster;
 
@@ -20,8 +20,8 @@ const UNSEEN: f64 = 0.02;
 const LEAST_GAIN: f64 = 1.25;
 /// Paths for each photon that is stored, over those without choice of photons, at most.
 const MOST_PATHS: f64 = 20.0;
-/// Least fraction of the photons that are needed, and that where much light comes from infinity. Paths
-/// of scenes with fewer are aimed at spheres, which pays for parallel light most.
+/// Least fraction of the photons that are needed, and that where much light comes from infinity.
+/// Paths of scenes with fewer are aimed at spheres, which pays for parallel light most.
 const LEAST_NEEDED: f64 = 1.0 / 2048.0;
 const LEAST_NEEDED_OF_FAR: f64 = 1.0 / 64.0;
 /// Greatest fraction of the photons that are stored by importance. Of maps that need more, all
@@ -30,8 +30,8 @@ const MOST_STORED: f64 = 0.5;
 /// Part of the stored photons that lie where they are hardly needed; and their greatest factor.
 const ELSEWHERE: f64 = 0.2;
 const LEAST_KEPT: f64 = 1.0 / 128.0;
-/// Paths that brought at least that from each light at infinity that has a part of the power of more
-/// than the last number.
+/// Paths that brought at least that from each light at infinity that has a part of the power of
+/// more than the last number.
 const FAR_PATHS: usize = 16;
 const BROUGHT: f64 = 0.1;
 const FAR_POWER: f64 = 0.05;
@@ -178,9 +178,9 @@ impl Pilot {
         (variance(by_power) > LEAST_GAIN * variance(&chosen)).then_some(chosen)
     }
 
-    /// Factor on importance that gives the probability of a photon to be stored, and the fraction of
-    /// photons that are stored by it: those of the middle importance at least, and as many more as
-    /// the paths allow.
+    /// Factor on importance that gives the probability of a photon to be stored, and the fraction
+    /// of photons that are stored by it: those of the middle importance at least, and as many more
+    /// as the paths allow.
     fn scale(&self, chances: &[f64], reference: f64, most_paths: f64) -> (f64, f64) {
         let stored = |scale: f64| self.kept(chances, |importance| (scale * importance).min(1.0));
         let mut scale = 1.0 / reference;
