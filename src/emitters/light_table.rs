@@ -169,6 +169,18 @@ impl LightTable {
         self.powers.iter().sum()
     }
 
+    /// Power of a light that may reach what is seen, W, mean of the channels.
+    #[must_use]
+    pub fn power_of(&self, light: u32) -> f64 {
+        self.powers[light as usize]
+    }
+
+    /// Table for photon paths as [`Self::for_photons`], with factors on the powers of the lights.
+    #[must_use]
+    pub fn for_steered_photons(&self, factors: &[f64], settings: &LightSettings) -> Choices {
+        self.choices(self.powers.iter().zip(factors).map(|(power, factor)| power * factor).collect(), settings)
+    }
+
     /// Table for photon paths: in proportion to power, or with equal probability for every named
     /// light, times the factors of the settings.
     #[must_use]

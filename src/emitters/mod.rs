@@ -3,7 +3,9 @@
 
 mod cumulative;
 pub mod environment_map;
+pub mod importance;
 mod light_bounds;
+pub mod light_clusters;
 mod light_media;
 pub mod light_table;
 pub mod light_tree;

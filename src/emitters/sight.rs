@@ -4,7 +4,10 @@
 use glam::{Vec3, vec3};
 use rayon::prelude::*;
 
-use super::targets::{Target, scene_target};
+use super::{
+    importance::Importance,
+    targets::{Target, scene_target},
+};
 use crate::{
     bvh::Bvh,
     layout::METAL,
@@ -26,6 +29,8 @@ const ENCLOSED: f64 = 0.9;
 const MAX_CHAIN: u32 = 12;
 /// Minimum number of points that spheres are made of.
 const MIN_POINTS: usize = 64;
+/// Maximum number of points whose density counts.
+const MAX_POINTS: usize = 1 << 14;
 /// Fraction of the points within the smallest sphere. The spheres have one centre.
 const QUANTILE: f64 = 0.5;
 /// Factor on its radius, for what lies at the border.
@@ -48,6 +53,8 @@ pub struct Sight {
     /// Fraction of the light that leaves a surface, 0 to 1, which meets another one: exceeded by
     /// that of a tenth of what the cameras see. 1 if they see nothing diffuse.
     pub enclosure: f64,
+    /// Density of that and of what lies around it; none without spheres.
+    pub importance: Option<Importance>,
 }
 
 impl Sight {
@@ -57,8 +64,12 @@ impl Sight {
         let cameras = scene.cameras.iter().step_by(step);
         let seen: Vec<SeenPoint> = cameras.flat_map(|camera| points_seen(scene, bvh, camera)).collect();
         let enclosure = enclosure(&seen);
-        let points = seen.into_iter().flat_map(|seen| std::iter::once(seen.position).chain(seen.around)).collect();
-        Self { targets: spheres_around(points, &scene_target(scene)), enclosure }
+        let points: Vec<Vec3> =
+            seen.into_iter().flat_map(|seen| std::iter::once(seen.position).chain(seen.around)).collect();
+        let targets = spheres_around(&points, &scene_target(scene));
+        let fewer = || points.iter().step_by(points.len().div_ceil(MAX_POINTS)).copied().collect::<Vec<_>>();
+        let importance = (!targets.is_empty()).then(|| Importance::new(&fewer(), scene.bounds()));
+        Self { targets, enclosure, importance }
     }
 }
 
@@ -150,7 +161,7 @@ fn cosine_direction(normal: Vec3, i: u32) -> Vec3 {
 }
 
 /// Spheres about the middle of the points, up to one that is not much smaller than the scene.
-fn spheres_around(points: Vec<Vec3>, whole: &Target) -> Vec<Target> {
+fn spheres_around(points: &[Vec3], whole: &Target) -> Vec<Target> {
     if points.len() < MIN_POINTS {
         return Vec::new();
     }

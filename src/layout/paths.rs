@@ -118,10 +118,16 @@ pub struct PhotonBatch {
     pub target_count: u32,
     /// Surfaces that a path meets at most.
     pub max_surfaces: u32,
-    pub pad1: u32,
+    /// Least probability with which a photon is stored.
+    pub least_kept: f32,
     /// Sphere that diffuse surfaces outside of it send more photons to, centre and radius; radius
     /// 0: none.
     pub aim: [f32; 4],
+    /// Photons are stored with the probability importance times this, at most 1; 0: all are stored.
+    pub kept_scale: f32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 impl PhotonBatch {
@@ -139,9 +145,11 @@ impl PhotonBatch {
     }
 }
 
-/// Streams of random numbers: of general photon paths, and of those aimed at mirrors and glass.
+/// Streams of random numbers: of general photon paths, of those aimed at mirrors and glass, and of
+/// the paths that look where the light goes before.
 pub const STREAM_PHOTON: u32 = 0;
 pub const STREAM_CAUSTIC: u32 = 2;
+pub const STREAM_PILOT: u32 = 4;
 /// The global map still takes photons.
 pub const STORE_GLOBAL: u32 = 1;
 /// The global map takes photons that come directly from a light.
@@ -157,6 +165,9 @@ pub const AIM: u32 = 16;
 pub const CAUSTICS_APART: u32 = 32;
 /// All targets are chosen as often, whatever their size.
 pub const EVENLY: u32 = 64;
+
+/// Bit of a node of the octree over what cameras see that has children.
+pub const IMPORTANCE_CHILDREN: u32 = 0x8000_0000;
 
 /// Maximum number of targets that caustic paths are aimed at.
 pub const MAX_TARGETS: u32 = 32;

@@ -7,6 +7,7 @@ use crate::{
     bvh::{Bvh, MediaProbe},
     emitters::{
         environment_map::EnvironmentMap,
+        importance::Importance,
         light_table::{Choices, LightTable},
         set_media,
         sight::Sight,
@@ -27,6 +28,14 @@ pub struct ChoiceBuffer {
     pub strata: u32,
 }
 
+impl ChoiceBuffer {
+    /// # Errors
+    /// [`crate::Error::Limit`] if the lights exceed a binding.
+    pub fn new(gpu: &Gpu, label: &str, choices: &Choices) -> Result<Self> {
+        Ok(Self { buffer: gpu.storage_with(label, &choices.entries)?, strata: choices.strata })
+    }
+}
+
 /// The lights on the device.
 #[derive(Debug)]
 pub struct LightBuffers {
@@ -43,6 +52,11 @@ pub struct LightBuffers {
     pub specular_targets: u32,
     /// See [`Sight::enclosure`].
     pub enclosure: f64,
+    /// See [`Sight::importance`].
+    pub importance: Option<Importance>,
+    /// Settings of the tables.
+    pub settings: LightSettings,
+    importance_words: Table,
     pub has_environment: bool,
     pub warnings: Vec<String>,
     lights: Buffer,
@@ -63,14 +77,11 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, (scene, bvh): (&Scene, &Bvh), probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = specular_targets(scene);
-        let Sight { targets: seen, enclosure } = Sight::new(scene, bvh);
+        let Sight { targets: seen, enclosure, importance } = Sight::new(scene, bvh);
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
         table.lights.par_iter_mut().for_each(|light| set_media(light, probe));
-        let upload = |label: &str, choices: &Choices| -> Result<ChoiceBuffer> {
-            Ok(ChoiceBuffer { buffer: gpu.storage_with(label, &choices.entries)?, strata: choices.strata })
-        };
         let spheres: Vec<[f32; 4]> =
             seen.iter().chain([&around]).chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
         let (sine, cosine) = map.as_ref().map_or(0.0, |map| map.rotation).sin_cos();
@@ -85,12 +96,23 @@ impl LightBuffers {
         let cells = map.as_ref().map_or(&[][..], |map| &map.cells);
         let rows = map.as_ref().map_or(&[][..], |map| &map.marginal);
         Ok(Self {
-            photons: upload("photon light choices", &table.for_photons(settings))?,
-            aimed: upload("aimed light choices", &table.for_aimed_photons(&targets, &around, settings))?,
+            photons: ChoiceBuffer::new(gpu, "photon light choices", &table.for_photons(settings))?,
+            aimed: ChoiceBuffer::new(
+                gpu,
+                "aimed light choices",
+                &table.for_aimed_photons(&targets, &around, settings),
+            )?,
             seen_targets: seen.len() as u32,
             seen: seen.first().map_or([0.0; 4], |target| target.center.extend(target.radius).to_array()),
             specular_targets: targets.len() as u32,
             enclosure,
+            importance_words: Table::new(
+                gpu,
+                "importance",
+                &importance.as_ref().map_or(vec![0; 5], Importance::words),
+            )?,
+            importance,
+            settings: settings.clone(),
             has_environment: map.is_some(),
             warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
@@ -118,12 +140,13 @@ impl LightBuffers {
 
     /// The tables that all passes share.
     #[must_use]
-    pub fn tables(&self) -> [(&'static str, &Table); 4] {
+    pub fn tables(&self) -> [(&'static str, &Table); 5] {
         [
             ("light_nodes", &self.nodes),
             ("environment", &self.environment),
             ("environment_cells", &self.environment_cells),
             ("environment_rows", &self.environment_rows),
+            ("importance_table", &self.importance_words),
         ]
     }
 }

@@ -209,10 +209,10 @@ impl SceneBuffers {
         let budget = self.visits.next_power_of_two().max(SHORT_LOOPS).min(gpu.trace_budget);
         let rays = if TWO_RAYS.contains(&shader.stem) { 2 } else { 1 };
         overrides.push(("TRACE_BUDGET", f64::from(budget / rays)));
-        let [light_nodes, pixels, cells, rows] = self.lights.tables();
+        let lights = self.lights.tables();
         let own = [("normals", &self.normals), ("media_table", &self.media), ("instances", &self.instances)];
         let high = [("nodes_high", &self.nodes.high), ("primitives_high", &self.primitives.high)];
-        let own = [&own[..], &high, &[light_nodes, pixels, cells, rows]].concat();
+        let own = [&own[..], &high, &lights].concat();
         let tables = [&own[..], &self.materials.tables()].concat();
         Kernel::of(gpu, shader, &overrides).with_tables(&tables)
     }

@@ -57,7 +57,7 @@ fn twins() -> Vec<Twin> {
         VisiblePoint { position, next_map, weight, offset, ng, media_low, ns, media_high, view, above }
         LobePoint { position, offset, beta, eta, ng, ns, view, tangent, f0, f90, compensation, sheen, alpha, clearcoat, clearcoat_normal, pad }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays, reads }
-        PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, pad1, aim }
+        PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, least_kept, aim, kept_scale, pad0, pad1, pad2 }
         Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, gathers, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, cells_from }
         FinalStep { first_ray, rays_now, rays, chosen, joint, patches, other_light, pad0 }
@@ -151,11 +151,13 @@ fn constants() -> Vec<(&'static str, f64)> {
         ENVIRONMENT_ROOT,
         NO_LEAF,
         LEAF_BIT,
+        IMPORTANCE_CHILDREN,
         BOTH_WAYS_BIT,
         FAR_BIT,
         NEXT_MASK,
         STREAM_PHOTON,
         STREAM_CAUSTIC,
+        STREAM_PILOT,
         STORE_GLOBAL,
         STORE_DIRECT,
         STORE_CAUSTIC,
@@ -347,7 +349,7 @@ fn this_test_knows_every_struct_and_constant_of_the_host() {
 
 /// Constants that no kernel names: sizes of structs; values that a kernel reads from a field or
 /// infers from the others of their kind; a limit of the host. Their values are not compared.
-const NOT_NAMED: [&str; 13] = [
+const NOT_NAMED: [&str; 14] = [
     "MASK_BIT",
     "WRAP_REPEAT",
     "MEDIA_WORDS",
@@ -356,6 +358,7 @@ const NOT_NAMED: [&str; 13] = [
     "GLASS",
     "STREAM_PHOTON",
     "STREAM_CAUSTIC",
+    "STREAM_PILOT",
     "SAMPLER_SOBOL",
     "MAX_TARGETS",
     "SPLIT_CELL",

@@ -129,4 +129,11 @@ impl BatchBuffers {
             staging_capacity,
         })
     }
+
+    /// The first staged photons with their keys, in any order.
+    pub fn staged(&self, gpu: &Gpu, count: u32) -> Result<Vec<(u32, Photon)>> {
+        let photons: Vec<Photon> = gpu.read(&self.staged, 0, count.into())?;
+        let keys: Vec<u32> = gpu.read(&self.staged_keys, 0, count.into())?;
+        Ok(keys.into_iter().zip(photons).collect())
+    }
 }

@@ -9,6 +9,7 @@
 //! paths, whose indices follow those of the passes before them ([`PathRanges`]).
 
 use super::{
+    emission_plans::{EmissionPlan, LOST_UNIT, PathRanges, plans, steered},
     photon_batch::{BatchBuffers, PhotonKernels},
     raw_map::RawMap,
 };
@@ -18,8 +19,8 @@ use crate::{
     layout::{self, PhotonBatch},
     map_kind::{ByKind, MapKind},
     progress::{Progress, Stage},
-    settings::{Emission, MAX_BOUNCES, PhotonSettings, Sampler},
-    upload::{SceneBuffers, light_buffers::ChoiceBuffer},
+    settings::{PhotonSettings, Sampler},
+    upload::SceneBuffers,
 };
 
 /// Minimum and maximum number of paths of one batch: the device must be busy, and the key of a
@@ -35,20 +36,6 @@ const GROWTH_PATHS: u64 = 1 << 17;
 /// Paths for each photon that a map has room for, at most and at least.
 const PATHS_PER_PHOTON: u64 = 100;
 const MIN_PATHS_PER_PHOTON: f64 = 4.0;
-/// Fixed-point unit of lost flux, as a fraction of a path's mean flux.
-const LOST_UNIT: f64 = 1.0 / 4096.0;
-
-/// Indices of the paths of one emission: `count` of them from `first` on; `None`: until the maps
-/// are full, hardly grow, or the setting's maximum of paths is emitted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PathRange {
-    pub first: u64,
-    pub count: Option<u64>,
-}
-
-/// Indices of the paths of both emissions, by the map that they are for.
-pub type PathRanges = ByKind<PathRange>;
-
 /// Result of the photon pass.
 #[derive(Debug)]
 pub struct TracedPhotons {
@@ -70,21 +57,6 @@ pub struct TracedPhotons {
 #[derive(Debug)]
 pub struct PhotonTracer {
     kernels: PhotonKernels,
-}
-
-/// One emission: paths of one kind, numbered from 0.
-struct EmissionPlan<'a> {
-    choices: &'a ChoiceBuffer,
-    stream: u32,
-    first_target: u32,
-    target_count: u32,
-    /// Rules of all batches: [`layout::AIM`], [`layout::CAUSTICS_APART`], and the rules of the mode
-    /// that apply to these paths.
-    rules: u32,
-    fills: &'static [MapKind],
-    /// Sphere that diffuse surfaces send more photons to.
-    aim: [f32; 4],
-    paths: PathRange,
 }
 
 impl PhotonTracer {
@@ -147,6 +119,8 @@ impl PhotonTracer {
         let named = scene.lights.table.named.len();
         let buffers = BatchBuffers::new(gpu, scene, batch_limit, named)?;
         for plan in plans(scene, settings, caustics, paths) {
+        let steered = steered(gpu, scene, (&self.kernels, settings), (&buffers, batch_limit, max_paths))?;
+        for plan in plans(scene, settings, caustics, paths, steered.as_ref()) {
             let enough =
                 paths_that_matter(scene.lights.enclosure, largest).filter(|_| plan.is_for_little_light(settings));
             let max_paths = plan.paths.count.or(enough).unwrap_or(max_paths);
@@ -182,7 +156,7 @@ impl PhotonTracer {
             let batch = PhotonBatch {
                 paths: paths as u32,
                 staging_capacity: buffers.staging_capacity as u32,
-                ..plan.batch(scene, settings, traced)
+                ..plan.batch(scene, settings, &open(traced))
             }
             .starting_at(plan.paths.first + first_path);
             let result = self.kernels.run(gpu, scene, &plan.choices.buffer, buffers, &batch)?;
@@ -216,86 +190,17 @@ impl PhotonTracer {
     }
 }
 
+/// Maps that take photons.
+fn open(traced: &TracedPhotons) -> ByKind<bool> {
+    ByKind { global: traced.maps.global.open, caustic: traced.maps.caustic.open }
+}
+
 /// Number of paths of a map of light that other surfaces send, in a scene where a fraction
 /// `enclosure` of it meets anything. Its noise counts by that fraction of the light of the picture:
 /// its variance by the square.
 fn paths_that_matter(enclosure: f64, capacity: u64) -> Option<u64> {
     let each = (PATHS_PER_PHOTON as f64 * enclosure * enclosure).max(MIN_PATHS_PER_PHOTON);
     (each < PATHS_PER_PHOTON as f64).then_some((each * capacity as f64) as u64)
-}
-
-/// The emissions that fill the maps, without those that have no light to choose.
-fn plans<'a>(
-    scene: &'a SceneBuffers,
-    settings: &PhotonSettings,
-    caustics: bool,
-    paths: &PathRanges,
-) -> Vec<EmissionPlan<'a>> {
-    let lights = &scene.lights;
-    let rule = |holds: bool, bit: u32| if holds { bit } else { 0 };
-    let aimed = settings.emission == Emission::Aimed;
-    let general = EmissionPlan {
-        choices: &lights.photons,
-        stream: layout::STREAM_PHOTON,
-        first_target: if aimed { 0 } else { lights.seen_targets },
-        target_count: if aimed { lights.seen_targets + 1 } else { 1 },
-        // Rays of final gathering see light that was scattered diffusely before it came through
-        // glass.
-        rules: rule(aimed, layout::AIM)
-            | rule(aimed && lights.seen_targets > 0, layout::EVENLY)
-            | rule(aimed || settings.final_gather > 0, layout::CAUSTICS_APART)
-            | rule(settings.mode.stores_direct(), layout::STORE_DIRECT)
-            | rule(settings.mode.follows_diffuse(), layout::FOLLOW_DIFFUSE),
-        fills: if aimed { &[MapKind::Global] } else { &MapKind::ALL },
-        aim: if aimed { lights.seen } else { [0.0; 4] },
-        paths: paths.global,
-    };
-    let caustic = EmissionPlan {
-        choices: &lights.aimed,
-        stream: layout::STREAM_CAUSTIC,
-        first_target: lights.seen_targets + 1,
-        target_count: lights.specular_targets,
-        rules: layout::AIM | layout::CAUSTICS_APART,
-        fills: &[MapKind::Caustic],
-        aim: [0.0; 4],
-        paths: paths.caustic,
-    };
-    let wanted = [Some(general), (aimed && caustics).then_some(caustic)];
-    wanted.into_iter().flatten().filter(|plan| plan.choices.strata > 0).collect()
-}
-
-impl EmissionPlan<'_> {
-    /// Whether the map has only light over other surfaces, and nobody asks for a number of paths.
-    fn is_for_little_light(&self, settings: &PhotonSettings) -> bool {
-        settings.max_paths.is_none() && self.fills == [MapKind::Global] && !settings.mode.stores_direct()
-    }
-
-    /// Settings that all batches of the emission share, and the rules for the maps that are still
-    /// open.
-    fn batch(&self, scene: &SceneBuffers, settings: &PhotonSettings, traced: &TracedPhotons) -> PhotonBatch {
-        let open = |kind: MapKind, bit: u32| {
-            if self.fills.contains(&kind) && traced.maps[kind].open { bit } else { 0 }
-        };
-        PhotonBatch {
-            seed: settings.seed,
-            light_count: scene.lights.table.lights.len() as u32,
-            strata: self.choices.strata,
-            max_bounces: settings.bounce_limit(),
-            max_surfaces: match scene.has_lobes {
-                true => MAX_BOUNCES.min(settings.bounce_limit() + layout::CHAIN_LIMIT),
-                false => settings.bounce_limit(),
-            },
-            rules: self.rules
-                | open(MapKind::Global, layout::STORE_GLOBAL)
-                | open(MapKind::Caustic, layout::STORE_CAUSTIC),
-            lost_scale: (1.0 / (LOST_UNIT * scene.lights.table.power())) as f32,
-            stream: self.stream,
-            first_target: self.first_target,
-            target_count: self.target_count,
-            aim: self.aim,
-            ..Default::default()
-        }
-    }
 }
 
 #[cfg(test)]

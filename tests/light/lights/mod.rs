@@ -5,6 +5,7 @@ mod closed_forms;
 mod closed_lamps;
 mod many;
 mod photons;
+mod steered;
 mod textured;
 
 use caustica::{
