@@ -16,7 +16,7 @@ use super::{
     exr::{Attributes, channels_of, count_photons, encode, failure},
     exr_read::{attributes_of, open, our_attributes, window_of},
     file::{open_regular, write_file},
-    film::{Bandwidth, ExtraSums, Film, Moments},
+    film::{Bandwidth, ExtraSums, Film, Moments, Weights},
     frame::DataWindow,
     layers::{EXTRA_LAYERS, LAYERS, Rule, layer_index},
     pass_sum::{PassBlock, PassSum, is_block},
@@ -56,6 +56,8 @@ struct BlockRow {
     extras: Vec<ExtraRow>,
     #[serde(default)]
     mattes: Vec<ExtraLayers>,
+    #[serde(default)]
+    weights: Weights,
 }
 
 /// A layer that was asked for.
@@ -151,6 +153,7 @@ fn row(block: &PassBlock) -> BlockRow {
         caustic: block.photons.caustic,
         extras,
         mattes,
+        weights: block.film.weights,
     }
 }
 
@@ -245,6 +248,7 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             extras: row.extras.iter().map(extra).collect::<Result<_>>()?,
             mattes: row.mattes.iter().map(matte).collect::<Result<_>>()?,
             non_finite: row.non_finite,
+            weights: row.weights,
         };
         let photons = ByKind { global: row.global, caustic: row.caustic };
         blocks.push(PassBlock { range: row.passes, film, photons });
@@ -259,7 +263,7 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
     let is_good = |row: &BlockRow| {
         let is_finite = row.bandwidth.iter().all(|bits| f64::from_bits(*bits).is_finite());
         let in_reach = row.passes.first < row.passes.end && PassRange::END.contains(row.passes.end);
-        in_reach && is_block(row.passes) && row.samples > 0 && is_finite
+        in_reach && is_block(row.passes) && row.samples > 0 && row.weights.plain > 0 && is_finite
     };
     let consecutive = rows.windows(2).all(|pair| pair[0].passes.end == pair[1].passes.first);
     if rows.is_empty() || !consecutive || !rows.iter().all(is_good) {
@@ -287,11 +291,11 @@ mod tests {
     fn sum(passes: std::ops::Range<u32>) -> PassSum {
         let mut sum = PassSum::default();
         for index in passes {
-            let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL);
+            let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL).with_extra_samples(12);
             for pixel in 0..6 {
                 let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
                 let position = (pixel % 3, pixel / 3);
-                let rows = [[value, value * 1e-9, 1e9, 0.0], [value; 4], [2.0; 4], [value * 7.0; 4], [value * 8.0; 4]];
+                let rows = [[value, value * 1e-9, 1e9, 0.0], [value; 4], [2.0; 4], [value * 7.0; 4], [value * 8.0; 4], [0.0; 4]];
                 film.add(position, &rows, 4);
                 film.add_to(Source::Estimate(MapKind::Caustic), position, &[value, 3.0, 1.0]);
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());

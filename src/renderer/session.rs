@@ -301,6 +301,7 @@ fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSetti
         size: Some((columns, rows)),
         spp: 1,
         crop: Some(Crop { column, row, width, height }),
+        max_spp: None,
         pixel_filter: PixelFilter::Box,
         ..picture.clone()
     }
@@ -313,5 +314,5 @@ fn preview_of(picture: &PictureSettings, size: (u32, u32), rays: u32) -> Picture
     let most = PREVIEW_RAYS.min(PREVIEW_RAYS_PER_PIXEL * pixels);
     let scale = (most / f64::from(rays) / pixels).min(0.25).sqrt();
     let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(1);
-    PictureSettings { size: Some((side(size.0), side(size.1))), spp: 1, crop: None, ..picture.clone() }
+    PictureSettings { size: Some((side(size.0), side(size.1))), spp: 1, max_spp: None, crop: None, ..picture.clone() }
 }

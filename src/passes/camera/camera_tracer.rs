@@ -19,7 +19,7 @@ use crate::{
         wavefront::{Step, Wavefront},
     },
     scene::Camera,
-    settings::{Crop, PhotonSettings, PictureSettings},
+    settings::{Crop, PhotonSettings, PictureSettings, first_extra_sample},
     upload::{SceneBuffers, sampler_constant},
 };
 
@@ -82,10 +82,16 @@ pub struct CameraTracer {
     /// Sums over the samples of each pixel, [`LAYER_ROWS`] + 1 rows a pixel.
     pixel_rows: Buffer,
     filter_table: Buffer,
-    view: CameraTile,
+    /// Pixels of the tile that was traced last, if it has a list of them.
+    pub listed_pixels: Buffer,
+    pub(super) view: CameraTile,
     window: Crop,
+    /// Index of the first sample beyond those that every pixel has.
+    pub(super) first_extra: u32,
+    /// Samples of a pixel that has more than every one.
+    pub(super) extra: u32,
     /// Maximum number of visible points of a tile, without its margin.
-    room: u64,
+    pub(super) room: u64,
 }
 
 impl CameraTracer {
@@ -124,6 +130,9 @@ impl CameraTracer {
             lobe_points: gpu.storage::<LobePoint>("lit lobes", if scene.materials.has_rough { slots } else { 1 })?,
             pixel_rows: gpu.storage::<PixelSums>("sums of pixels", room / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
+            listed_pixels: gpu.storage::<u32>("listed pixels", room / u64::from(branches))?,
+            first_extra: first_extra_sample(photons, picture),
+            extra: picture.extra_samples(),
             view: CameraTile { margin, ..view },
             window: picture.window(size),
             room,
@@ -157,8 +166,9 @@ impl CameraTracer {
     /// Limits of the adapter.
     pub fn of_pass(self, gpu: &Gpu, picture: &PictureSettings, first: u32) -> Result<Self> {
         let offsets = picture.pixel_filter.offsets();
+        let first_extra = self.first_extra + first / self.view.spp * self.extra;
         let view = CameraTile { first_sample: first, filter_steps: offsets.len() as u32 - 1, ..self.view };
-        Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, view, ..self })
+        Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, first_extra, view, ..self })
     }
 
     /// The tiles of the whole picture that overlap the data window, in order. A tile is the same
@@ -176,7 +186,8 @@ impl CameraTracer {
                 for first_sample in (0..self.view.spp).step_by(samples as usize) {
                     let samples = samples.min(self.view.spp - first_sample);
                     let first_sample = self.view.first_sample + first_sample;
-                    tiles.push(Tile { pixels: width * height, first_column, first_row, first_sample, samples });
+                    let pixels = width * height;
+                    tiles.push(Tile { pixels, first_column, first_row, first_sample, samples, listed: None });
                 }
             }
         }
@@ -222,6 +233,7 @@ impl CameraTracer {
             samples: tile.samples,
             branches: self.view.branches,
             margin: self.view.margin / MARGIN_SAMPLES,
+            is_square: tile.listed.is_none(),
             radiance: &self.radiance,
             gathered: &self.gathered,
         }
@@ -230,6 +242,7 @@ impl CameraTracer {
     /// Column and row of the `i`-th pixel of a tile within the data window; `None` outside of it.
     #[must_use]
     pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
+        let i = tile.listed.as_ref().map_or(i, |listed| listed.pixels[i as usize]);
         let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
         let (x, y) = (tile.first_column + even_bits(i), tile.first_row + even_bits(i >> 1));
         let window = &self.window;
@@ -242,14 +255,18 @@ impl CameraTracer {
     /// # Errors
     /// Faults of the driver.
     pub fn trace(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
-        let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
+        let view = self.tile_view(tile);
+        let uniform = gpu.uniform("camera tile", &view);
+        if let Some(listed) = &tile.listed {
+            gpu.write(&self.listed_pixels, 0, &listed.pixels);
+        }
         let own = [("tile", &uniform), ("points", &self.points), ("filter_table", &self.filter_table)];
         let start = Step { kernel: &self.kernels.start, buffers: &own };
         let trace = Step { kernel: &self.kernels.trace, buffers: &own };
         self.follow(
             gpu,
             scene,
-            (&start, tile.pixels * tile.samples + self.view.margin),
+            (&start, tile.pixels * tile.samples + view.margin),
             &trace,
             (self.kernels.lobes.as_ref(), &self.radiance),
         )
@@ -268,7 +285,12 @@ impl CameraTracer {
     ) -> Result<StepCount> {
         let most_paths = (u64::from(invocations) * u64::from(self.view.branches))
             .min(self.room + u64::from(self.view.margin * self.view.branches));
-        let tile = [("first_hits", &self.first_hits), ("radiance", radiance), ("lobe_points", &self.lobe_points)];
+        let tile = [
+            ("first_hits", &self.first_hits),
+            ("radiance", radiance),
+            ("lobe_points", &self.lobe_points),
+            ("listed_pixels", &self.listed_pixels),
+        ];
         let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
         let start = Step { kernel: start.kernel, buffers: &started };
         let trace = Step { kernel: trace.kernel, buffers: &followed };
@@ -309,7 +331,8 @@ impl CameraTracer {
     ) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", view);
         let counters = ("counters", &self.wavefront.counters);
-        let buffers = [("tile", &uniform), ("points", points), ("radiance", radiance), counters];
+        let listed = ("listed_pixels", &self.listed_pixels);
+        let buffers = [("tile", &uniform), ("points", points), ("radiance", radiance), counters, listed];
         let (steps, points) = (direct.steps(scene), count);
         let mut count = StepCount::default();
         for first in (0..steps).step_by(DIRECT_STEPS_PER_READ as usize) {
@@ -361,6 +384,8 @@ impl CameraTracer {
             pixels: tile.pixels,
             first_sample: tile.first_sample,
             samples: tile.samples,
+            listed: tile.listed.as_ref().map_or(0, |listed| listed.before + 1),
+            margin: if tile.listed.is_none() { self.view.margin } else { 0 },
             ..self.view
         }
     }

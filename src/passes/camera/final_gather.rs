@@ -259,7 +259,8 @@ impl FinalGather {
 /// The rays of a step as samples of one pixel: all of them draw from one set of numbers. At glass,
 /// a ray chooses reflection or refraction at random.
 fn rays_as_samples(view: &CameraTile, rays: FinalRays) -> CameraTile {
-    let tile_seed = mix(view.first_row << 16 | view.first_column) ^ mix(view.first_sample);
+    let listed = if view.listed > 0 { mix(view.listed) } else { 0 };
+    let tile_seed = mix(view.first_row << 16 | view.first_column) ^ mix(view.first_sample) ^ listed;
     CameraTile {
         seed: mix(view.seed ^ mix(rays.first.wrapping_add(1))) ^ tile_seed,
         branches: 1,
@@ -269,6 +270,7 @@ fn rays_as_samples(view: &CameraTile, rays: FinalRays) -> CameraTile {
         first_row: 0,
         first_sample: 0,
         gathers: 1,
+        listed: 0,
         ..*view
     }
 }

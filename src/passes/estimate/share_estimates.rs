@@ -23,12 +23,14 @@ pub struct SharedPoints<'a> {
     /// [`VisiblePoint`]s: for each pixel, in Morton order, its samples, each with its branches;
     /// then those of the margin.
     pub points: &'a Buffer,
-    /// A power of 2, at least 64.
+    /// Of a square, a power of 2, at least 64.
     pub pixels: u32,
     pub samples: u32,
     pub branches: u32,
     /// Cells of the margin.
     pub margin: u32,
+    /// Whether the pixels are those of a square. Others share nothing.
+    pub is_square: bool,
     /// Radiance from each point, `vec4f`, and room for results of gathers,
     /// [`Gathered`](crate::layout::Gathered).
     pub radiance: &'a Buffer,
@@ -92,7 +94,7 @@ impl EstimateSharing {
     pub fn run(&mut self, gpu: &Gpu, map_number: u32, tile: &SharedPoints, estimates: &mut Estimates) -> Result<()> {
         let count = tile.pixels * tile.samples * tile.branches;
         for cell_pixels in ROUNDS {
-            if self.reach == 0.0 || cell_pixels * tile.samples < MIN_CELL {
+            if self.reach == 0.0 || !tile.is_square || cell_pixels * tile.samples < MIN_CELL {
                 break;
             }
             let is_first = cell_pixels == ROUNDS[0];

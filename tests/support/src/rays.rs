@@ -33,6 +33,7 @@ pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) ->
     let first_hits = gpu.storage::<FirstHit>("first hits", count).expect("fits");
     let radiance = gpu.storage::<[f32; 4]>("radiance", count).expect("fits");
     let lobe_points = gpu.storage::<LobePoint>("lit lobes", 1).expect("fits");
+    let listed = gpu.storage::<u32>("listed pixels", 1).expect("fits");
     let tile = gpu.uniform("tile", &CameraTile { samples: 1, branches: 1, ..CameraTile::default() });
     let own = [
         ("tile", &tile),
@@ -43,6 +44,7 @@ pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) ->
         ("first_hits", &first_hits),
         ("radiance", &radiance),
         ("lobe_points", &lobe_points),
+        ("listed_pixels", &listed),
     ];
     let bindings = kernel.bind(gpu, &buffers.with(&own));
     let mut commands = gpu.encoder();
