@@ -124,11 +124,6 @@ pub struct SharedOptions {
     #[arg(long, value_name = "N", value_parser = whole(PictureSettings::SPP), help_heading = "Picture")]
     pub spp: Option<u32>,
 
-    /// Camera samples of pixels at edges and in penumbrae; no more than --spp leaves every pixel with
-    /// those [default: by --quality, 16, or --spp where that is given]
-    #[arg(long, value_name = "N", value_parser = whole(PictureSettings::SPP), help_heading = "Picture")]
-    pub max_spp: Option<u32>,
-
     /// Size in pixels; the vertical angle of view stays [default: 512 high, as wide as the camera
     /// says or square]
     #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true, help_heading = "Picture")]
@@ -231,7 +226,8 @@ impl SharedOptions {
                 crop: self.crop,
                 camera: self.camera.clone(),
                 spp: self.spp.unwrap_or(picture.spp),
-                max_spp: self.max_spp.or(picture.max_spp.filter(|_| self.spp.is_none())),
+                // That many samples are those of every pixel.
+                max_spp: picture.max_spp.filter(|_| self.spp.is_none()),
                 pixel_filter: self.pixel_filter.into(),
                 aperture: self.aperture.unwrap_or(picture.aperture),
                 focus: self.focus,

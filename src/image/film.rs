@@ -45,6 +45,8 @@ pub struct Film {
     pub(super) non_finite: u64,
     /// How samples of pixels that have more of them count.
     pub(super) weights: Weights,
+    /// Number of samples beyond those that every pixel has.
+    pub(super) extra_samples: u64,
 }
 
 /// How the samples of a pass count in pixels of different numbers of samples.
@@ -54,12 +56,14 @@ pub(super) struct Weights {
     /// more: both give a pixel the same total. The first is also that of the number of samples.
     pub plain: u32,
     pub uneven: u32,
+    /// Samples that a pixel has more.
+    pub extra: u32,
 }
 
 /// Every pixel has the same number.
 impl Default for Weights {
     fn default() -> Self {
-        Self { plain: 1, uneven: 1 }
+        Self { plain: 1, uneven: 1, extra: 0 }
     }
 }
 
@@ -123,6 +127,7 @@ impl Film {
             mattes: Vec::new(),
             non_finite: 0,
             weights: Weights::default(),
+            extra_samples: 0,
         }
     }
 
@@ -132,7 +137,7 @@ impl Film {
         let spp = self.samples as u32;
         let divisor = (1..=spp.max(1)).rev().find(|d| spp % d == 0 && extra % d == 0).unwrap_or(1);
         if extra > 0 {
-            self.weights = Weights { plain: (spp + extra) / divisor, uneven: spp / divisor };
+            self.weights = Weights { plain: (spp + extra) / divisor, uneven: spp / divisor, extra };
         }
         self
     }
@@ -141,9 +146,10 @@ impl Film {
     /// it has more.
     pub(crate) fn weigh(&mut self, (column, row): (u32, u32), is_uneven: bool) {
         let pixel = row as usize * self.window.width as usize + column as usize;
-        let Weights { plain, uneven } = self.weights;
+        let Weights { plain, uneven, extra } = self.weights;
         self.mattes.iter_mut().for_each(|matte| matte.weigh(pixel, if is_uneven { uneven } else { plain }));
         if is_uneven {
+            self.extra_samples += u64::from(extra);
             let weight = uneven as f32 / plain as f32;
             let all = LAYERS.iter().map(|layer| layer.channels.len()).zip(&mut self.sums);
             let extras = self.extras.iter_mut().map(|layer| (layer.count(), &mut layer.sums));
@@ -224,6 +230,7 @@ impl Film {
                 }
             }
             total.non_finite += film.non_finite;
+            total.extra_samples += film.extra_samples;
         }
         let mut total = total.expect("a group of lights");
         total.extras.extend(lights);
@@ -258,6 +265,12 @@ impl Film {
     #[must_use]
     pub fn samples(&self) -> u64 {
         self.samples
+    }
+
+    /// Number of samples beyond those that every pixel has.
+    #[must_use]
+    pub fn extra_samples(&self) -> u64 {
+        self.extra_samples
     }
 
     /// Number of samples that were left out, since a sum would not be finite with them.
@@ -350,6 +363,7 @@ impl Film {
         self.passes += other.passes;
         self.samples += other.samples;
         self.non_finite += other.non_finite;
+        self.extra_samples += other.extra_samples;
         Ok(())
     }
 
@@ -550,7 +564,7 @@ mod tests {
         assert_eq!(film.non_finite(), 2, "twice the blue channel exceeds the largest number");
         assert!(film.finish().radiance()[0].iter().all(|x| x.is_finite()));
         let mut counted = Film::new(WHOLE, ALL, 1);
-        counted.add((1, 1), &[[0.0, 0.0, 0.0, 3.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
+        counted.add((1, 1), &[[0.0, 0.0, 0.0, 3.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
         assert_eq!(counted.non_finite(), 3);
     }
 }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     cryptomatte::{Matte, RANKS},
-    exr::{Attributes, channels_of, count_photons, encode, failure},
+    exr::{Attributes, channels_of, count_photons, count_samples, encode, failure},
     exr_read::{attributes_of, open, our_attributes, window_of},
     file::{open_regular, write_file},
     film::{Bandwidth, ExtraSums, Film, Moments, Weights},
@@ -58,6 +58,8 @@ struct BlockRow {
     mattes: Vec<ExtraLayers>,
     #[serde(default)]
     weights: Weights,
+    #[serde(default)]
+    extra_samples: u64,
 }
 
 /// A layer that was asked for.
@@ -93,6 +95,7 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
     let total = sum.total()?.expect("a part has a pass");
     let mut attributes = attributes.clone();
     count_photons(&mut attributes, total.photons.global, total.photons.caustic);
+    count_samples(&mut attributes, total.film.extra_samples);
     let rows: Vec<BlockRow> = sum.blocks.iter().map(row).collect();
     attributes.insert("blocks".to_owned(), serde_json::to_string(&rows).expect("blocks hold numbers only"));
     attributes.insert("passes".to_owned(), range(&rows).to_string());
@@ -154,6 +157,7 @@ fn row(block: &PassBlock) -> BlockRow {
         extras,
         mattes,
         weights: block.film.weights,
+        extra_samples: block.film.extra_samples,
     }
 }
 
@@ -249,6 +253,7 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             mattes: row.mattes.iter().map(matte).collect::<Result<_>>()?,
             non_finite: row.non_finite,
             weights: row.weights,
+            extra_samples: row.extra_samples,
         };
         let photons = ByKind { global: row.global, caustic: row.caustic };
         blocks.push(PassBlock { range: row.passes, film, photons });
@@ -299,6 +304,7 @@ mod tests {
                 film.add(position, &rows, 4);
                 film.add_to(Source::Estimate(MapKind::Caustic), position, &[value, 3.0, 1.0]);
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
+                film.weigh(position, pixel == 2);
             }
             let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3));
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");

@@ -192,10 +192,10 @@ impl<'a> CameraPass<'a> {
                 let Some(at) = self.tracer.pixel(tile, pixel) else { continue };
                 let is_uneven = uneven.binary_search(&pixel).is_ok();
                 films.iter_mut().for_each(|film| film.weigh(at, is_uneven));
-                stats.extra_samples += if is_uneven { u64::from(self.extra) } else { 0 };
             }
             Ok(())
         })?;
+        stats.extra_samples += films.iter().map(Film::extra_samples).sum::<u64>();
         stats.non_finite.film += films.iter().map(Film::non_finite).sum::<u64>();
         let paths = f64::from(self.window.width) * f64::from(self.window.height) * f64::from(self.spp);
         stats.warnings.extend(tally::lost_in_chains(stats.lost_camera_paths / paths));

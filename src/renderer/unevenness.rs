@@ -50,7 +50,12 @@ impl Square<'_> {
                 "mean" => { let v: Vec<f32> = around.iter().flatten().copied().collect(); v.iter().sum::<f32>() / v.len().max(1) as f32 }
                 "own3" => around.iter().flatten().chain(&own).fold(0.0_f32, |a, b| a.max(*b)),
                 "own" => own.unwrap_or(0.0),
-                _ => through(&around),
+                "through" => through(&around),
+                _ => {
+                    let far = AROUND.map(|(x, y)| at(column as i32 + 2 * x, row as i32 + 2 * y));
+                    let both = |i: usize| around[i].map(|near| near.max(far[i].unwrap_or(0.0)));
+                    through(&std::array::from_fn(both))
+                }
             };
             own.is_some() && e > threshold
         };

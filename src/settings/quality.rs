@@ -7,7 +7,7 @@ use super::Settings;
 pub enum Quality {
     /// To look at while a scene is made.
     Draft,
-    /// Clean where light is smooth; edges of 4 samples.
+    /// Clean where light is smooth, and at edges.
     #[default]
     Normal,
     /// Clean edges and penumbrae as well.
@@ -40,9 +40,9 @@ impl Quality {
     fn row(self) -> Row {
         match self {
             Self::Draft => (30_000, 50, 1, 1, 2, 32, 4, 16.0),
-            Self::Normal => (100_000, 50, 4, 16, 4, 64, 2, 8.0),
-            Self::High => (300_000, 50, 16, 64, 4, 128, 2, 8.0),
-            Self::Final => (1_000_000, 50, 64, 256, 4, 256, 1, 4.0),
+            Self::Normal => (100_000, 50, 4, 20, 4, 64, 2, 8.0),
+            Self::High => (300_000, 50, 16, 80, 4, 128, 2, 8.0),
+            Self::Final => (1_000_000, 50, 64, 320, 4, 256, 1, 4.0),
         }
     }
 
