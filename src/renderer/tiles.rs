@@ -377,10 +377,15 @@ impl<'a> CameraPass<'a> {
             return Ok(done);
         }
         gather.choose(self.gpu, &chosen);
-        let at_once = (self.tracer.room() as u32 / chosen.len() as u32).min(gather.rays());
-        for first in (0..gather.rays()).step_by(at_once as usize) {
+        // The rays of a pixel are those of all its samples.
+        let each = match tile.listed {
+            Some(_) => (gather.rays() * self.spp).div_ceil(self.spp + self.extra),
+            None => gather.rays(),
+        };
+        let at_once = (self.tracer.room() as u32 / chosen.len() as u32).min(each);
+        for first in (0..each).step_by(at_once as usize) {
             progress.check()?;
-            let rays = FinalRays { first, count: at_once.min(gather.rays() - first), chosen: chosen.len() as u32 };
+            let rays = FinalRays { first, count: at_once.min(each - first), chosen: chosen.len() as u32, each };
             done += gather.trace(self.gpu, self.scene, &self.tracer, tile, rays)?;
             done += light(gather, rays, &chosen)?;
             gather.add(self.gpu, &self.tracer, rays);

@@ -76,7 +76,7 @@ fn twins() -> Vec<Twin> {
         MapInfo { count, levels, split, pad }
         GatherInfo { count, first, neighbors, fixed_radius, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, map_number, pad0, pad1 }
         Gathered { radius_squared, count, fingerprint }
-        ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, map_number }
+        ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, map_number, is_listed }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
         KeyStep { count, segment_first, segment_count, fine }

@@ -77,6 +77,8 @@ pub struct FinalRays {
     pub count: u32,
     /// Number of chosen points.
     pub chosen: u32,
+    /// Rays of each of them in all.
+    pub each: u32,
 }
 
 impl FinalRays {
@@ -208,7 +210,7 @@ impl FinalGather {
         tile: &Tile,
         (ends, found, count): (&Buffer, &Buffer, u32),
     ) -> Result<StepCount> {
-        let rays = FinalRays { first: 0, count: 1, chosen: count };
+        let rays = FinalRays { first: 0, count: 1, chosen: count, each: 1 };
         self.light(gpu, scene, tracer, (tile, rays), (ends, found))
     }
 
@@ -245,7 +247,7 @@ impl FinalGather {
         let step = FinalStep {
             first_ray: rays.first,
             rays_now: rays.count,
-            rays: self.rays,
+            rays: rays.each,
             chosen: rays.chosen,
             joint: self.joint.into(),
             patches: self.patch_count,

@@ -29,7 +29,7 @@ pub struct SharedPoints<'a> {
     pub branches: u32,
     /// Cells of the margin.
     pub margin: u32,
-    /// Whether the pixels are those of a square. Others share nothing.
+    /// Whether the pixels are those of a square. Others share nothing with each other.
     pub is_square: bool,
     /// Radiance from each point, `vec4f`, and room for results of gathers,
     /// [`Gathered`](crate::layout::Gathered).
@@ -94,8 +94,11 @@ impl EstimateSharing {
     pub fn run(&mut self, gpu: &Gpu, map_number: u32, tile: &SharedPoints, estimates: &mut Estimates) -> Result<()> {
         let count = tile.pixels * tile.samples * tile.branches;
         for cell_pixels in ROUNDS {
-            if self.reach == 0.0 || !tile.is_square || cell_pixels * tile.samples < MIN_CELL {
+            if self.reach == 0.0 || cell_pixels * tile.samples < MIN_CELL {
                 break;
+            }
+            if !tile.is_square && cell_pixels > 1 {
+                continue;
             }
             let is_first = cell_pixels == ROUNDS[0];
             let round = ShareRound {
@@ -109,6 +112,7 @@ impl EstimateSharing {
                 reach_squared: self.reach * self.reach,
                 points: count,
                 map_number,
+                is_listed: (!tile.is_square).into(),
             };
             self.run_round(gpu, &round, tile, estimates)?;
         }
