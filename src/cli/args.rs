@@ -112,7 +112,7 @@ pub struct RenderArgs {
     pub quality: QualityArg,
 
     /// Camera samples of a pixel whose neighbours are uneven, as at edges, in penumbrae and in glass; no
-    /// more than --spp: every pixel has those [default: by --quality, 20; --spp where that is given,
+    /// more than --spp: every pixel has those [default: by --quality, 16; --spp where that is given,
     /// or without final gathering]
     #[arg(long, value_name = "N", value_parser = whole(PictureSettings::SPP), help_heading = "Picture")]
     pub max_spp: Option<u32>,
@@ -286,11 +286,11 @@ mod tests {
             let picture = settings(line).picture;
             (picture.spp, picture.extra_samples())
         };
-        assert_eq!(samples(""), (4, 16));
+        assert_eq!(samples(""), (4, 12));
         assert_eq!(samples("--spp 4"), (4, 0));
         assert_eq!(samples("--spp 4 --max-spp 7"), (4, 3));
         assert_eq!(samples("--max-spp 1"), (4, 0));
-        assert_eq!(samples("--quality high"), (16, 64));
+        assert_eq!(samples("--quality high"), (16, 48));
         assert_eq!(samples("--quality draft"), (1, 0));
         assert_eq!(samples("--final-gather 0"), (4, 0));
         assert_eq!(samples("--final-gather 0 --max-spp 64"), (4, 60));

@@ -384,7 +384,10 @@ impl Film {
             }
         }
         for matte in &self.mattes {
-            matte.channels(self.samples * u64::from(self.weights.plain)).into_iter().for_each(|(name, numbers)| frame.add_extra(&name, numbers));
+            matte
+                .channels(self.samples * u64::from(self.weights.plain))
+                .into_iter()
+                .for_each(|(name, numbers)| frame.add_extra(&name, numbers));
         }
         frame
     }

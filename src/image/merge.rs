@@ -328,7 +328,11 @@ mod tests {
             for (row, column) in (0..window.height).flat_map(|y| (0..window.width).map(move |x| (y, x))) {
                 let pixel = (row + window.row) * WHOLE.0 + column + window.column;
                 let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
-                film.add((column, row), &[[value, value, value, 0.0], [value; 4], [2.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 2);
+                film.add(
+                    (column, row),
+                    &[[value, value, value, 0.0], [value; 4], [2.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]],
+                    2,
+                );
             }
             let film = film.with_bandwidth(1.0 / f64::from(index + 1));
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).unwrap();

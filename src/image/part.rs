@@ -300,7 +300,14 @@ mod tests {
             for pixel in 0..6 {
                 let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
                 let position = (pixel % 3, pixel / 3);
-                let rows = [[value, value * 1e-9, 1e9, 0.0], [value; 4], [2.0; 4], [value * 7.0; 4], [value * 8.0; 4], [0.0; 4]];
+                let rows = [
+                    [value, value * 1e-9, 1e9, 0.0],
+                    [value; 4],
+                    [2.0; 4],
+                    [value * 7.0; 4],
+                    [value * 8.0; 4],
+                    [0.0; 4],
+                ];
                 film.add(position, &rows, 4);
                 film.add_to(Source::Estimate(MapKind::Caustic), position, &[value, 3.0, 1.0]);
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());

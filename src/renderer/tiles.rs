@@ -188,8 +188,8 @@ impl<'a> CameraPass<'a> {
                 self.trace(&extra, stats)?;
                 self.light(&extra, gatherer, &mut films, stats, progress)?;
             }
-            for pixel in 0..if self.extra > 0 { tile.pixels } else { 0 } {
-                let Some(at) = self.tracer.pixel(tile, pixel) else { continue };
+            let all = if self.extra > 0 { 0..tile.pixels } else { 0..0 };
+            for (pixel, at) in all.filter_map(|pixel| Some((pixel, self.tracer.pixel(tile, pixel)?))) {
                 let is_uneven = uneven.binary_search(&pixel).is_ok();
                 films.iter_mut().for_each(|film| film.weigh(at, is_uneven));
             }
@@ -262,15 +262,12 @@ impl<'a> CameraPass<'a> {
 
     /// Numbers of the tile's pixels that need more samples, in order.
     fn uneven_pixels(&self, tile: &Tile, sums: &[PixelSums]) -> Vec<u32> {
-        let number = |column: u32, row: u32| {
-            let spread = |x: u32| (0..16).fold(0, |sum, bit| sum | (x >> bit & 1) << (2 * bit));
-            spread(column) | spread(row) << 1
-        };
         let (columns, rows) = CameraTracer::square(tile);
         let is_in = |column, row| tile.first_column + column < self.size.0 && tile.first_row + row < self.size.1;
-        let of = |column, row| is_in(column, row).then(|| &sums[number(column, row) as usize]);
+        let of = |column, row| is_in(column, row).then(|| &sums[CameraTracer::number(column, row) as usize]);
         let square = Square { columns, rows, samples: tile.samples, sums: &of };
-        let mut pixels: Vec<u32> = square.uneven().into_iter().map(|(column, row)| number(column, row)).collect();
+        let numbers = square.uneven().into_iter().map(|(column, row)| CameraTracer::number(column, row));
+        let mut pixels: Vec<u32> = numbers.collect();
         pixels.sort_unstable();
         pixels
     }

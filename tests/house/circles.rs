@@ -211,6 +211,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "tally",
             "seen",
             "maps",
+            "unevenness",
             "tiles",
             "preview",
             "gatherer",

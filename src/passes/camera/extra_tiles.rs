@@ -31,10 +31,17 @@ impl CameraTracer {
         tiles
     }
 
-    /// Columns and rows of a tile's square, and the place of its pixels there in Morton order.
+    /// Columns and rows of a tile's square.
     #[must_use]
     pub fn square(tile: &Tile) -> (u32, u32) {
         let bits = tile.pixels.ilog2();
         (1 << bits.div_ceil(2), 1 << (bits / 2))
+    }
+
+    /// Number of a pixel of a tile in Morton order, by its column and row there.
+    #[must_use]
+    pub fn number(column: u32, row: u32) -> u32 {
+        let spread = |x: u32| (0..16).fold(0, |sum, bit| sum | ((x >> bit) & 1) << (2 * bit));
+        spread(column) | (spread(row) << 1)
     }
 }
