@@ -12,6 +12,7 @@ use super::{
     size::picture_size,
     tally,
     tiles::{CameraPass, Gatherer},
+    unevenness::UNEVENNESS_REACH,
 };
 use crate::{
     bvh::{Bvh, Media, MediaProbe, contacts},
@@ -289,11 +290,15 @@ fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSetti
     let spacing = record_spacing(size, estimate.gather_spacing, branches);
     let reach = filter_footprint(estimate.gather_radius, spacing);
     let window = picture.window(size);
+    // Those around a pixel tell whether it has more samples.
+    let around = if picture.extra_samples() > 0 { UNEVENNESS_REACH } else { 0 };
     let along = |pixels: u32, origin: u32, count: u32| {
+        let end = (origin + count + around).min(pixels);
+        let origin = origin.saturating_sub(around);
         let side = pixels.div_ceil(spacing);
         let scaled = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
         let first = scaled(origin).saturating_sub(reach + 1);
-        (side, first, (scaled(origin + count) + reach + 2).min(side) - first)
+        (side, first, (scaled(end) + reach + 2).min(side) - first)
     };
     let (columns, column, width) = along(size.0, window.column, window.width);
     let (rows, row, height) = along(size.1, window.row, window.height);

@@ -11,8 +11,11 @@ use crate::layout::{LAYER_ROWS, PixelSums};
 
 /// Squared relative error of the mean of its samples from which on a pixel is uneven.
 const UNEVEN: f32 = 0.005;
-/// Radiance below which errors count less, as a fraction of what is usual in the square.
-const DARK: f64 = 0.1;
+/// Radiance below which errors count less, as a fraction of that around.
+const DARK: f32 = 0.1;
+
+/// Pixels on each side of a pixel that tell whether it has more samples.
+pub const UNEVENNESS_REACH: u32 = 2;
 
 /// Steps to the neighbours of a pixel, in turn around it.
 const AROUND: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
@@ -31,50 +34,55 @@ impl Square<'_> {
     /// Columns and rows of the pixels between uneven ones, row by row.
     pub fn uneven(&self) -> Vec<(u32, u32)> {
         let places = || (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| (column, row)));
-        let dark = self.dark(places());
-        let error = |(column, row)| (self.sums)(column, row).map(|sums| error(sums, self.samples, dark));
-        let errors: Vec<Option<f32>> = places().map(error).collect();
+        let spread = |(column, row)| (self.sums)(column, row).map(|sums| Spread::of(sums, self.samples));
+        let spreads: Vec<Option<Spread>> = places().map(spread).collect();
         let at = |column: i32, row: i32| {
             let (column, row) = (u32::try_from(column).ok()?, u32::try_from(row).ok()?);
-            (column < self.columns && row < self.rows).then(|| errors[(row * self.columns + column) as usize])?
+            (column < self.columns && row < self.rows).then(|| spreads[(row * self.columns + column) as usize])?
         };
         let is_uneven = |&(column, row): &(u32, u32)| {
             let (column, row) = (column as i32, row as i32);
+            let near = AROUND.map(|(x, y)| at(column + x, row + y));
+            let far = AROUND.map(|(x, y)| at(column + 2 * x, row + 2 * y));
+            let all = || near.iter().chain(&far).flatten();
+            let dark = DARK * all().map(|one| one.light()).sum::<f32>() / all().count().max(1) as f32;
+            let error = |one: &Spread| one.error(dark);
             // Few samples may miss what runs along the rim of the next pixel, but show it in the
             // one after that.
-            let toward = |i: usize| {
-                let (x, y) = AROUND[i];
-                let near = at(column + x, row + y)?;
-                Some(near.max(at(column + 2 * x, row + 2 * y).unwrap_or(0.0)))
-            };
+            let toward = |i: usize| Some(error(near[i].as_ref()?).max(far[i].as_ref().map_or(0.0, error)));
             at(column, row).is_some() && through(&from_fn(toward)) > UNEVEN
         };
         places().filter(is_uneven).collect()
     }
-
-    /// Radiance below which errors count less. The mean of roots hardly follows a small lamp.
-    fn dark(&self, places: impl Iterator<Item = (u32, u32)>) -> f32 {
-        let (mut roots, mut count) = (0.0, 0);
-        for sums in places.filter_map(|(column, row)| (self.sums)(column, row)) {
-            let mean = sums[0][..3].iter().map(|sum| f64::from(*sum)).sum::<f64>() / (3.0 * f64::from(self.samples));
-            roots += if mean.is_finite() { mean.max(0.0).sqrt() } else { 0.0 };
-            count += 1;
-        }
-        (DARK * (roots / f64::from(count.max(1))).powi(2)) as f32
-    }
 }
 
-/// Squared relative error of the mean of a pixel's samples, mean of the channels.
-fn error(sums: &PixelSums, samples: u32, dark: f32) -> f32 {
-    let n = samples as f32;
-    let of = |c: usize| {
-        let mean = sums[0][c] / n;
-        let variance = (sums[LAYER_ROWS + 1][c] / n - mean * mean).max(0.0) / (n - 1.0);
-        variance / (mean * mean + dark * dark).max(f32::MIN_POSITIVE)
-    };
-    let mean = [0, 1, 2].map(of).iter().sum::<f32>() / 3.0;
-    // A sum of squares is infinite where radiance is beyond the root of what numbers hold.
-    if mean.is_nan() { 0.0 } else { mean }
+/// Mean of a pixel's samples, and the variance of that mean.
+#[derive(Clone, Copy)]
+struct Spread {
+    mean: [f32; 3],
+    variance: [f32; 3],
+}
+
+impl Spread {
+    fn of(sums: &PixelSums, samples: u32) -> Self {
+        let n = samples as f32;
+        let mean = from_fn(|c| sums[0][c] / n);
+        let variance = |c: usize| (sums[LAYER_ROWS + 1][c] / n - mean[c] * mean[c]).max(0.0) / (n - 1.0);
+        Self { mean, variance: from_fn(variance) }
+    }
+
+    /// Mean of the channels.
+    fn light(&self) -> f32 {
+        self.mean.iter().sum::<f32>() / 3.0
+    }
+
+    /// Squared relative error of the mean, mean of the channels.
+    fn error(&self, dark: f32) -> f32 {
+        let of = |c: usize| self.variance[c] / (self.mean[c] * self.mean[c] + dark * dark).max(f32::MIN_POSITIVE);
+        let error = [0, 1, 2].map(of).iter().sum::<f32>() / 3.0;
+        // Of radiance whose square is beyond what numbers hold.
+        if error.is_nan() { 0.0 } else { error }
+    }
 }
 
 /// Error of what runs through a pixel: the largest that neighbours on opposite sides have both. Of

@@ -22,7 +22,7 @@ use support::{photons::Random, *};
 fn sampled(size: u32, most: u32) -> Settings {
     settings(Mode::DirectRays, 1, size).with(|s| {
         s.picture.spp = 4;
-        s.picture.max_spp = Some(most);
+        s.picture.max_spp = (most > 4).then_some(most);
     })
 }
 
@@ -48,7 +48,7 @@ fn uneven_pixels_have_the_error_of_many_samples() {
     assert_eq!(even.stats.extra_samples, 0);
     let part = more.stats.extra_samples as f64 / f64::from(128 * 128 * 16);
     assert!((0.02..0.5).contains(&part), "{part} of the pixels have more samples");
-    let error = |render: &caustica::renderer::Render| rel_mse(render.frame.radiance(), many.frame.radiance(), 0.01);
+    let error = |render: &caustica::renderer::Render| rel_mse(render.frame.radiance(), many.frame.radiance(), None);
     println!("relMSE {:.5} with more samples in {part:.2} of the pixels, {:.5} without", error(&more), error(&even));
     assert!(error(&more) < 0.35 * error(&even), "{} and {}", error(&more), error(&even));
     // Control: as many samples as those have in the mean, but in all pixels.
@@ -108,7 +108,8 @@ fn a_crop_has_the_bits_of_the_whole() {
     let part = render_scene(&scene, &settings.clone().with(|s| s.picture.crop = Some(crop)));
     let rows = whole.frame.radiance().chunks(150).skip(70).take(37);
     let expected: Vec<_> = rows.flat_map(|row| row[60..101].to_vec()).collect();
-    assert_eq!(part.frame.radiance(), expected);
+    let differ = part.frame.radiance().iter().zip(&expected).filter(|(a, b)| a != b).count();
+    assert_eq!(differ, 0, "pixels of {}", expected.len());
     assert!((1..whole.stats.extra_samples).contains(&part.stats.extra_samples), "those of its own pixels");
     let other = render_scene(&scene, &settings.with(|s| s.photons.seed = 1));
     assert_ne!(other.frame.radiance(), whole.frame.radiance(), "control: another seed");
@@ -154,7 +155,7 @@ fn passes_have_further_samples_of_their_own() {
     both.merge(&second).expect("of one picture");
     assert_eq!(both.extra_samples(), first.extra_samples() + second.extra_samples());
     let many = render_scene(&scene, &settings.clone().with(|s| (s.picture.spp, s.picture.max_spp) = (256, None)));
-    let error = |film: &caustica::image::Film| rel_mse(film.finish().radiance(), many.frame.radiance(), 0.01);
+    let error = |film: &caustica::image::Film| rel_mse(film.finish().radiance(), many.frame.radiance(), None);
     assert!(error(&both) < 0.75 * error(&first), "{} and {}", error(&both), error(&first));
     let plain = Session::film(
         &session,
