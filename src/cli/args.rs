@@ -111,9 +111,9 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WHAT", value_enum, default_value = "normal", help_heading = "Picture")]
     pub quality: QualityArg,
 
-    /// Camera samples of a pixel whose neighbours are uneven, as at edges, in penumbrae and in glass; no
-    /// more than --spp: every pixel has those [default: by --quality, 16; --spp where that is given,
-    /// or without final gathering]
+    /// Camera samples of a pixel whose neighbours are uneven, as at edges, in penumbrae and in
+    /// glass; no more than --spp: every pixel has those [default: by --quality, 16; --spp where
+    /// that is given, or without final gathering]
     #[arg(long, value_name = "N", value_parser = whole(PictureSettings::SPP), help_heading = "Picture")]
     pub max_spp: Option<u32>,
 
