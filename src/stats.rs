@@ -166,6 +166,9 @@ pub struct Stats {
     /// in paths.
     #[serde(default)]
     pub lost_camera_paths: f64,
+    /// Camera samples of the picture beyond those that every pixel has.
+    #[serde(default)]
+    pub extra_samples: u64,
     /// Times that more solids met in one place than are told apart.
     pub media_overflows: u64,
     /// Rays given up: late ones for which there was no room, none on software; their light is lost.
@@ -207,6 +210,7 @@ impl Stats {
         p.lights.iter_mut().zip(&q.lights).for_each(|(light, of_pass)| light.photons += of_pass.photons);
         self.rays += pass.rays;
         self.lost_camera_paths += pass.lost_camera_paths;
+        self.extra_samples += pass.extra_samples;
         self.media_overflows += pass.media_overflows;
         self.unfinished_rays += pass.unfinished_rays;
         self.non_finite.add(pass.non_finite);

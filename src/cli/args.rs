@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use caustica::{
     compare::TOLERANCE,
-    settings::{EstimateSettings, Mode, PhotonSettings, Quality, Settings},
+    settings::{EstimateSettings, Mode, PhotonSettings, PictureSettings, Quality, Settings},
 };
 use clap::{
     ArgAction, Parser, Subcommand,
@@ -111,6 +111,12 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WHAT", value_enum, default_value = "normal", help_heading = "Picture")]
     pub quality: QualityArg,
 
+    /// Camera samples of a pixel whose neighbours are uneven, as at edges, in penumbrae and in
+    /// glass; no more than --spp: every pixel has those [default: by --quality, 16; --spp where
+    /// that is given, or without final gathering]
+    #[arg(long, value_name = "N", value_parser = whole(PictureSettings::SPP), help_heading = "Picture")]
+    pub max_spp: Option<u32>,
+
     /// Rays of final gathering per visible point: light over other surfaces is what these see of
     /// direct light and the maps; 0 takes it from the photons around the point itself [default: by
     /// --quality, 64; 0 in other modes than hybrid and indirect-photons, with --raw-estimate, and
@@ -204,6 +210,7 @@ impl RenderArgs {
         let size = options.shared.size.unwrap_or(Quality::WHOLE);
         let base = if gathers { quality.settings_for(size) } else { quality.without_final_gather_for(size) };
         options.settings(base).with(|s| {
+            s.picture.max_spp = self.max_spp.or(s.picture.max_spp);
             s.photons.final_gather = self.final_gather.unwrap_or(s.photons.final_gather);
             s.estimate.gather_spacing = self.gather_spacing.unwrap_or(s.estimate.gather_spacing);
             s.estimate.gather_radius = self.gather_radius.unwrap_or(s.estimate.gather_radius);
@@ -222,13 +229,14 @@ impl RenderArgs {
     pub fn quality_line(&self) -> String {
         let Settings { photons, estimate, picture, .. } = self.settings();
         format!(
-            "quality {}: --global-photons {} --caustic-photons {} -k {} --spp {} --light-samples {} --final-gather {} \
+            "quality {}: --global-photons {} --caustic-photons {} -k {} --spp {} --max-spp {} --light-samples {} --final-gather {} \
              --gather-spacing {} --gather-radius {}",
             Quality::from(self.quality).name(),
             photons.global,
             photons.caustic,
             estimate.neighbors,
             picture.spp,
+            picture.spp + picture.extra_samples(),
             picture.light_samples,
             photons.final_gather,
             estimate.gather_spacing,
@@ -266,9 +274,26 @@ mod tests {
         let high = settings("--quality high --spp 9 --final-gather 32");
         let expected = Quality::High.settings().with(|s| {
             s.picture.spp = 9;
+            s.picture.max_spp = None;
             s.photons.final_gather = 32;
         });
         assert_eq!(high, expected);
+    }
+
+    #[test]
+    fn a_number_of_samples_is_that_of_every_pixel() {
+        let samples = |line: &str| {
+            let picture = settings(line).picture;
+            (picture.spp, picture.extra_samples())
+        };
+        assert_eq!(samples(""), (4, 12));
+        assert_eq!(samples("--spp 4"), (4, 0));
+        assert_eq!(samples("--spp 4 --max-spp 7"), (4, 3));
+        assert_eq!(samples("--max-spp 1"), (4, 0));
+        assert_eq!(samples("--quality high"), (16, 48));
+        assert_eq!(samples("--quality draft"), (1, 0));
+        assert_eq!(samples("--final-gather 0"), (4, 0));
+        assert_eq!(samples("--final-gather 0 --max-spp 64"), (4, 60));
     }
 
     #[test]

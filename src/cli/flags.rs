@@ -4,7 +4,7 @@
 type Row = (&'static str, &'static str);
 
 /// Inputs that a message of the library can name.
-const FLAGS: [Row; 42] = [
+const FLAGS: [Row; 43] = [
     ("device", "--device"),
     ("estimate.cone_constant", "--cone-constant"),
     ("estimate.kernel", "--kernel"),
@@ -44,6 +44,7 @@ const FLAGS: [Row; 42] = [
     ("picture.focus", "--focus"),
     ("picture.layers", "--layers"),
     ("picture.light_samples", "--light-samples"),
+    ("picture.max_spp", "--max-spp"),
     ("picture.pixel_filter", "--pixel-filter"),
     ("picture.size", "--size"),
     ("picture.spp", "--spp"),

@@ -226,6 +226,8 @@ impl SharedOptions {
                 crop: self.crop,
                 camera: self.camera.clone(),
                 spp: self.spp.unwrap_or(picture.spp),
+                // That many samples are those of every pixel.
+                max_spp: picture.max_spp.filter(|_| self.spp.is_none()),
                 pixel_filter: self.pixel_filter.into(),
                 aperture: self.aperture.unwrap_or(picture.aperture),
                 focus: self.focus,

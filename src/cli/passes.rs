@@ -247,6 +247,7 @@ fn picture(inputs: &Inputs, done: &Done) -> Result<Picture> {
     let total = done.sum.total()?.ok_or_else(|| Error::Incomplete("no pass was rendered".to_owned()))?;
     let mut stats = done.stats.clone();
     (stats.photons.global, stats.photons.caustic) = (total.photons().global, total.photons().caustic);
+    stats.extra_samples = total.film().extra_samples();
     let mut attributes = attributes(inputs, &stats);
     attributes.insert("passes".to_owned(), passes(&done.sum));
     let error = ErrorEstimate::of(total.film(), inputs.args.passes.region);

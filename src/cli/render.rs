@@ -218,7 +218,7 @@ fn summary(stats: &Stats) -> String {
     let (s, global, caustic) = (&stats.seconds, stats.photons.global, stats.photons.caustic);
     format!(
         "seconds: load {:.2}, bvh {:.2}, photons {:.2}, grid {:.2}, camera {:.2}, direct {:.2}, gather {:.2}, \
-         total {:.2}\nglobal map: {} photons of {} paths\ncaustic map: {} photons of {} paths\nrays: {}\n\
+         total {:.2}\ncamera samples in some pixels only: {}\nglobal map: {} photons of {} paths\ncaustic map: {} photons of {} paths\nrays: {}\n\
          peak device memory: {:.1} MiB",
         s.load,
         s.bvh,
@@ -228,6 +228,7 @@ fn summary(stats: &Stats) -> String {
         s.direct,
         s.gather,
         s.total,
+        stats.extra_samples,
         global.stored,
         global.emitted,
         caustic.stored,

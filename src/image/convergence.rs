@@ -79,8 +79,8 @@ mod tests {
         let window = Crop { column: 4, row: 2, width: 2, height: 1 };
         let one = |(value, bandwidth): &(f32, f64)| {
             let mut film = Film::new((8, 8), window, 1).with_bandwidth(*bandwidth);
-            film.add((0, 0), &[[1.0, 1.0, 1.0, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
-            film.add((1, 0), &[[*value, *value, *value, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
+            film.add((0, 0), &[[1.0, 1.0, 1.0, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
+            film.add((1, 0), &[[*value, *value, *value, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
             film
         };
         let mut merged = one(&passes[0]);

@@ -32,6 +32,11 @@ impl Matte {
         }
     }
 
+    /// Has each sample of a pixel count that many times.
+    pub fn weigh(&mut self, pixel: usize, weight: u32) {
+        self.ranks[pixel].iter_mut().for_each(|rank| rank[1] *= weight);
+    }
+
     /// Adds the samples of other passes of the same pixels. What covers most is kept.
     pub fn merge(&mut self, other: &Self) {
         for (ranks, theirs) in self.ranks.iter_mut().zip(&other.ranks) {

@@ -164,6 +164,7 @@ impl Provenance<'_> {
         let all = texts.into_iter().chain(environment);
         let mut attributes: Attributes = all.map(|(name, value)| (name.to_owned(), value)).collect();
         count_photons(&mut attributes, stats.photons.global, stats.photons.caustic);
+        count_samples(&mut attributes, stats.extra_samples);
         let asked = &settings.picture.layers;
         if asked.contains(&ExtraLayers::Objects) {
             attributes.extend(Matte::attributes(ExtraLayers::Objects, self.objects.iter().copied()));
@@ -181,6 +182,11 @@ pub(super) fn count_photons(attributes: &mut Attributes, global: MapStats, caust
         attributes.insert(format!("{map}Emitted"), of_map.emitted.to_string());
         attributes.insert(format!("{map}Stored"), of_map.stored.to_string());
     }
+}
+
+/// Sets the attribute that counts samples beyond those that every pixel has.
+pub(super) fn count_samples(attributes: &mut Attributes, extra: u64) {
+    attributes.insert("extraSamples".to_owned(), extra.to_string());
 }
 
 /// The attributes in the form of the file's writer.

@@ -3,6 +3,8 @@
 
 use std::array;
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     cryptomatte::Matte,
     frame::{DataWindow, Frame},
@@ -41,6 +43,28 @@ pub struct Film {
     pub(super) mattes: Vec<Matte>,
     /// Number of samples that were left out, since a sum would not be finite with them.
     pub(super) non_finite: u64,
+    /// How samples of pixels that have more of them count.
+    pub(super) weights: Weights,
+    /// Number of samples beyond those that every pixel has.
+    pub(super) extra_samples: u64,
+}
+
+/// How the samples of a pass count in pixels of different numbers of samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Weights {
+    /// Factors on counts of samples where a pixel has those that every pixel has, and where it has
+    /// more: both give a pixel the same total. The first is also that of the number of samples.
+    pub plain: u32,
+    pub uneven: u32,
+    /// Samples that a pixel has more.
+    pub extra: u32,
+}
+
+/// Every pixel has the same number.
+impl Default for Weights {
+    fn default() -> Self {
+        Self { plain: 1, uneven: 1, extra: 0 }
+    }
 }
 
 /// Sums of a layer that was asked for.
@@ -102,6 +126,36 @@ impl Film {
             extras: Vec::new(),
             mattes: Vec::new(),
             non_finite: 0,
+            weights: Weights::default(),
+            extra_samples: 0,
+        }
+    }
+
+    /// Has some pixels take so many samples more, see [`Self::weigh`].
+    #[must_use]
+    pub fn with_extra_samples(mut self, extra: u32) -> Self {
+        let spp = self.samples as u32;
+        let divisor = (1..=spp.max(1)).rev().find(|d| spp % d == 0 && extra % d == 0).unwrap_or(1);
+        if extra > 0 {
+            self.weights = Weights { plain: (spp + extra) / divisor, uneven: spp / divisor, extra };
+        }
+        self
+    }
+
+    /// Weighs what a pixel has so far as that number of samples that every pixel has. `is_uneven`:
+    /// it has more.
+    pub(crate) fn weigh(&mut self, (column, row): (u32, u32), is_uneven: bool) {
+        let pixel = row as usize * self.window.width as usize + column as usize;
+        let Weights { plain, uneven, extra } = self.weights;
+        self.mattes.iter_mut().for_each(|matte| matte.weigh(pixel, if is_uneven { uneven } else { plain }));
+        if is_uneven {
+            self.extra_samples += u64::from(extra);
+            let weight = uneven as f32 / plain as f32;
+            let all = LAYERS.iter().map(|layer| layer.channels.len()).zip(&mut self.sums);
+            let extras = self.extras.iter_mut().map(|layer| (layer.count(), &mut layer.sums));
+            for (count, sums) in all.chain(extras) {
+                sums[pixel * count..][..count].iter_mut().for_each(|sum| *sum *= weight);
+            }
         }
     }
 
@@ -176,6 +230,7 @@ impl Film {
                 }
             }
             total.non_finite += film.non_finite;
+            total.extra_samples += film.extra_samples;
         }
         let mut total = total.expect("a group of lights");
         total.extras.extend(lights);
@@ -210,6 +265,12 @@ impl Film {
     #[must_use]
     pub fn samples(&self) -> u64 {
         self.samples
+    }
+
+    /// Number of samples beyond those that every pixel has.
+    #[must_use]
+    pub fn extra_samples(&self) -> u64 {
+        self.extra_samples
     }
 
     /// Number of samples that were left out, since a sum would not be finite with them.
@@ -256,6 +317,9 @@ impl Film {
         if (layers(self), mattes(self)) != (layers(other), mattes(other)) {
             return Err(Error::Differs("films of different layers cannot be merged".to_owned()));
         }
+        if self.weights != other.weights {
+            return Err(Error::Differs("films of different numbers of samples cannot be merged".to_owned()));
+        }
         if (self.whole, self.window) != (other.whole, other.window) {
             let part = |film: &Self| {
                 let (Crop { column, row, width, height }, (w, h)) = (film.window, film.whole);
@@ -299,6 +363,7 @@ impl Film {
         self.passes += other.passes;
         self.samples += other.samples;
         self.non_finite += other.non_finite;
+        self.extra_samples += other.extra_samples;
         Ok(())
     }
 
@@ -319,7 +384,10 @@ impl Film {
             }
         }
         for matte in &self.mattes {
-            matte.channels(self.samples).into_iter().for_each(|(name, numbers)| frame.add_extra(&name, numbers));
+            matte
+                .channels(self.samples * u64::from(self.weights.plain))
+                .into_iter()
+                .for_each(|(name, numbers)| frame.add_extra(&name, numbers));
         }
         frame
     }
@@ -409,7 +477,7 @@ mod tests {
         let (s, hits) = (samples as f32, samples as f32 / 2.0);
         let rows = [[v * s, 2.0 * v * s, 3.0 * v * s, 0.0], [0.0, 0.0, hits, 5.0 * hits], [v * hits, 0.0, 0.0, hits]];
         let [radiance, normal, albedo] = rows;
-        [radiance, normal, albedo, [7.0 * hits, 8.0 * hits, 9.0 * hits, 0.0], [0.0; 4]]
+        [radiance, normal, albedo, [7.0 * hits, 8.0 * hits, 9.0 * hits, 0.0], [0.0; 4], [0.0; 4]]
     }
 
     fn film(values: &[f32], spp: u32) -> Film {
@@ -499,7 +567,7 @@ mod tests {
         assert_eq!(film.non_finite(), 2, "twice the blue channel exceeds the largest number");
         assert!(film.finish().radiance()[0].iter().all(|x| x.is_finite()));
         let mut counted = Film::new(WHOLE, ALL, 1);
-        counted.add((1, 1), &[[0.0, 0.0, 0.0, 3.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
+        counted.add((1, 1), &[[0.0, 0.0, 0.0, 3.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
         assert_eq!(counted.non_finite(), 3);
     }
 }

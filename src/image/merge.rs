@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    exr::{Attributes, count_photons},
+    exr::{Attributes, count_photons, count_samples},
     frame::{DataWindow, Frame},
     layers::LAYERS,
     part::{PartHeader, read_part, read_part_header},
@@ -247,7 +247,7 @@ pub fn merge(survey: &Survey, check: &dyn Fn(usize) -> Result<()>) -> Result<(Fr
     };
     attributes.insert("device".to_owned(), joined(|(device, _)| device));
     attributes.insert("driver".to_owned(), joined(|(_, driver)| driver));
-    let (mut frames, mut read) = (Vec::new(), 0);
+    let (mut frames, mut read, mut extra_samples) = (Vec::new(), 0, 0);
     for parts in &survey.windows {
         let mut fold = Fold::default();
         for (_, path) in &parts.parts {
@@ -261,8 +261,10 @@ pub fn merge(survey: &Survey, check: &dyn Fn(usize) -> Result<()>) -> Result<(Fr
             let passes: Vec<String> = parts.passes().iter().map(ToString::to_string).collect();
             attributes.insert("passes".to_owned(), passes.join(", "));
         }
+        extra_samples += sum.film.extra_samples;
         frames.push((parts.window, sum.film.finish_with_errors()));
     }
+    count_samples(&mut attributes, extra_samples);
     if frames.len() == 1 {
         return Ok((frames.pop().expect("one frame").1, attributes));
     }
@@ -326,7 +328,11 @@ mod tests {
             for (row, column) in (0..window.height).flat_map(|y| (0..window.width).map(move |x| (y, x))) {
                 let pixel = (row + window.row) * WHOLE.0 + column + window.column;
                 let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
-                film.add((column, row), &[[value, value, value, 0.0], [value; 4], [2.0; 4], [0.0; 4], [0.0; 4]], 2);
+                film.add(
+                    (column, row),
+                    &[[value, value, value, 0.0], [value; 4], [2.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]],
+                    2,
+                );
             }
             let film = film.with_bandwidth(1.0 / f64::from(index + 1));
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).unwrap();

@@ -13,10 +13,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     cryptomatte::{Matte, RANKS},
-    exr::{Attributes, channels_of, count_photons, encode, failure},
+    exr::{Attributes, channels_of, count_photons, count_samples, encode, failure},
     exr_read::{attributes_of, open, our_attributes, window_of},
     file::{open_regular, write_file},
-    film::{Bandwidth, ExtraSums, Film, Moments},
+    film::{Bandwidth, ExtraSums, Film, Moments, Weights},
     frame::DataWindow,
     layers::{EXTRA_LAYERS, LAYERS, Rule, layer_index},
     pass_sum::{PassBlock, PassSum, is_block},
@@ -56,6 +56,10 @@ struct BlockRow {
     extras: Vec<ExtraRow>,
     #[serde(default)]
     mattes: Vec<ExtraLayers>,
+    #[serde(default)]
+    weights: Weights,
+    #[serde(default)]
+    extra_samples: u64,
 }
 
 /// A layer that was asked for.
@@ -91,6 +95,7 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
     let total = sum.total()?.expect("a part has a pass");
     let mut attributes = attributes.clone();
     count_photons(&mut attributes, total.photons.global, total.photons.caustic);
+    count_samples(&mut attributes, total.film.extra_samples);
     let rows: Vec<BlockRow> = sum.blocks.iter().map(row).collect();
     attributes.insert("blocks".to_owned(), serde_json::to_string(&rows).expect("blocks hold numbers only"));
     attributes.insert("passes".to_owned(), range(&rows).to_string());
@@ -151,6 +156,8 @@ fn row(block: &PassBlock) -> BlockRow {
         caustic: block.photons.caustic,
         extras,
         mattes,
+        weights: block.film.weights,
+        extra_samples: block.film.extra_samples,
     }
 }
 
@@ -245,6 +252,8 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             extras: row.extras.iter().map(extra).collect::<Result<_>>()?,
             mattes: row.mattes.iter().map(matte).collect::<Result<_>>()?,
             non_finite: row.non_finite,
+            weights: row.weights,
+            extra_samples: row.extra_samples,
         };
         let photons = ByKind { global: row.global, caustic: row.caustic };
         blocks.push(PassBlock { range: row.passes, film, photons });
@@ -259,7 +268,7 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
     let is_good = |row: &BlockRow| {
         let is_finite = row.bandwidth.iter().all(|bits| f64::from_bits(*bits).is_finite());
         let in_reach = row.passes.first < row.passes.end && PassRange::END.contains(row.passes.end);
-        in_reach && is_block(row.passes) && row.samples > 0 && is_finite
+        in_reach && is_block(row.passes) && row.samples > 0 && row.weights.plain > 0 && is_finite
     };
     let consecutive = rows.windows(2).all(|pair| pair[0].passes.end == pair[1].passes.first);
     if rows.is_empty() || !consecutive || !rows.iter().all(is_good) {
@@ -287,14 +296,22 @@ mod tests {
     fn sum(passes: std::ops::Range<u32>) -> PassSum {
         let mut sum = PassSum::default();
         for index in passes {
-            let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL);
+            let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL).with_extra_samples(12);
             for pixel in 0..6 {
                 let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
                 let position = (pixel % 3, pixel / 3);
-                let rows = [[value, value * 1e-9, 1e9, 0.0], [value; 4], [2.0; 4], [value * 7.0; 4], [value * 8.0; 4]];
+                let rows = [
+                    [value, value * 1e-9, 1e9, 0.0],
+                    [value; 4],
+                    [2.0; 4],
+                    [value * 7.0; 4],
+                    [value * 8.0; 4],
+                    [0.0; 4],
+                ];
                 film.add(position, &rows, 4);
                 film.add_to(Source::Estimate(MapKind::Caustic), position, &[value, 3.0, 1.0]);
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
+                film.weigh(position, pixel == 2);
             }
             let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3));
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");

@@ -176,7 +176,11 @@ mod tests {
     fn pass(index: u32) -> PassBlock {
         let mut film = Film::new((1, 1), Crop { column: 0, row: 0, width: 1, height: 1 }, 1);
         let value = 0.1 + 1.0 / (index as f32 + 3.0);
-        film.add((0, 0), &[[value, value * 1e-5, value * 1e5, 0.0], [value; 4], [value; 4], [0.0; 4], [0.0; 4]], 1);
+        film.add(
+            (0, 0),
+            &[[value, value * 1e-5, value * 1e5, 0.0], [value; 4], [value; 4], [0.0; 4], [0.0; 4], [0.0; 4]],
+            1,
+        );
         let map = MapStats { emitted: 10, stored: u64::from(index), seen: None };
         let stats = Stats::default();
         PassBlock { photons: ByKind { global: map, caustic: map }, ..PassBlock::of_pass(index, film, &stats) }

@@ -120,6 +120,12 @@ pub struct CameraTile {
     /// Width of what a sample sees by rough lobes, metres, from which on irradiance kept in cells
     /// will do; 0: nowhere.
     pub cells_from: f32,
+    /// 0: the tile's pixels are all of a square. Otherwise a list of some of them, and one more
+    /// than the number of those that other tiles of the same square had before.
+    pub listed: u32,
+    pub listed_at: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// First hit of a camera sample.
@@ -198,6 +204,6 @@ pub struct ArrivingLight {
 }
 
 /// Sums over a tile's samples of one pixel, by rows. The first row is the radiance, and the number
-/// of samples left out of it because the sum would not be finite with them. The others are the rows
-/// of the samples.
-pub type PixelSums = [[f32; 4]; LAYER_ROWS + 1];
+/// of samples left out of it because the sum would not be finite with them. Then follow the rows of
+/// the samples, and the squares of their radiance.
+pub type PixelSums = [[f32; 4]; LAYER_ROWS + 2];

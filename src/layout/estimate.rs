@@ -75,6 +75,8 @@ pub struct ShareRound {
     pub points: u32,
     /// Same as in [`GatherInfo`].
     pub map_number: u32,
+    /// 1: cells that follow each other are no neighbours, and share nothing with each other.
+    pub is_listed: u32,
 }
 
 /// Bytes of `SearchState` in the shaders: the state of a query between dispatches.

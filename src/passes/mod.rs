@@ -2,7 +2,7 @@
 
 pub mod camera;
 pub mod estimate;
-pub mod late_rays;
+pub mod lists;
 pub mod maps;
 pub mod photons;
 pub mod wavefront;
@@ -12,6 +12,6 @@ pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
     Records, SharedPoints, filter_footprint, record_spacing,
 };
-pub use late_rays::LateRays;
+pub use lists::Lists;
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
 pub use photons::{PathRange, PathRanges, PhotonTracer, RawMap, TracedPhotons};

@@ -2,7 +2,7 @@
 //! paths is compacted between dispatches. It traces photons, camera paths and rays of final
 //! gathering. Kernel: `advance_queue`.
 
-use super::late_rays::LateRays;
+use super::lists::Lists;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
@@ -27,8 +27,8 @@ pub struct Wavefront {
     /// One [`Counters`], cleared by each run.
     pub counters: Buffer,
     dispatch_arguments: Buffer,
-    /// Paths whose rays need more than one dispatch.
-    late_rays: LateRays,
+    /// Of paths whose rays need more than one dispatch, and of pixels.
+    pub lists: Lists,
 }
 
 /// A kernel and the buffers that it uses besides the scene and those of the wavefront, by name.
@@ -39,18 +39,19 @@ pub struct Step<'b> {
 }
 
 impl Wavefront {
-    /// Room for `slots` paths in a scene; `name` is in the labels of its buffers.
+    /// Room for `slots` paths in a scene, and for a list of `pixels`; `name` is in the labels of its
+    /// buffers.
     ///
     /// # Errors
     /// Limits of the adapter.
-    pub fn new(gpu: &Gpu, scene: &SceneBuffers, name: &str, slots: u64) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, name: &str, (slots, pixels): (u64, u64)) -> Result<Self> {
         Ok(Self {
             advance: Kernel::new(gpu, "advance_queue", &[]),
             paths: gpu.storage::<Path>(&format!("{name} paths"), slots)?,
             queues: gpu.storage::<u32>(&format!("{name} queues"), 2 * slots)?,
             counters: gpu.storage::<Counters>(&format!("{name} counters"), 1)?,
             dispatch_arguments: gpu.storage::<[u32; 3]>(&format!("{name} dispatch arguments"), 1)?,
-            late_rays: LateRays::new(gpu, scene, slots)?,
+            lists: Lists::new(gpu, scene, slots, pixels)?,
         })
     }
 
@@ -94,9 +95,9 @@ impl Wavefront {
                     return Ok(Counters { unfinished: given_up, ..counters });
                 }
                 // Late paths go on where they are; the bound of surfaces is that of each of them.
-                let late = |step: &Step| LateRays::kernel(gpu, step.kernel, &self.bindings(scene, step.buffers));
+                let late = |step: &Step| Lists::kernel(gpu, step.kernel, &self.bindings(scene, step.buffers));
                 let kernels: Vec<_> = steps.iter().map(late).collect();
-                given_up += self.late_rays.finish(gpu, &self.counters, counters.unfinished, &kernels)?;
+                given_up += self.lists.finish(gpu, &self.counters, counters.unfinished, &kernels)?;
                 surfaces = 0;
             }
             encoder = gpu.encoder();
@@ -110,7 +111,7 @@ impl Wavefront {
             ("queues", &self.queues),
             ("counters", &self.counters),
             ("dispatch_arguments", &self.dispatch_arguments),
-            self.late_rays.binding(),
+            self.lists.binding(),
         ];
         scene.with(&[&own, others].concat())
     }

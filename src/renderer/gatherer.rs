@@ -284,7 +284,7 @@ impl Gatherer for MapGatherer<'_> {
         }
         if let Some(records) = &self.records {
             let view = pass.tracer.tile_view(tile);
-            let buffers = (&pass.tracer.points, &pass.tracer.radiance);
+            let buffers = (&pass.tracer.points, &pass.tracer.radiance, pass.tracer.lists());
             timed(&mut seconds, || records.light(pass.gpu, &view, buffers));
         }
         let count = timed(&mut seconds, || self.gather_finally(pass, tile, &mut |_| {}, progress))?;

@@ -15,6 +15,7 @@ mod session;
 mod size;
 mod tally;
 mod tiles;
+mod unevenness;
 
 pub use light_groups::LightGroups;
 pub use maps::PhotonMaps;

@@ -12,6 +12,7 @@ use super::{
     size::picture_size,
     tally,
     tiles::{CameraPass, Gatherer},
+    unevenness::UNEVENNESS_REACH,
 };
 use crate::{
     bvh::{Bvh, Media, MediaProbe, contacts},
@@ -289,11 +290,15 @@ fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSetti
     let spacing = record_spacing(size, estimate.gather_spacing, branches);
     let reach = filter_footprint(estimate.gather_radius, spacing);
     let window = picture.window(size);
+    // Those around a pixel tell whether it has more samples.
+    let around = if picture.extra_samples() > 0 { UNEVENNESS_REACH } else { 0 };
     let along = |pixels: u32, origin: u32, count: u32| {
+        let end = (origin + count + around).min(pixels);
+        let origin = origin.saturating_sub(around);
         let side = pixels.div_ceil(spacing);
         let scaled = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
         let first = scaled(origin).saturating_sub(reach + 1);
-        (side, first, (scaled(origin + count) + reach + 2).min(side) - first)
+        (side, first, (scaled(end) + reach + 2).min(side) - first)
     };
     let (columns, column, width) = along(size.0, window.column, window.width);
     let (rows, row, height) = along(size.1, window.row, window.height);
@@ -301,6 +306,7 @@ fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSetti
         size: Some((columns, rows)),
         spp: 1,
         crop: Some(Crop { column, row, width, height }),
+        max_spp: None,
         pixel_filter: PixelFilter::Box,
         ..picture.clone()
     }
@@ -313,5 +319,5 @@ fn preview_of(picture: &PictureSettings, size: (u32, u32), rays: u32) -> Picture
     let most = PREVIEW_RAYS.min(PREVIEW_RAYS_PER_PIXEL * pixels);
     let scale = (most / f64::from(rays) / pixels).min(0.25).sqrt();
     let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(1);
-    PictureSettings { size: Some((side(size.0), side(size.1))), spp: 1, crop: None, ..picture.clone() }
+    PictureSettings { size: Some((side(size.0), side(size.1))), spp: 1, max_spp: None, crop: None, ..picture.clone() }
 }

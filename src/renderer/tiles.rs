@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use super::{ray_start::ray_start, size::picture_size, tally};
+use super::{ray_start::ray_start, size::picture_size, tally, unevenness::Square};
 use crate::{
     bvh::Media,
     error::Result,
@@ -12,7 +12,7 @@ use crate::{
         cryptomatte::hash,
         layers::{HITS, LightComponent, POSITIONS, Source},
     },
-    layout::{ArrivingLight, FirstHit, Gathered, VisiblePoint},
+    layout::{ArrivingLight, FirstHit, Gathered, PixelSums, VisiblePoint},
     map_kind::MapKind,
     passes::{BrightPlaces, CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
@@ -89,6 +89,8 @@ pub(crate) struct CameraPass<'a> {
     pub size: (u32, u32),
     pub window: Crop,
     spp: u32,
+    /// Samples of a pixel with uneven neighbours besides.
+    extra: u32,
     /// Direct light comes from shadow rays.
     direct: bool,
     geometry: &'a Scene,
@@ -128,6 +130,7 @@ impl<'a> CameraPass<'a> {
             size,
             window: picture.window(size),
             spp: picture.spp,
+            extra: picture.extra_samples(),
             direct: photons.mode.direct_by_rays(),
             geometry,
             finished: RefCell::default(),
@@ -175,21 +178,24 @@ impl<'a> CameraPass<'a> {
         stats: &mut Stats,
         progress: &dyn Progress,
     ) -> Result<Vec<Film>> {
-        let film = Film::new(self.size, self.window, self.spp).with_layers(&self.layers);
+        let film = Film::new(self.size, self.window, self.spp).with_layers(&self.layers).with_extra_samples(self.extra);
         let mut films = vec![film; gatherer.pictures()];
         self.for_each_tile(Some(stage), stats, progress, &mut |tile, stats| {
-            self.finished.borrow_mut().clear();
-            self.finished_component(tile, LightComponent::Emission, &mut films[0])?;
-            if self.direct {
-                self.light_directly(tile, &mut films[0], stats)?;
+            let sums = self.light(tile, gatherer, &mut films, stats, progress)?;
+            let uneven = if self.extra > 0 { self.uneven_pixels(tile, &sums) } else { Vec::new() };
+            for extra in self.tracer.extra_tiles(tile, &uneven) {
+                progress.check()?;
+                self.trace(&extra, stats)?;
+                self.light(&extra, gatherer, &mut films, stats, progress)?;
             }
-            gatherer.gather(self, tile, &mut films[0], stats, progress)?;
-            for (picture, film) in films.iter_mut().enumerate() {
-                gatherer.show(picture, self);
-                self.resolve(tile, film)?;
+            let all = if self.extra > 0 { 0..tile.pixels } else { 0..0 };
+            for (pixel, at) in all.filter_map(|pixel| Some((pixel, self.tracer.pixel(tile, pixel)?))) {
+                let is_uneven = uneven.binary_search(&pixel).is_ok();
+                films.iter_mut().for_each(|film| film.weigh(at, is_uneven));
             }
             Ok(())
         })?;
+        stats.extra_samples += films.iter().map(Film::extra_samples).sum::<u64>();
         stats.non_finite.film += films.iter().map(Film::non_finite).sum::<u64>();
         let paths = f64::from(self.window.width) * f64::from(self.window.height) * f64::from(self.spp);
         stats.warnings.extend(tally::lost_in_chains(stats.lost_camera_paths / paths));
@@ -214,14 +220,56 @@ impl<'a> CameraPass<'a> {
         for (done, tile) in tiles.iter().enumerate() {
             progress.check()?;
             report(done);
-            let trace = || self.tracer.trace(self.gpu, self.scene, tile);
-            let count = timed(&mut stats.seconds.camera, trace)?;
-            stats.non_finite.camera += count.non_finite;
-            tally::add_step(stats, count);
+            self.trace(tile, stats)?;
             work(tile, stats)?;
         }
         report(tiles.len());
         Ok(())
+    }
+
+    /// Traces a tile's camera paths to their visible points.
+    fn trace(&self, tile: &Tile, stats: &mut Stats) -> Result<()> {
+        let trace = || self.tracer.trace(self.gpu, self.scene, tile);
+        let count = timed(&mut stats.seconds.camera, trace)?;
+        stats.non_finite.camera += count.non_finite;
+        tally::add_step(stats, count);
+        Ok(())
+    }
+
+    /// Lights the visible points of a tile that was traced, and adds its samples to the films.
+    /// Returns the sums of the last one.
+    fn light(
+        &self,
+        tile: &Tile,
+        gatherer: &mut dyn Gatherer,
+        films: &mut [Film],
+        stats: &mut Stats,
+        progress: &dyn Progress,
+    ) -> Result<Vec<PixelSums>> {
+        self.finished.borrow_mut().clear();
+        self.finished_component(tile, LightComponent::Emission, &mut films[0])?;
+        if self.direct {
+            self.light_directly(tile, &mut films[0], stats)?;
+        }
+        gatherer.gather(self, tile, &mut films[0], stats, progress)?;
+        let mut sums = Vec::new();
+        for (picture, film) in films.iter_mut().enumerate() {
+            gatherer.show(picture, self);
+            sums = self.resolve(tile, film)?;
+        }
+        Ok(sums)
+    }
+
+    /// Numbers of the tile's pixels that need more samples, in order.
+    fn uneven_pixels(&self, tile: &Tile, sums: &[PixelSums]) -> Vec<u32> {
+        let (columns, rows) = CameraTracer::square(tile);
+        let is_in = |column, row| tile.first_column + column < self.size.0 && tile.first_row + row < self.size.1;
+        let of = |column, row| is_in(column, row).then(|| &sums[CameraTracer::number(column, row) as usize]);
+        let square = Square { columns, rows, samples: tile.samples, sums: &of };
+        let numbers = square.uneven().into_iter().map(|(column, row)| CameraTracer::number(column, row));
+        let mut pixels: Vec<u32> = numbers.collect();
+        pixels.sort_unstable();
+        pixels
     }
 
     /// Adds direct light at the tile's visible points by shadow rays.
@@ -273,8 +321,9 @@ impl<'a> CameraPass<'a> {
     }
 
     /// Sums the tile's radiance and layers into the film.
-    fn resolve(&self, tile: &Tile, film: &mut Film) -> Result<()> {
-        for (i, mut sums) in (0..).zip(self.tracer.resolve(self.gpu, tile)?) {
+    fn resolve(&self, tile: &Tile, film: &mut Film) -> Result<Vec<PixelSums>> {
+        let all = self.tracer.resolve(self.gpu, tile)?;
+        for (i, mut sums) in (0..).zip(all.iter().copied()) {
             if let Some(pixel) = self.tracer.pixel(tile, i) {
                 // Positions are relative to the centre on the device.
                 let center = self.geometry.center.as_vec3() * sums[HITS.0][HITS.1];
@@ -282,7 +331,10 @@ impl<'a> CameraPass<'a> {
                 film.add(pixel, &sums, tile.samples);
             }
         }
-        if film.has_mattes() { self.add_mattes(tile, film) } else { Ok(()) }
+        if film.has_mattes() {
+            self.add_mattes(tile, film)?;
+        }
+        Ok(all)
     }
 
     /// Adds to the mattes what the tile's samples see first.
@@ -322,10 +374,15 @@ impl<'a> CameraPass<'a> {
             return Ok(done);
         }
         gather.choose(self.gpu, &chosen);
-        let at_once = (self.tracer.room() as u32 / chosen.len() as u32).min(gather.rays());
-        for first in (0..gather.rays()).step_by(at_once as usize) {
+        // The rays of a pixel are those of all its samples.
+        let each = match tile.listed {
+            Some(_) => (gather.rays() * self.spp).div_ceil(self.spp + self.extra),
+            None => gather.rays(),
+        };
+        let at_once = (self.tracer.room() as u32 / chosen.len() as u32).min(each);
+        for first in (0..each).step_by(at_once as usize) {
             progress.check()?;
-            let rays = FinalRays { first, count: at_once.min(gather.rays() - first), chosen: chosen.len() as u32 };
+            let rays = FinalRays { first, count: at_once.min(each - first), chosen: chosen.len() as u32, each };
             done += gather.trace(self.gpu, self.scene, &self.tracer, tile, rays)?;
             done += light(gather, rays, &chosen)?;
             gather.add(self.gpu, &self.tracer, rays);

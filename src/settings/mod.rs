@@ -21,4 +21,4 @@ pub use picture::{Crop, PictureSettings};
 pub use quality::Quality;
 pub use range::{Number, Range};
 pub use render_settings::Settings;
-pub(crate) use render_settings::check_samples;
+pub(crate) use render_settings::{check_samples, first_extra_sample};

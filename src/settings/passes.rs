@@ -100,7 +100,8 @@ impl PassRange {
     /// Maximum number of passes: as many as 32-bit indices of the numbers for sampling suffice for.
     #[must_use]
     pub fn longest(settings: &Settings) -> Self {
-        let most = most_samples(&settings.photons, &settings.picture) / u64::from(settings.picture.spp.max(1));
+        let each = settings.picture.spp.max(settings.picture.extra_samples()).max(1);
+        let most = most_samples(&settings.photons, &settings.picture) / u64::from(each);
         Self { first: 0, end: (most.max(1)).min(Self::END.most().into()) as u32 }
     }
 
@@ -114,8 +115,7 @@ impl PassRange {
             let problem = format!("must be of at least one pass, with an end {}", Self::END);
             return fail("passes.range", self.to_string(), &problem);
         }
-        let samples = u64::from(self.end) * u64::from(settings.picture.spp);
-        check_sample_count(&settings.photons, &settings.picture, samples, ("passes.range", self.to_string()))
+        check_sample_count(&settings.photons, &settings.picture, self.end.into(), ("passes.range", self.to_string()))
     }
 }
 

@@ -45,6 +45,10 @@ pub struct PictureSettings {
     /// Camera samples per pixel, in [`Self::SPP`]. Many light samples or rays of final gathering
     /// lower the maximum: see [`super::Settings::check`].
     pub spp: u32,
+    /// Samples of a pixel whose neighbours are uneven, if these are more than [`Self::spp`]: edges,
+    /// penumbrae. `None`: every pixel has [`Self::spp`]. Without an effect beyond
+    /// [`Self::MOST_EVEN`] samples, or below two.
+    pub max_spp: Option<u32>,
     /// Filter that weighs the light around a pixel's centre.
     pub pixel_filter: PixelFilter,
     /// Diameter of the lens, metres, in [`Self::APERTURE`]; 0: a pinhole camera, everything is in
@@ -67,6 +71,7 @@ impl Default for PictureSettings {
             crop: None,
             camera: None,
             spp: 4,
+            max_spp: None,
             pixel_filter: PixelFilter::Box,
             aperture: 0.0,
             focus: None,
@@ -81,6 +86,8 @@ impl PictureSettings {
     pub const SIDE: Range<u32> = Range::closed(1, 65_535);
     /// Range of [`Self::spp`].
     pub const SPP: Range<u32> = Range::at_least(1);
+    /// Samples of every pixel beyond which none has more.
+    pub const MOST_EVEN: u32 = 256;
     /// Range of [`Self::aperture`], metres.
     pub const APERTURE: Range<f32> = Range::at_least(0.0);
     /// Range of [`Self::focus`], metres.
@@ -92,6 +99,13 @@ impl PictureSettings {
     #[must_use]
     pub fn window(&self, (width, height): (u32, u32)) -> Crop {
         self.crop.unwrap_or(Crop { column: 0, row: 0, width, height })
+    }
+
+    /// Samples that a pixel has besides those of every pixel, where its neighbours are uneven.
+    #[must_use]
+    pub fn extra_samples(&self) -> u32 {
+        let can_tell = (2..=Self::MOST_EVEN).contains(&self.spp);
+        self.max_spp.filter(|_| can_tell).map_or(0, |most| most.saturating_sub(self.spp))
     }
 
     /// Inverse CDF of the pixel filter, see [`PixelFilter::offsets`]. A single sample with the box
@@ -107,6 +121,7 @@ impl PictureSettings {
     /// [`crate::Error::Setting`] with the first that is out of range.
     pub fn check(&self) -> Result<()> {
         Self::SPP.check("picture.spp", self.spp)?;
+        self.max_spp.map_or(Ok(()), |most| Self::SPP.check("picture.max_spp", most))?;
         Self::LIGHT_SAMPLES.check("picture.light_samples", self.light_samples)?;
         Self::APERTURE.check("picture.aperture", self.aperture)?;
         match self.focus {

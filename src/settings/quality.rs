@@ -7,7 +7,7 @@ use super::Settings;
 pub enum Quality {
     /// To look at while a scene is made.
     Draft,
-    /// Clean where light is smooth; edges of 4 samples.
+    /// Clean where light is smooth, and at edges.
     #[default]
     Normal,
     /// Clean edges and penumbrae as well.
@@ -16,9 +16,10 @@ pub enum Quality {
     Final,
 }
 
-/// Photons of each map, neighbours of an estimate, samples of a pixel and of its light, rays of
-/// final gathering, pixels between their points, and the radius of the filter, pixels.
-type Row = (u32, u32, u32, u32, u32, u32, f32);
+/// Photons of each map, neighbours of an estimate, samples of a pixel and most of them, samples of
+/// its light, rays of final gathering, pixels between their points, and the radius of the filter,
+/// pixels.
+type Row = (u32, u32, u32, u32, u32, u32, u32, f32);
 
 impl Quality {
     /// Width and height of a picture that has all photons of a quality, and of one that has the
@@ -38,10 +39,10 @@ impl Quality {
 
     fn row(self) -> Row {
         match self {
-            Self::Draft => (30_000, 50, 1, 2, 32, 4, 16.0),
-            Self::Normal => (100_000, 50, 4, 4, 64, 2, 8.0),
-            Self::High => (300_000, 50, 16, 4, 128, 2, 8.0),
-            Self::Final => (1_000_000, 50, 64, 4, 256, 1, 4.0),
+            Self::Draft => (30_000, 50, 1, 1, 2, 32, 4, 16.0),
+            Self::Normal => (100_000, 50, 4, 16, 4, 64, 2, 8.0),
+            Self::High => (300_000, 50, 16, 64, 4, 128, 2, 8.0),
+            Self::Final => (1_000_000, 50, 64, 256, 4, 256, 1, 4.0),
         }
     }
 
@@ -63,7 +64,7 @@ impl Quality {
     /// The defaults of [`Settings`], with those of this quality.
     #[must_use]
     pub fn settings(self) -> Settings {
-        let (photons, neighbors, spp, light_samples, rays, spacing, radius) = self.row();
+        let (photons, neighbors, spp, max_spp, light_samples, rays, spacing, radius) = self.row();
         Settings::default().with(|s| {
             s.photons.global = photons;
             s.photons.caustic = photons;
@@ -72,6 +73,7 @@ impl Quality {
             s.estimate.gather_spacing = spacing;
             s.estimate.gather_radius = radius;
             s.picture.spp = spp;
+            s.picture.max_spp = (max_spp > spp).then_some(max_spp);
             s.picture.light_samples = light_samples;
         })
     }
@@ -84,6 +86,7 @@ impl Quality {
         self.settings().with(|s| {
             s.photons.final_gather = 0;
             s.estimate = plain.estimate;
+            s.picture.max_spp = None;
         })
     }
 }

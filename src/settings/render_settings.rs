@@ -57,18 +57,21 @@ impl Settings {
 /// all samples of a pixel and, within a sample, over its four paths, light samples or rays of final
 /// gathering.
 pub(crate) fn check_samples(photons: &PhotonSettings, picture: &PictureSettings) -> Result<()> {
-    check_sample_count(photons, picture, picture.spp.into(), ("picture.spp", picture.spp.to_string()))
+    let (spp, extra) = (picture.spp, picture.extra_samples());
+    let setting = if extra > spp { ("picture.max_spp", spp + extra) } else { ("picture.spp", spp) };
+    check_sample_count(photons, picture, 1, (setting.0, setting.1.to_string()))
 }
 
-/// Variant of [`check_samples`] for a number of samples of all passes together. `setting` is
-/// refused: its name and value.
+/// Variant of [`check_samples`] for that many passes together. `setting` is refused: its name and
+/// value.
 pub(super) fn check_sample_count(
     photons: &PhotonSettings,
     picture: &PictureSettings,
-    samples: u64,
+    passes: u64,
     (setting, value): (&'static str, String),
 ) -> Result<()> {
     let most = most_samples(photons, picture);
+    let samples = passes.saturating_mul(picture.spp.max(picture.extra_samples()).into());
     if samples > most {
         let samples = if setting == "picture.spp" { "" } else { " samples of a pixel" };
         let problem = format!("must be at most {most}{samples} with these light samples and rays of final gathering");
@@ -77,10 +80,22 @@ pub(super) fn check_sample_count(
     Ok(())
 }
 
-/// Maximum number of samples of a pixel.
+/// Maximum number of samples of a pixel. Those that only some pixels have are as many at most.
 pub(super) fn most_samples(photons: &PhotonSettings, picture: &PictureSettings) -> u64 {
     let each = picture.light_samples.max(photons.final_gather).max(4);
-    (1_u64 << 32) / u64::from(each)
+    let all = (1_u64 << 32) / u64::from(each);
+    if picture.extra_samples() > 0 { first_extra(all) } else { all }
+}
+
+/// Index of the first sample that only some pixels have: a power of two, so that these samples are
+/// well distributed among themselves.
+pub(crate) fn first_extra_sample(photons: &PhotonSettings, picture: &PictureSettings) -> u32 {
+    if picture.extra_samples() > 0 { most_samples(photons, picture) as u32 } else { 0 }
+}
+
+/// The largest power of two of which there are two.
+fn first_extra(all: u64) -> u64 {
+    1 << (all.ilog2() - 1)
 }
 
 #[cfg(test)]

@@ -41,7 +41,7 @@ pub struct SceneBuffers {
     stack: usize,
     /// Nodes and primitives: no ray visits more.
     visits: u32,
-    no_late_rays: Arc<Buffer>,
+    no_lists: Arc<Buffer>,
     /// Ranks of primitives that lie in each other.
     contacts: Arc<Contacts>,
     /// Some solid absorbs light.
@@ -125,7 +125,7 @@ impl SceneBuffers {
             instances: Table::new(gpu, "instances", &bvh.instances)?,
             has_instances: !bvh.instances.is_empty(),
             visits: visits(bvh),
-            no_late_rays: Arc::new(gpu.storage::<u32>("no late rays", 1)?),
+            no_lists: Arc::new(gpu.storage::<u32>("no lists", 1)?),
             contacts,
             has_lobes: scene.has_lobes(),
             splits: scene
@@ -156,7 +156,7 @@ impl SceneBuffers {
             instances: self.instances.clone(),
             solids: self.solids.clone(),
             contacts: Arc::clone(&self.contacts),
-            no_late_rays: Arc::clone(&self.no_late_rays),
+            no_lists: Arc::clone(&self.no_lists),
             lights,
             ..*self
         })
@@ -225,7 +225,7 @@ impl SceneBuffers {
         all.extend(self.lights.bindings());
         all.extend_from_slice(others);
         // The first of a name is bound.
-        all.push(("late_rays", &self.no_late_rays));
+        all.push(("lists", &self.no_lists));
         all
     }
 }

@@ -211,6 +211,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "tally",
             "seen",
             "maps",
+            "unevenness",
             "tiles",
             "preview",
             "gatherer",
@@ -220,7 +221,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "progressive",
         ],
     ),
-    ("passes", &["maps", "late_rays", "wavefront", "photons", "estimate", "camera"]),
+    ("passes", &["maps", "lists", "wavefront", "photons", "estimate", "camera"]),
     (
         "passes/estimate",
         &[

@@ -17,3 +17,4 @@ mod sessions;
 mod solids;
 mod spaced_gathering;
 mod transport;
+mod uneven_pixels;

@@ -16,11 +16,10 @@ use crate::{
     layout::{self, CameraTile, Counters, FirstHit, Gathered, LobePoint, MARGIN_SAMPLES, PixelSums, VisiblePoint},
     passes::{
         estimate::SharedPoints,
-        late_rays::LateRays,
         wavefront::{Step, Wavefront},
     },
     scene::Camera,
-    settings::{Crop, PhotonSettings, PictureSettings},
+    settings::{Crop, PhotonSettings, PictureSettings, first_extra_sample},
     upload::{SceneBuffers, sampler_constant},
 };
 
@@ -71,8 +70,6 @@ impl CameraKernels {
 pub struct CameraTracer {
     kernels: CameraKernels,
     wavefront: Wavefront,
-    /// Points whose rays to lights need more than one dispatch.
-    late_points: LateRays,
     /// A [`VisiblePoint`] per path slot; some slots have no point.
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
@@ -85,10 +82,14 @@ pub struct CameraTracer {
     /// Sums over the samples of each pixel, [`LAYER_ROWS`] + 1 rows a pixel.
     pixel_rows: Buffer,
     filter_table: Buffer,
-    view: CameraTile,
+    pub(super) view: CameraTile,
     window: Crop,
+    /// Index of the first sample beyond those that every pixel has.
+    pub(super) first_extra: u32,
+    /// Samples of a pixel that has more than every one.
+    pub(super) extra: u32,
     /// Maximum number of visible points of a tile, without its margin.
-    room: u64,
+    pub(super) room: u64,
 }
 
 impl CameraTracer {
@@ -119,8 +120,7 @@ impl CameraTracer {
         let slots = samples * u64::from(branches);
         Ok(Self {
             kernels: CameraKernels::new(gpu, scene, photons, picture.light_samples),
-            wavefront: Wavefront::new(gpu, scene, "camera", slots)?,
-            late_points: LateRays::new(gpu, scene, slots)?,
+            wavefront: Wavefront::new(gpu, scene, "camera", (slots, room / u64::from(branches)))?,
             points: gpu.storage::<VisiblePoint>("visible points", slots)?,
             radiance: gpu.storage::<[f32; 4]>("radiance", slots)?,
             gathered: gpu.storage::<Gathered>("gathered", room)?,
@@ -128,6 +128,8 @@ impl CameraTracer {
             lobe_points: gpu.storage::<LobePoint>("lit lobes", if scene.materials.has_rough { slots } else { 1 })?,
             pixel_rows: gpu.storage::<PixelSums>("sums of pixels", room / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
+            first_extra: first_extra_sample(photons, picture),
+            extra: picture.extra_samples(),
             view: CameraTile { margin, ..view },
             window: picture.window(size),
             room,
@@ -161,8 +163,9 @@ impl CameraTracer {
     /// Limits of the adapter.
     pub fn of_pass(self, gpu: &Gpu, picture: &PictureSettings, first: u32) -> Result<Self> {
         let offsets = picture.pixel_filter.offsets();
+        let first_extra = self.first_extra + first / self.view.spp * self.extra;
         let view = CameraTile { first_sample: first, filter_steps: offsets.len() as u32 - 1, ..self.view };
-        Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, view, ..self })
+        Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, first_extra, view, ..self })
     }
 
     /// The tiles of the whole picture that overlap the data window, in order. A tile is the same
@@ -180,7 +183,8 @@ impl CameraTracer {
                 for first_sample in (0..self.view.spp).step_by(samples as usize) {
                     let samples = samples.min(self.view.spp - first_sample);
                     let first_sample = self.view.first_sample + first_sample;
-                    tiles.push(Tile { pixels: width * height, first_column, first_row, first_sample, samples });
+                    let pixels = width * height;
+                    tiles.push(Tile { pixels, first_column, first_row, first_sample, samples, listed: None });
                 }
             }
         }
@@ -217,6 +221,12 @@ impl CameraTracer {
         self.room
     }
 
+    /// The lists that kernels with the tile's view read.
+    #[must_use]
+    pub fn lists(&self) -> &Buffer {
+        self.wavefront.lists.binding().1
+    }
+
     /// The visible points of a tile, which share estimates.
     #[must_use]
     pub fn shared_points(&self, tile: &Tile) -> SharedPoints<'_> {
@@ -226,6 +236,7 @@ impl CameraTracer {
             samples: tile.samples,
             branches: self.view.branches,
             margin: self.view.margin / MARGIN_SAMPLES,
+            is_square: tile.listed.is_none(),
             radiance: &self.radiance,
             gathered: &self.gathered,
         }
@@ -234,6 +245,7 @@ impl CameraTracer {
     /// Column and row of the `i`-th pixel of a tile within the data window; `None` outside of it.
     #[must_use]
     pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
+        let i = tile.listed.as_ref().map_or(i, |listed| listed.pixels[i as usize]);
         let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
         let (x, y) = (tile.first_column + even_bits(i), tile.first_row + even_bits(i >> 1));
         let window = &self.window;
@@ -246,14 +258,18 @@ impl CameraTracer {
     /// # Errors
     /// Faults of the driver.
     pub fn trace(&self, gpu: &Gpu, scene: &SceneBuffers, tile: &Tile) -> Result<StepCount> {
-        let uniform = gpu.uniform("camera tile", &self.tile_view(tile));
+        let view = self.tile_view(tile);
+        let uniform = gpu.uniform("camera tile", &view);
+        if let Some(listed) = &tile.listed {
+            self.wavefront.lists.write_pixels(gpu, &listed.pixels);
+        }
         let own = [("tile", &uniform), ("points", &self.points), ("filter_table", &self.filter_table)];
         let start = Step { kernel: &self.kernels.start, buffers: &own };
         let trace = Step { kernel: &self.kernels.trace, buffers: &own };
         self.follow(
             gpu,
             scene,
-            (&start, tile.pixels * tile.samples + self.view.margin),
+            (&start, tile.pixels * tile.samples + view.margin),
             &trace,
             (self.kernels.lobes.as_ref(), &self.radiance),
         )
@@ -312,8 +328,8 @@ impl CameraTracer {
         (points, radiance, count): (&Buffer, &Buffer, u32),
     ) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", view);
-        let (counters, late) = (("counters", &self.wavefront.counters), &self.late_points);
-        let buffers = [("tile", &uniform), ("points", points), ("radiance", radiance), counters, late.binding()];
+        let (counters, lists) = (("counters", &self.wavefront.counters), &self.wavefront.lists);
+        let buffers = [("tile", &uniform), ("points", points), ("radiance", radiance), counters, lists.binding()];
         let (steps, points) = (direct.steps(scene), count);
         let mut count = StepCount::default();
         let at_once = if scene.has_late_rays(gpu) { 1 } else { DIRECT_STEPS_PER_READ };
@@ -327,7 +343,7 @@ impl CameraTracer {
             let mut counters: Counters = gpu.read(&self.wavefront.counters, 0, 1)?[0];
             if counters.unfinished > 0 {
                 let kernel = direct.late(gpu, scene, (first, points), &buffers);
-                let given_up = late.finish(gpu, &self.wavefront.counters, counters.unfinished, &[kernel])?;
+                let given_up = lists.finish(gpu, &self.wavefront.counters, counters.unfinished, &[kernel])?;
                 counters = gpu.read(&self.wavefront.counters, 0, 1)?[0];
                 counters.unfinished = given_up;
             }
@@ -372,6 +388,9 @@ impl CameraTracer {
             pixels: tile.pixels,
             first_sample: tile.first_sample,
             samples: tile.samples,
+            listed: tile.listed.as_ref().map_or(0, |listed| listed.before + 1),
+            listed_at: self.wavefront.lists.pixels_at(),
+            margin: if tile.listed.is_none() { self.view.margin } else { 0 },
             ..self.view
         }
     }

@@ -4,7 +4,7 @@
 use crate::{
     gpu::{Bindings, Buffer, Commands, Gpu, Kernel},
     layout::{DirectLight, EmitterSample},
-    passes::late_rays::LateRays,
+    passes::lists::Lists,
     settings::Sampler,
     upload::{SceneBuffers, sampler_constant},
 };
@@ -33,7 +33,7 @@ impl DirectLighting {
     }
 
     /// Adds the direct light of one step to the radiance of the points. `buffers` are `tile`,
-    /// `points`, `radiance`, `counters` and `late_rays`.
+    /// `points`, `radiance`, `counters` and `lists`.
     pub fn add(
         &self,
         gpu: &Gpu,
@@ -56,7 +56,7 @@ impl DirectLighting {
         buffers: &[(&str, &Buffer)],
     ) -> (Kernel, Bindings) {
         let (kernel, uniform) = self.step(gpu, scene, (step, points));
-        LateRays::kernel(gpu, kernel, &[&scene.with(buffers)[..], &[(uniform.0, &uniform.1)]].concat())
+        Lists::kernel(gpu, kernel, &[&scene.with(buffers)[..], &[(uniform.0, &uniform.1)]].concat())
     }
 
     /// The kernel of a step, and its uniform by name.

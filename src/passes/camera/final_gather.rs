@@ -77,6 +77,8 @@ pub struct FinalRays {
     pub count: u32,
     /// Number of chosen points.
     pub chosen: u32,
+    /// Rays of each of them in all.
+    pub each: u32,
 }
 
 impl FinalRays {
@@ -208,7 +210,7 @@ impl FinalGather {
         tile: &Tile,
         (ends, found, count): (&Buffer, &Buffer, u32),
     ) -> Result<StepCount> {
-        let rays = FinalRays { first: 0, count: 1, chosen: count };
+        let rays = FinalRays { first: 0, count: 1, chosen: count, each: 1 };
         self.light(gpu, scene, tracer, (tile, rays), (ends, found))
     }
 
@@ -245,7 +247,7 @@ impl FinalGather {
         let step = FinalStep {
             first_ray: rays.first,
             rays_now: rays.count,
-            rays: self.rays,
+            rays: rays.each,
             chosen: rays.chosen,
             joint: self.joint.into(),
             patches: self.patch_count,
@@ -259,7 +261,8 @@ impl FinalGather {
 /// The rays of a step as samples of one pixel: all of them draw from one set of numbers. At glass,
 /// a ray chooses reflection or refraction at random.
 fn rays_as_samples(view: &CameraTile, rays: FinalRays) -> CameraTile {
-    let tile_seed = mix(view.first_row << 16 | view.first_column) ^ mix(view.first_sample);
+    let listed = if view.listed > 0 { mix(view.listed) } else { 0 };
+    let tile_seed = mix(view.first_row << 16 | view.first_column) ^ mix(view.first_sample) ^ listed;
     CameraTile {
         seed: mix(view.seed ^ mix(rays.first.wrapping_add(1))) ^ tile_seed,
         branches: 1,
@@ -269,6 +272,7 @@ fn rays_as_samples(view: &CameraTile, rays: FinalRays) -> CameraTile {
         first_row: 0,
         first_sample: 0,
         gathers: 1,
+        listed: 0,
         ..*view
     }
 }

@@ -1,6 +1,11 @@
 //! Tiles: parts of a picture's samples, their sizes, and counts of one step over a tile.
 
-use crate::layout::{CameraTile, Counters, LOST_SCALE, MARGIN_CELL};
+use std::sync::Arc;
+
+use crate::{
+    layout::{CameraTile, Counters, LOST_SCALE, MARGIN_CELL},
+    settings::PictureSettings,
+};
 
 /// Rays of final gathering of each visible point of a small picture for which a tile has room.
 const RAYS_AT_ONCE: u64 = 16;
@@ -9,14 +14,15 @@ const RAYS_AT_ONCE: u64 = 16;
 const MIN_ROOM: u64 = 1 << 16;
 const MIN_ROOM_PER_PIXEL: u64 = 128;
 /// Maximum number of samples of one pixel in a tile.
-pub(super) const PIXEL_SAMPLES: u32 = 256;
+pub(super) const PIXEL_SAMPLES: u32 = PictureSettings::MOST_EVEN;
 /// Minimum number of pixels of a tile.
 const MIN_TILE_PIXELS: u32 = 64;
 
 /// A part of the picture's samples.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Tile {
-    /// Pixels, a power of 2, in Morton order; some of them may lie outside the picture.
+    /// Pixels, a power of 2, in Morton order; some of them may lie outside the picture. Of a list,
+    /// as many as it has.
     pub pixels: u32,
     /// Pixel of the upper left corner.
     pub first_column: u32,
@@ -24,6 +30,17 @@ pub struct Tile {
     pub first_sample: u32,
     /// Samples of each pixel.
     pub samples: u32,
+    /// Some pixels of the square; `None`: all.
+    pub listed: Option<Listed>,
+}
+
+/// Some pixels of a square.
+#[derive(Clone, Debug)]
+pub struct Listed {
+    /// Their numbers in Morton order.
+    pub pixels: Arc<[u32]>,
+    /// Number of pixels of the same square in lists before this one.
+    pub before: u32,
 }
 
 /// Counts of one step, for the statistics.

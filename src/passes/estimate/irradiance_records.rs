@@ -146,7 +146,7 @@ impl IrradianceRecords {
 
     /// Adds the light of the records to the radiance of a tile's points. Those that it lights wait
     /// for no map then; others have too few records about them.
-    pub fn light(&self, gpu: &Gpu, tile: &CameraTile, (points, radiance): (&Buffer, &Buffer)) {
+    pub fn light(&self, gpu: &Gpu, tile: &CameraTile, (points, radiance, lists): (&Buffer, &Buffer, &Buffer)) {
         let invocations = u64::from(tile.pixels) * u64::from(tile.branches);
         let grid = gpu.uniform("record grid", &self.grid);
         let tile = gpu.uniform("camera tile", tile);
@@ -156,6 +156,7 @@ impl IrradianceRecords {
             ("records", &self.records),
             ("points", points),
             ("radiance", radiance),
+            ("lists", lists),
         ];
         let mut encoder = gpu.encoder();
         self.kernel.dispatch(&mut encoder, &self.kernel.bind(gpu, &buffers), invocations);

@@ -23,12 +23,14 @@ pub struct SharedPoints<'a> {
     /// [`VisiblePoint`]s: for each pixel, in Morton order, its samples, each with its branches;
     /// then those of the margin.
     pub points: &'a Buffer,
-    /// A power of 2, at least 64.
+    /// Of a square, a power of 2, at least 64.
     pub pixels: u32,
     pub samples: u32,
     pub branches: u32,
     /// Cells of the margin.
     pub margin: u32,
+    /// Whether the pixels are those of a square. Others share nothing with each other.
+    pub is_square: bool,
     /// Radiance from each point, `vec4f`, and room for results of gathers,
     /// [`Gathered`](crate::layout::Gathered).
     pub radiance: &'a Buffer,
@@ -95,6 +97,9 @@ impl EstimateSharing {
             if self.reach == 0.0 || cell_pixels * tile.samples < MIN_CELL {
                 break;
             }
+            if !tile.is_square && cell_pixels > 1 {
+                continue;
+            }
             let is_first = cell_pixels == ROUNDS[0];
             let round = ShareRound {
                 cells: tile.pixels / cell_pixels,
@@ -107,6 +112,7 @@ impl EstimateSharing {
                 reach_squared: self.reach * self.reach,
                 points: count,
                 map_number,
+                is_listed: (!tile.is_square).into(),
             };
             self.run_round(gpu, &round, tile, estimates)?;
         }

@@ -118,7 +118,6 @@ impl PhotonTracer {
         let batch_limit = (largest / 4).clamp(busy, MAX_BATCH).min(max_paths.max(1));
         let named = scene.lights.table.named.len();
         let buffers = BatchBuffers::new(gpu, scene, batch_limit, named)?;
-        for plan in plans(scene, settings, caustics, paths) {
         let steered = steered(gpu, scene, (&self.kernels, settings), (&buffers, batch_limit, max_paths))?;
         for plan in plans(scene, settings, caustics, paths, steered.as_ref()) {
             let enough =

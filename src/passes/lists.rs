@@ -1,6 +1,6 @@
-//! Rays that need more than the loop budget of an invocation: they go on in further dispatches.
+//! Lists of a pass: late rays, and pixels of a tile.
 //!
-//! A kernel lists the paths or points with such rays. It then runs again for a slice of the list at
+//! Late rays need more than the loop budget of an invocation, and go on in further dispatches: a kernel lists the paths or points with such rays. It then runs again for a slice of the list at
 //! a time, as often as its rays take: each is kept where it stopped. What a ray finds does not
 //! depend on where it stopped, nor on the order of the list.
 
@@ -19,28 +19,41 @@ const MOST_DISPATCHES: u32 = 1 << 16;
 const KEPT_WORDS: u64 = (LATE_SLICE * LATE_WORDS) as u64;
 const WORD: u64 = size_of::<u32>() as u64;
 
-/// The list, and what is kept of the rays of a slice.
+/// Paths or points with late rays, pixels, and what is kept of the rays of a slice.
 #[derive(Debug)]
-pub struct LateRays {
+pub struct Lists {
     buffer: Buffer,
-    /// Number of entries that the list has room for.
+    /// Number of paths or points that there is room for.
     room: u64,
+    pixels: u64,
 }
 
-impl LateRays {
-    /// Room for as many paths or points, if rays of the scene can be late.
+impl Lists {
+    /// Room for as many paths or points, if rays of the scene can be late, and for as many pixels.
     ///
     /// # Errors
     /// Limits of the adapter.
-    pub fn new(gpu: &Gpu, scene: &SceneBuffers, room: u64) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, room: u64, pixels: u64) -> Result<Self> {
         let (room, kept) = if scene.has_late_rays(gpu) { (room, KEPT_WORDS) } else { (0, 0) };
-        Ok(Self { buffer: gpu.storage::<u32>("late rays", u64::from(LATE_HEADER) + room + kept)?, room })
+        let buffer = gpu.storage::<u32>("lists", u64::from(LATE_HEADER) + room + pixels + kept)?;
+        Ok(Self { buffer, room, pixels })
     }
 
-    /// The binding of kernels that list or finish late rays.
+    /// The binding of kernels that use them.
     #[must_use]
     pub fn binding(&self) -> (&str, &Buffer) {
-        ("late_rays", &self.buffer)
+        ("lists", &self.buffer)
+    }
+
+    /// Word at which the pixels begin.
+    #[must_use]
+    pub fn pixels_at(&self) -> u32 {
+        LATE_HEADER + self.room as u32
+    }
+
+    /// Lists pixels.
+    pub fn write_pixels(&self, gpu: &Gpu, pixels: &[u32]) {
+        gpu.write(&self.buffer, u64::from(self.pixels_at()) * WORD, pixels);
     }
 
     /// Traces the rays of the first `listed` entries to their ends: of each slice of the list, those
@@ -61,7 +74,7 @@ impl LateRays {
                 for dispatch in 0..MOST_DISPATCHES {
                     let mut encoder = gpu.encoder();
                     if dispatch == 0 {
-                        encoder.clear_buffer(&self.buffer, (u64::from(LATE_HEADER) + self.room) * WORD, None);
+                        encoder.clear_buffer(&self.buffer, (u64::from(self.pixels_at()) + self.pixels) * WORD, None);
                     }
                     encoder.clear_buffer(counters, unfinished, Some(WORD));
                     kernel.dispatch(&mut encoder, bindings, count.into());
