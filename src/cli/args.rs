@@ -303,11 +303,11 @@ mod tests {
             let photons = settings(line).photons;
             (photons.global, photons.caustic)
         };
-        assert_eq!(photons("--size 64x64"), (6250, 25_000));
+        assert_eq!(photons("--size 64x64"), (12_500, 25_000));
         assert_eq!(photons("--size 64x64 --final-gather 0"), (6250, 25_000));
         assert_eq!(photons("--size 64x64 --quality high"), (18_750, 75_000));
         assert_eq!(photons("--size 64x64 --photons 100k"), (100_000, 100_000));
-        assert_eq!(photons("--size 64x64 --caustic-photons 7"), (6250, 7));
+        assert_eq!(photons("--size 64x64 --caustic-photons 7"), (12_500, 7));
     }
 
     #[test]

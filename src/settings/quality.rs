@@ -16,10 +16,10 @@ pub enum Quality {
     Final,
 }
 
-/// Photons of each map, neighbours of an estimate, samples of a pixel and most of them, samples of
-/// its light, rays of final gathering, pixels between their points, and the radius of the filter,
-/// pixels.
-type Row = (u32, u32, u32, u32, u32, u32, u32, f32);
+/// Photons of the global and of the caustic map, neighbours of an estimate, samples of a pixel and
+/// most of them, samples of its light, rays of final gathering, pixels between their points, and
+/// the radius of the filter, pixels.
+type Row = ([u32; 2], u32, u32, u32, u32, u32, u32, f32);
 
 impl Quality {
     /// Width and height of a picture that has all photons of a quality, and of one that has the
@@ -39,10 +39,10 @@ impl Quality {
 
     fn row(self) -> Row {
         match self {
-            Self::Draft => (30_000, 50, 1, 1, 2, 32, 4, 16.0),
-            Self::Normal => (100_000, 50, 4, 16, 4, 64, 2, 8.0),
-            Self::High => (300_000, 50, 16, 64, 4, 128, 2, 8.0),
-            Self::Final => (1_000_000, 50, 64, 256, 4, 256, 1, 4.0),
+            Self::Draft => ([30_000; 2], 50, 1, 1, 2, 32, 4, 16.0),
+            Self::Normal => ([200_000, 100_000], 50, 4, 16, 4, 64, 2, 8.0),
+            Self::High => ([300_000; 2], 50, 16, 64, 4, 128, 2, 8.0),
+            Self::Final => ([1_000_000; 2], 50, 64, 256, 4, 256, 1, 4.0),
         }
     }
 
@@ -66,8 +66,7 @@ impl Quality {
     pub fn settings(self) -> Settings {
         let (photons, neighbors, spp, max_spp, light_samples, rays, spacing, radius) = self.row();
         Settings::default().with(|s| {
-            s.photons.global = photons;
-            s.photons.caustic = photons;
+            [s.photons.global, s.photons.caustic] = photons;
             s.photons.final_gather = rays;
             s.estimate.neighbors = neighbors;
             s.estimate.gather_spacing = spacing;
@@ -84,6 +83,7 @@ impl Quality {
     pub fn without_final_gather(self) -> Settings {
         let plain = Settings::default();
         self.settings().with(|s| {
+            s.photons.global = s.photons.caustic;
             s.photons.final_gather = 0;
             s.estimate = plain.estimate;
             s.picture.max_spp = None;
