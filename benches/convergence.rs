@@ -1,12 +1,16 @@
 //! Benchmark: error of a picture of many passes, estimated and true, against a reference at 128 x
 //! 128.
 //!
-//! `cargo bench --bench convergence [-- PASSES [PLOT.svg]]`. Errors are relative, as
+//! `cargo bench --bench convergence [-- PASSES [PLOT.svg [SCENE.glb]]]`. The reference of a scene,
+//! S1 unless one is given, is `SCENE_128.exr` beside it. Errors are relative, as
 //! [`ErrorEstimate`] has them. The noise of the reference is found by the correlation of the errors
 //! of disjoint passes, early and late ones, whose bias is proportional to their squared radius; it
 //! is taken off. Fits are slopes over the logarithm of the number of passes.
 
-use std::{error::Error, path::Path};
+use std::{
+    error::Error,
+    path::{Path, PathBuf},
+};
 
 use caustica::{
     Gpu, Progressive, Scene, Session, Settings, Silent,
@@ -20,7 +24,7 @@ const PHOTONS: u32 = 50_000;
 const PASSES: u32 = 64;
 /// Part of the mean radiance that is added to that of each pixel, as in [`ErrorEstimate`].
 const FLOOR: f64 = 0.1;
-const SCENE: &str = "S1";
+const SCENE: &str = "tests/references/S1.glb";
 
 /// The state after some passes; errors are roots of mean squares.
 struct Row {
@@ -35,20 +39,22 @@ struct Row {
 fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let passes = words.first().map_or(Ok(PASSES), |word| word.parse())?;
+    let scene = words.get(2).map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join(SCENE), PathBuf::from);
+    let scene = scene.as_path();
     let mut curves = Vec::new();
     for (name, settings) in [("final gathering", Quality::Normal.settings()), ("photons alone", Settings::default())] {
-        let (rows, noise) = measure(settings, passes)?;
-        print(name, &rows, noise);
+        let (rows, noise) = measure(scene, settings, passes)?;
+        print(&format!("{}, {name}", scene.display()), &rows, noise);
         curves.push((name, rows, noise));
     }
-    words.get(1).map_or(Ok(()), |path| plot(Path::new(path), &curves))
+    words.get(1).filter(|path| path.as_str() != "-").map_or(Ok(()), |path| plot(Path::new(path), &curves))
 }
 
 /// Renders the passes. Also returns the mean square of the reference's own noise.
-fn measure(settings: Settings, passes: u32) -> Result<(Vec<Row>, f64), Box<dyn Error>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
-    let scene = Scene::load(&folder.join(format!("{SCENE}.glb")))?;
-    let reference = read_exr(&folder.join(format!("{SCENE}_{SIZE}.exr")))?;
+fn measure(path: &Path, settings: Settings, passes: u32) -> Result<(Vec<Row>, f64), Box<dyn Error>> {
+    let scene = Scene::load(path)?;
+    let stem = path.file_stem().ok_or("no file")?.to_string_lossy();
+    let reference = read_exr(&path.with_file_name(format!("{stem}_{SIZE}.exr")))?;
     let settings = settings.with(|s| {
         (s.photons.global, s.photons.caustic) = (PHOTONS, PHOTONS);
         s.picture.size = Some((SIZE, SIZE));
@@ -131,7 +137,7 @@ fn truth(row: &Row, noise: f64) -> f64 {
 }
 
 fn print(name: &str, rows: &[Row], noise: f64) {
-    println!("{SCENE}, {name}: {PHOTONS} photons a map; noise of the reference {:.2} %", 100.0 * noise.sqrt());
+    println!("{name}: {PHOTONS} photons a map; noise of the reference {:.2} %", 100.0 * noise.sqrt());
     println!(
         "{:>7} {:>8} {:>10} {:>9} {:>9} {:>9} {:>9} {:>11}",
         "passes", "mean", "8x8 relMSE", "noise %", "est. %", "bias e. %", "error %", "est. / true"

@@ -7,12 +7,16 @@ use crate::settings::Crop;
 /// pixels do not decide. Where the mean is 1, the square of the error estimates relMSE.
 const FLOOR: f64 = 0.1;
 
+/// Ratio of the mean square of the bias to that of the differences between the picture and
+/// estimates of half its radius.
+const SHOWN: f64 = 1.0;
+
 /// Relative errors of a picture, root mean squares over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorEstimate {
     /// Standard error of the means.
     pub noise: f64,
-    /// Bias of the estimate's kernel, beyond what its own noise explains; 0 if radii do not shrink.
+    /// Bias of the estimate's kernel, beyond what its own noise explains.
     pub bias: f64,
 }
 
@@ -42,7 +46,20 @@ impl ErrorEstimate {
             let ratio = film.bias_noise().unwrap_or(0.0);
             (mean_square(&biases) - ratio * ratio * noise).max(0.0)
         };
-        Some(Self { noise: noise.sqrt(), bias: biases.map_or(0.0, unexplained).sqrt() })
+        let term = |place: usize, squares: [f64; 3]| {
+            let of_channel = |c: usize| {
+                let x = f64::from(frame.layer("radiance")[3 * place + c]);
+                squares[c] / (x * x + floor).max(f64::MIN_POSITIVE)
+            };
+            (0..3).map(of_channel).sum::<f64>() / 3.0
+        };
+        let checked = film.check.as_ref().and_then(|check| check.squares(film.whole, film.window)).and_then(|all| {
+            let all = all.filter(|(place, _)| is_in(*place)).map(|(place, squares)| term(place, squares));
+            let (count, sum) = all.fold((0, 0.0), |(count, sum), term| (count + 1, sum + term));
+            (count > 0).then(|| SHOWN * (sum / f64::from(count)).max(0.0))
+        });
+        let bias = checked.or_else(|| biases.map(unexplained)).unwrap_or(0.0);
+        Some(Self { noise: noise.sqrt(), bias: bias.sqrt() })
     }
 
     /// Both errors together.

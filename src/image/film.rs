@@ -4,6 +4,7 @@
 use std::array;
 
 use super::{
+    bias_check::BiasCheck,
     cryptomatte::Matte,
     frame::{DataWindow, Frame},
     layers::{EXTRA_LAYERS, LAYERS, Rule, Source, layer_index},
@@ -11,7 +12,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     layout::PixelSums,
-    settings::{Crop, ExtraLayers},
+    settings::{Crop, ExtraLayers, PixelGrid},
 };
 
 /// Number of a film's layers.
@@ -39,6 +40,8 @@ pub struct Film {
     /// Layers that were asked for.
     pub(super) extras: Vec<ExtraSums>,
     pub(super) mattes: Vec<Matte>,
+    /// Differences from estimates of less bias, if there are such for all passes.
+    pub(super) check: Option<BiasCheck>,
     /// Number of samples that were left out, since a sum would not be finite with them.
     pub(super) non_finite: u64,
 }
@@ -101,6 +104,7 @@ impl Film {
             moments: None,
             extras: Vec::new(),
             mattes: Vec::new(),
+            check: None,
             non_finite: 0,
         }
     }
@@ -176,6 +180,13 @@ impl Film {
                 }
             }
             total.non_finite += film.non_finite;
+            total.check = match (total.check.take(), &film.check) {
+                (Some(mut sum), Some(of_group)) => {
+                    sum.add_light(of_group);
+                    Some(sum)
+                }
+                _ => None,
+            };
         }
         let mut total = total.expect("a group of lights");
         total.extras.extend(lights);
@@ -186,6 +197,18 @@ impl Film {
     #[must_use]
     pub fn with_bandwidth(self, factor: f64) -> Self {
         Self { bandwidth: Bandwidth::of_pass(factor), ..self }
+    }
+
+    /// Notes how far the radiance of pass `index` is from that of `closer`, a film of estimates of
+    /// less bias at the pixels of the picture's [`PixelGrid`] alone.
+    #[must_use]
+    pub(crate) fn checked_by(self, index: u32, closer: &Self) -> Self {
+        let radiance = layer_index("radiance");
+        let (here, there) = (self.means(), closer.means());
+        let places = PixelGrid::of(self.whole).places(self.window);
+        let numbers = places.flat_map(|place| &here[radiance][3 * place..][..3]);
+        let differences = numbers.zip(&there[radiance]).map(|(a, b)| a - b).collect();
+        Self { check: Some(BiasCheck::of_pass(index, differences)), ..self }
     }
 
     /// Width and height of the whole picture, pixels.
@@ -296,6 +319,13 @@ impl Film {
             layer.sums.iter_mut().zip(&theirs.sums).for_each(|(a, b)| *a += b);
         }
         self.mattes.iter_mut().zip(&other.mattes).for_each(|(matte, theirs)| matte.merge(theirs));
+        self.check = match (self.check.take(), &other.check) {
+            (Some(mut sum), Some(theirs)) => {
+                sum.merge(theirs);
+                Some(sum)
+            }
+            _ => None,
+        };
         self.passes += other.passes;
         self.samples += other.samples;
         self.non_finite += other.non_finite;

@@ -12,6 +12,7 @@ use exr::meta::MetaData;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    bias_check::BiasCheck,
     cryptomatte::{Matte, RANKS},
     exr::{Attributes, channels_of, count_photons, encode, failure},
     exr_read::{attributes_of, open, our_attributes, window_of},
@@ -24,9 +25,12 @@ use super::{
 use crate::{
     error::{Error, Result},
     map_kind::ByKind,
-    settings::{Crop, ExtraLayers, PassRange},
+    settings::{Crop, ExtraLayers, PassRange, PixelGrid},
     stats::MapStats,
 };
+
+/// Kinds of the channels with differences from estimates of less bias, of even and odd passes.
+const CHECKS: [&str; 2] = ["evenCheck", "oddCheck"];
 
 /// Header of a part: all but its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +60,9 @@ struct BlockRow {
     extras: Vec<ExtraRow>,
     #[serde(default)]
     mattes: Vec<ExtraLayers>,
+    /// Number of even and of odd passes that are checked for bias.
+    #[serde(default)]
+    checked: Option<[u32; 2]>,
 }
 
 /// A layer that was asked for.
@@ -118,6 +125,16 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
             let numbers: Vec<f32> = matte.ranks.iter().flatten().flat_map(numbers).collect();
             channels.extend(channels_of(&numbers, &names, &before));
         }
+        if let Some(check) = &film.check {
+            let names = LAYERS[layer_index("radiance")].channels;
+            for (kind, sums) in CHECKS.iter().zip(&check.sums) {
+                let mut spread = vec![0.0; 3 * frame.pixels()];
+                for (place, numbers) in PixelGrid::of(film.whole).places(film.window).zip(sums.chunks(3)) {
+                    spread[3 * place..][..3].copy_from_slice(numbers);
+                }
+                channels.extend(channels_of(&spread, names, &format!("{before}{kind}.")));
+            }
+        }
         if let Some(moments) = &film.moments {
             let names = LAYERS[layer_index("radiance")].channels;
             channels.extend(channels_of(&moments.with_bandwidth, names, &format!("{before}withBandwidth.")));
@@ -151,6 +168,7 @@ fn row(block: &PassBlock) -> BlockRow {
         caustic: block.photons.caustic,
         extras,
         mattes,
+        checked: block.film.check.as_ref().map(|check| check.passes),
     }
 }
 
@@ -233,6 +251,14 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             let ranks = |pixel: &[f32]| std::array::from_fn(|i| rank(pixel, i));
             Ok(Matte { of: *of, ranks: numbers.chunks(2 * RANKS).map(ranks).collect() })
         };
+        let check = |passes: [u32; 2]| -> Result<BiasCheck> {
+            let of = |kind: &str| -> Result<Vec<f32>> {
+                let spread = read(&format!("{before}{kind}."), LAYERS[layer_index("radiance")].channels)?;
+                let places = PixelGrid::of(whole).places(window);
+                Ok(places.flat_map(|place| spread[3 * place..][..3].to_vec()).collect())
+            };
+            Ok(BiasCheck { passes, sums: [of(CHECKS[0])?, of(CHECKS[1])?] })
+        };
         let [mean, deviations, inverse] = row.bandwidth.map(f64::from_bits);
         let film = Film {
             whole,
@@ -244,6 +270,7 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             moments: if row.passes.count() > 1 { Some(moments()?) } else { None },
             extras: row.extras.iter().map(extra).collect::<Result<_>>()?,
             mattes: row.mattes.iter().map(matte).collect::<Result<_>>()?,
+            check: row.checked.map(check).transpose()?,
             non_finite: row.non_finite,
         };
         let photons = ByKind { global: row.global, caustic: row.caustic };
@@ -296,10 +323,17 @@ mod tests {
                 film.add_to(Source::Estimate(MapKind::Caustic), position, &[value, 3.0, 1.0]);
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
             }
-            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3));
+            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3)).checked_by(index, &closer(index));
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");
         }
         sum
+    }
+
+    /// An estimate of less bias at the only pixel of the grid in the crop.
+    fn closer(index: u32) -> Film {
+        let mut film = Film::new((1, 1), Crop { column: 0, row: 0, width: 1, height: 1 }, 1);
+        film.add((0, 0), &[[1.0 / (index as f32 + 0.7), 3.0, 1e-7, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
+        film
     }
 
     fn attributes() -> Attributes {

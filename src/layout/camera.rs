@@ -120,6 +120,12 @@ pub struct CameraTile {
     /// Width of what a sample sees by rough lobes, metres, from which on irradiance kept in cells
     /// will do; 0: nowhere.
     pub cells_from: f32,
+    /// Columns and rows left out between those of a picture of few of the pixels, and the first
+    /// that it has. `first_column` and `first_row` then count those that it has.
+    pub left_out: u32,
+    pub first_kept: u32,
+    pub pad0: u32,
+    pub pad1: u32,
 }
 
 /// First hit of a camera sample.

@@ -217,6 +217,32 @@ impl<'a> Session<'a> {
         self.observed_film(maps, estimate, picture, None, progress)
     }
 
+    /// Renders the pixels of the picture's grid alone, each with rays of final gathering of its own.
+    /// `stats` counts what that takes.
+    pub(super) fn grid_film(
+        &self,
+        maps: &PhotonMaps,
+        estimate: &EstimateSettings,
+        picture: &PictureSettings,
+        stats: &mut Stats,
+        progress: &dyn Progress,
+    ) -> Result<Film> {
+        let mut gatherer = MapGatherer::new(self.gpu, &self.buffers, maps, estimate, None)?;
+        let picture = PictureSettings { layers: Vec::new(), ..picture.clone() };
+        let pass = self.pass(maps, estimate, &picture)?.at_grid();
+        let mut films = pass.render(&mut gatherer, Stage::Camera, stats, progress)?;
+        Ok(films.pop().expect("one picture"))
+    }
+
+    /// The camera pass of a picture.
+    fn pass(&self, maps: &PhotonMaps, estimate: &EstimateSettings, picture: &PictureSettings) -> Result<CameraPass<'_>> {
+        let number = self.scene.camera_number(picture.camera.as_deref())?;
+        let camera = (&self.scene.cameras[number], self.camera_media[number]);
+        let scene = (self.scene, &self.buffers);
+        let pass = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, picture)?;
+        pass.of_pass(picture, maps.first_sample)
+    }
+
     /// Renders as [`Self::film`]. The observer receives the results of the estimates of each map
     /// and tile.
     pub(crate) fn observed_film<'b>(
@@ -256,8 +282,7 @@ impl<'a> Session<'a> {
         let number = self.scene.camera_number(picture.camera.as_deref())?;
         let camera = (&self.scene.cameras[number], self.camera_media[number]);
         let scene = (self.scene, &self.buffers);
-        let pass = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, picture)?;
-        let pass = pass.of_pass(picture, maps.first_sample)?;
+        let pass = self.pass(maps, estimate, picture)?;
         let mut stats = maps.stats().clone();
         if estimate.keeps_irradiance() && pass.final_rays() > 0 && !maps.maps().is_empty() {
             let small = preview_of(picture, pass.size, maps.settings().final_gather);

@@ -58,6 +58,22 @@ impl PassSettings {
         }
     }
 
+    /// Estimate of a pass with less bias, for few pixels: half the radius at all points, and rays of
+    /// final gathering from each of them.
+    #[must_use]
+    pub fn closer(&self, shrunken: &EstimateSettings) -> EstimateSettings {
+        let half = |radius: f32| 0.5 * radius;
+        EstimateSettings {
+            neighbors: (shrunken.neighbors / 4).max(Self::MIN_NEIGHBORS.min(shrunken.neighbors)),
+            radius: shrunken.radius.map(half),
+            max_radius: shrunken.max_radius.map(half),
+            gather_spacing: 0,
+            irradiance_cells: 0.0,
+            share_reach: 0.0,
+            ..shrunken.clone()
+        }
+    }
+
     /// Squared radius of the estimate of pass `index`, relative to that of pass 0: the shrinkage,
     /// but for whole numbers of neighbours.
     #[must_use]

@@ -19,7 +19,7 @@ use crate::{
         wavefront::{Step, Wavefront},
     },
     scene::Camera,
-    settings::{Crop, PhotonSettings, PictureSettings},
+    settings::{Crop, PhotonSettings, PictureSettings, PixelGrid},
     upload::{SceneBuffers, sampler_constant},
 };
 
@@ -161,15 +161,24 @@ impl CameraTracer {
         Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, view, ..self })
     }
 
+    /// Leaves out all pixels but those of a grid. Tiles and data window count its columns and rows.
+    #[must_use]
+    pub fn at_grid(self, grid: PixelGrid) -> Self {
+        let view = CameraTile { left_out: grid.every() - 1, first_kept: grid.first(), margin: 0, ..self.view };
+        Self { view, window: grid.window(self.window), ..self }
+    }
+
     /// The tiles of the whole picture that overlap the data window, in order. A tile is the same
     /// for every data window, to the last bit.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
         let (width, height) = tile_sides(&self.view, self.room);
+        let (columns, rows) = (self.view.width, self.view.height);
+        let kept = |side: u32| (side - self.view.first_kept.min(side)).div_ceil(self.view.left_out + 1);
         let mut tiles = Vec::new();
-        for first_row in (0..self.view.height).step_by(height as usize) {
-            for first_column in (0..self.view.width).step_by(width as usize) {
+        for first_row in (0..kept(rows)).step_by(height as usize) {
+            for first_column in (0..kept(columns)).step_by(width as usize) {
                 if !self.window.touches((first_column, first_row), (width, height)) {
                     continue;
                 }
