@@ -200,14 +200,15 @@ impl Film {
     }
 
     /// Notes how far the radiance of pass `index` is from that of `closer`, a film of estimates of
-    /// less bias at the pixels of the picture's [`PixelGrid`] alone.
+    /// less bias at the pixels of the picture's [`PixelGrid`] alone. `ratio` is that of the bias to
+    /// this difference.
     #[must_use]
-    pub(crate) fn checked_by(self, index: u32, closer: &Self) -> Self {
+    pub(crate) fn checked_by(self, index: u32, closer: &Self, ratio: f32) -> Self {
         let radiance = layer_index("radiance");
         let (here, there) = (self.means(), closer.means());
         let places = PixelGrid::of(self.whole).places(self.window);
         let numbers = places.flat_map(|place| &here[radiance][3 * place..][..3]);
-        let differences = numbers.zip(&there[radiance]).map(|(a, b)| a - b).collect();
+        let differences = numbers.zip(&there[radiance]).map(|(a, b)| ratio * (a - b)).collect();
         Self { check: Some(BiasCheck::of_pass(index, differences)), ..self }
     }
 

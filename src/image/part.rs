@@ -29,6 +29,9 @@ use crate::{
     stats::MapStats,
 };
 
+/// Version of what the channels and `blocks` hold, in the attribute `partFormat`. Parts without one
+/// are of format 1, without differences from estimates of less bias.
+const FORMAT: &str = "2";
 /// Kinds of the channels with differences from estimates of less bias, of even and odd passes.
 const CHECKS: [&str; 2] = ["evenCheck", "oddCheck"];
 
@@ -101,6 +104,7 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
     let rows: Vec<BlockRow> = sum.blocks.iter().map(row).collect();
     attributes.insert("blocks".to_owned(), serde_json::to_string(&rows).expect("blocks hold numbers only"));
     attributes.insert("passes".to_owned(), range(&rows).to_string());
+    attributes.insert("partFormat".to_owned(), FORMAT.to_owned());
     let frame = total.film.finish();
     let shown = ["radiance", "alpha"].map(|name| LAYERS[layer_index(name)]);
     let mut channels: Vec<_> =
@@ -292,7 +296,10 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
     if rows.is_empty() || !consecutive || !rows.iter().all(is_good) {
         return Err(no_part(path));
     }
-    Ok(rows)
+    match attributes.get("partFormat").map_or("1", String::as_str) {
+        FORMAT => Ok(rows),
+        other => Err(failure(path, format!("is a part of format {other}; this version reads and writes {FORMAT}"))),
+    }
 }
 
 fn no_part(path: &Path) -> Error {
@@ -308,7 +315,7 @@ mod tests {
         stats::Stats,
     };
 
-    const WINDOW: Crop = Crop { column: 1, row: 2, width: 3, height: 2 };
+    const WINDOW: Crop = Crop { column: 1, row: 3, width: 3, height: 2 };
 
     /// Passes of a crop of 3 x 2 pixels.
     fn sum(passes: std::ops::Range<u32>) -> PassSum {
@@ -323,7 +330,7 @@ mod tests {
                 film.add_to(Source::Estimate(MapKind::Caustic), position, &[value, 3.0, 1.0]);
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
             }
-            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3)).checked_by(index, &closer(index));
+            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3)).checked_by(index, &closer(index), 0.3);
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");
         }
         sum
@@ -390,6 +397,15 @@ mod tests {
         std::fs::write(&path, &bytes).unwrap();
         let message = read_part(&path).unwrap_err().to_string();
         assert!(message.contains("is damaged: ") && message.ends_with("131072 x 131072 pixels"), "{message}");
+        let (format, blocks) = (b"partFormat\0", b"string\0\x01\0\0\0");
+        write_part(&path, &sum(0..1), &attributes()).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        let name = [&b"caustica:"[..], format, blocks].concat();
+        let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len();
+        assert_eq!(bytes[at], b'2');
+        bytes[at] = b'1';
+        std::fs::write(&path, &bytes).unwrap();
+        assert!(said(&path).contains("is a part of format 1; this version reads and writes 2"), "{}", said(&path));
         for blocks in ["[]", "{}", "7", r#"[{"passes":{"first":3,"end":9}}]"#] {
             let mut attributes = attributes();
             attributes.insert("blocks".to_owned(), blocks.to_owned());

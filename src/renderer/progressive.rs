@@ -66,9 +66,9 @@ impl<'a> Progressive<'a> {
         if PixelGrid::of(film.whole()).places(film.window()).next().is_none() {
             return Ok((film, stats));
         }
-        let closer = self.passes.closer(&shrunken);
+        let (closer, ratio) = PassSettings::closer(&shrunken, photons.final_gather > 0);
         let closer = self.session.grid_film(&maps, &closer, picture, &mut stats, &Checking(progress))?;
-        Ok((film.checked_by(index, &closer), stats))
+        Ok((film.checked_by(index, &closer, ratio), stats))
     }
 
     /// Indices of the photon paths of a pass from 1 on.
