@@ -1,10 +1,11 @@
 //! Benchmark: efficiency of whole renders, 1 / (relMSE · process seconds), against the references
 //! at 256 x 256.
 //!
-//! `cargo bench --bench efficiency [-- WORD..]`. Rows that have one of the words, or all. Runs the program as a user would, with a warm driver cache,
-//! five times per setting. The table gives the median time. The same follows for POV-Ray
-//! (`povray`) and Mitsuba 3 (of the Python that `MITSUBA_PYTHON` names, `python3` by default) where
-//! they are installed, with the scenes in `benches/others`; these take longer and run three times.
+//! `cargo bench --bench efficiency [-- WORD..]`. Rows that have one of the words, or all. Runs the
+//! program as a user would, with a warm driver cache, five times per setting. The table gives the
+//! median time. The same follows for POV-Ray (`povray`) and Mitsuba 3 (of the Python that
+//! `MITSUBA_PYTHON` names, `python3` by default) where they are installed, with the scenes in
+//! `benches/others`; these take longer and run three times.
 
 use std::{
     path::{Path, PathBuf},

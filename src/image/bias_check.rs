@@ -4,8 +4,8 @@
 use crate::settings::{Crop, PixelGrid};
 
 /// Sums over passes of the difference between the mean radiance of a pixel and that of an estimate
-/// of less bias, at the pixels of a grid. Even and odd passes are apart: their noise is independent,
-/// so that the product of their means is the square of the bias on average.
+/// of less bias, at the pixels of a grid. Even and odd passes are apart: their noise is
+/// independent, so that the product of their means is the square of the bias on average.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BiasCheck {
     /// Number of even and of odd passes.

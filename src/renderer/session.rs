@@ -221,8 +221,8 @@ impl<'a> Session<'a> {
         self.observed_film(maps, estimate, picture, None, progress)
     }
 
-    /// Renders the pixels of the picture's grid alone, each with rays of final gathering of its own.
-    /// `stats` counts the time and the rays that it takes.
+    /// Renders the pixels of the picture's grid alone, each with rays of final gathering of its
+    /// own. `stats` counts the time and the rays that it takes.
     pub(super) fn grid_film(
         &self,
         maps: &PhotonMaps,

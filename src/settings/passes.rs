@@ -58,11 +58,11 @@ impl PassSettings {
         }
     }
 
-    /// Estimate of a pass with less bias, for few pixels, and the ratio of the bias of `shrunken` to
-    /// the difference that both have. With final gathering, each point has rays of its own and
-    /// caustics an area of a sixteenth, so that little bias is left. By photons alone, the radius is
-    /// half: the bias of even curvature is 4/3 of the difference, that of edges twice it, as root of
-    /// the mean square over pixels; the geometric mean of both is off by 1.22 at most.
+    /// Estimate of a pass with less bias, for few pixels, and the ratio of the bias of `shrunken`
+    /// to the difference that both have. With final gathering, each point has rays of its own and
+    /// caustics an area of a sixteenth, so that little bias is left. By photons alone, the radius
+    /// is half: the bias of even curvature is 4/3 of the difference, that of edges twice it, as
+    /// root of the mean square over pixels; the geometric mean of both is off by 1.22 at most.
     #[must_use]
     pub fn closer(shrunken: &EstimateSettings, gathers_finally: bool) -> (EstimateSettings, f32) {
         let (area, ratio) = if gathers_finally { (1.0 / 16.0, 1.0) } else { (0.25, (8.0_f32 / 3.0).sqrt()) };

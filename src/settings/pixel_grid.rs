@@ -34,8 +34,8 @@ impl PixelGrid {
         self.every / 2
     }
 
-    /// The pixels of the grid in a part of the picture, as columns and rows of the grid. It may have
-    /// none.
+    /// The pixels of the grid in a part of the picture, as columns and rows of the grid. It may
+    /// have none.
     #[must_use]
     pub fn window(&self, part: Crop) -> Crop {
         let along = |first: u32, count: u32| {
