@@ -315,7 +315,7 @@ mod tests {
         stats::Stats,
     };
 
-    const WINDOW: Crop = Crop { column: 1, row: 3, width: 3, height: 2 };
+    const WINDOW: Crop = Crop { column: 1, row: 2, width: 3, height: 2 };
 
     /// Passes of a crop of 3 x 2 pixels.
     fn sum(passes: std::ops::Range<u32>) -> PassSum {

@@ -32,9 +32,9 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Rays of final gathering of each pixel of a grid, for all of its samples. Bias is the mean over
-/// many pixels, so that more pixels tell more than more rays.
-const GRID_RAYS: u32 = 8;
+/// Rays of final gathering of each pixel of a grid, for all of its samples. With eight, their noise
+/// hides a bias of 3 % in 16 passes of S1.
+const GRID_RAYS: u32 = 64;
 
 /// Rays of final gathering that the preview of a picture traces at most, in all and for each pixel
 /// of the picture.
