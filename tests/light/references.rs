@@ -14,7 +14,7 @@ use caustica::{
     progress::Silent,
     renderer::{Progressive, Session},
     scene::Scene,
-    settings::{EstimateSettings, Mode, PassSettings},
+    settings::{EstimateSettings, Mode, PassSettings, Quality, Settings},
 };
 use support::*;
 
@@ -95,17 +95,16 @@ fn diffuse_only() {
     errors("S2", "S1", 256, 0.0045);
 }
 
-/// Passes of a picture of S2 with that many rays of final gathering: their estimated error against
-/// the true one.
-fn error_of_passes(rays: u32) {
+/// Eight passes of a picture of S2: their estimated error against the true one.
+fn error_of_passes(estimate: Settings) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let scene = Scene::load(&folder.join("S2.glb")).expect("the scene loads");
     let reference = read_exr(&folder.join("S2_128.exr")).expect("the reference reads");
-    let settings = settings(Mode::Hybrid, 20_000, 128).with(|s| {
-        s.picture.spp = 1;
-        s.photons.final_gather = rays;
-        s.estimate.gather_spacing = if rays > 0 { 2 } else { 0 };
+    let settings = estimate.with(|s| {
+        (s.photons.global, s.photons.caustic) = (50_000, 50_000);
+        s.picture.size = Some((128, 128));
     });
+    let rays = settings.photons.final_gather;
     let session = Session::open(gpu(), &scene, &settings.lights, &Silent).expect("the scene fits");
     let passes = Progressive::new(&session, &settings, PassSettings::default()).expect("passes");
     let mut sum = PassSum::default();
@@ -127,10 +126,10 @@ fn error_of_passes(rays: u32) {
 
 #[test]
 fn errors_of_passes_by_photons_alone() {
-    error_of_passes(0);
+    error_of_passes(Settings::default());
 }
 
 #[test]
 fn errors_of_passes_with_final_gathering() {
-    error_of_passes(64);
+    error_of_passes(Quality::Normal.settings());
 }
