@@ -1,12 +1,15 @@
 //! Benchmark: error of a picture of many passes, estimated and true, against a reference at 128 x
 //! 128.
 //!
-//! `cargo bench --bench convergence [-- PASSES [PLOT.svg]]`. Errors are relative, as
-//! [`ErrorEstimate`] has them. The noise of the reference is found by the correlation of the errors
-//! of disjoint passes, early and late ones, whose bias is proportional to their squared radius; it
-//! is taken off. Fits are slopes over the logarithm of the number of passes.
+//! `cargo bench --bench convergence [-- PASSES [PLOT.svg [SCENE.glb]]]`. The reference of a scene,
+//! S1 unless one is given, is `SCENE_128.exr` beside it. Errors are relative, as
+//! [`ErrorEstimate`] has them. The noise of the reference is taken off. Fits are slopes over the
+//! logarithm of the number of passes.
 
-use std::{error::Error, path::Path};
+use std::{
+    error::Error,
+    path::{Path, PathBuf},
+};
 
 use caustica::{
     Gpu, Progressive, Scene, Session, Settings, Silent,
@@ -18,9 +21,11 @@ use plotters::prelude::*;
 const SIZE: u32 = 128;
 const PHOTONS: u32 = 50_000;
 const PASSES: u32 = 64;
+/// Mean square of the noise of the references S1 and S2 at this size, from that at 256 x 256.
+const REFERENCE_NOISE: f64 = 3e-4 / 4.0;
 /// Part of the mean radiance that is added to that of each pixel, as in [`ErrorEstimate`].
 const FLOOR: f64 = 0.1;
-const SCENE: &str = "S1";
+const SCENE: &str = "tests/references/S1.glb";
 
 /// The state after some passes; errors are roots of mean squares.
 struct Row {
@@ -35,20 +40,22 @@ struct Row {
 fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let passes = words.first().map_or(Ok(PASSES), |word| word.parse())?;
+    let scene = words.get(2).map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join(SCENE), PathBuf::from);
+    let scene = scene.as_path();
     let mut curves = Vec::new();
     for (name, settings) in [("final gathering", Quality::Normal.settings()), ("photons alone", Settings::default())] {
-        let (rows, noise) = measure(settings, passes)?;
-        print(name, &rows, noise);
-        curves.push((name, rows, noise));
+        let rows = measure(scene, settings, passes)?;
+        print(&format!("{}, {name}", scene.display()), &rows);
+        curves.push((name, rows));
     }
-    words.get(1).map_or(Ok(()), |path| plot(Path::new(path), &curves))
+    words.get(1).filter(|path| path.as_str() != "-").map_or(Ok(()), |path| plot(Path::new(path), &curves))
 }
 
-/// Renders the passes. Also returns the mean square of the reference's own noise.
-fn measure(settings: Settings, passes: u32) -> Result<(Vec<Row>, f64), Box<dyn Error>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
-    let scene = Scene::load(&folder.join(format!("{SCENE}.glb")))?;
-    let reference = read_exr(&folder.join(format!("{SCENE}_{SIZE}.exr")))?;
+/// Renders the passes.
+fn measure(path: &Path, settings: Settings, passes: u32) -> Result<Vec<Row>, Box<dyn Error>> {
+    let scene = Scene::load(path)?;
+    let stem = path.file_stem().ok_or("no file")?.to_string_lossy();
+    let reference = read_exr(&path.with_file_name(format!("{stem}_{SIZE}.exr")))?;
     let settings = settings.with(|s| {
         (s.photons.global, s.photons.caustic) = (PHOTONS, PHOTONS);
         s.picture.size = Some((SIZE, SIZE));
@@ -64,17 +71,14 @@ fn measure(settings: Settings, passes: u32) -> Result<(Vec<Row>, f64), Box<dyn E
     let session = Session::open(&gpu, &scene, &settings.lights, &Silent)?;
     let progressive = Progressive::new(&session, &settings, PassSettings::default())?;
     let (mut all, mut rows) = (PassSum::default(), Vec::new());
-    // Even and odd passes of the first and of the second half.
-    let mut quarters: [Option<Film>; 4] = Default::default();
-    let mut bandwidths = [0.0; 2];
+    // Even and odd passes.
+    let mut halves: [Option<Film>; 2] = Default::default();
     for index in 0..passes {
         let (film, stats) = progressive.render(index, &Silent)?;
-        let half = usize::from(2 * index >= passes);
-        bandwidths[half] += 2.0 * PassSettings::default().bandwidth(&settings.estimate, index) / f64::from(passes);
-        let quarter = &mut quarters[2 * half + index as usize % 2];
-        match quarter {
+        let half = &mut halves[index as usize % 2];
+        match half {
             Some(sum) => sum.merge(&film)?,
-            None => *quarter = Some(film.clone()),
+            None => *half = Some(film.clone()),
         }
         all.push(PassBlock::of_pass(index, film, &stats))?;
         if !(index + 1).is_power_of_two() {
@@ -84,35 +88,19 @@ fn measure(settings: Settings, passes: u32) -> Result<(Vec<Row>, f64), Box<dyn E
         let frame = total.film().finish();
         let here = frame.layer("radiance");
         let square = |i: usize| (f64::from(here[i]) - right[i]).powi(2);
-        let halves = both_halves(&quarters);
-        let noise = halves.map(|(a, b)| relative(&|i| (f64::from(a[i] - b[i]) / 2.0).powi(2)));
+        let means = halves.each_ref().map(|half| half.as_ref().map(|film| film.finish().layer("radiance").to_vec()));
+        let [Some(even), Some(odd)] = means else { continue };
+        let noise = relative(&|i| (f64::from(even[i] - odd[i]) / 2.0).powi(2));
         rows.push(Row {
             passes: index + 1,
             mean: here.iter().map(|x| f64::from(*x)).sum::<f64>() / (mean * right.len() as f64),
             blocks: rel_mse(&blocks(frame.radiance()), &blocks(reference.radiance()), None),
             estimate: ErrorEstimate::of(total.film(), None),
-            noise: noise.unwrap_or(f64::NAN).sqrt(),
+            noise: noise.sqrt(),
             squared: relative(&square),
         });
     }
-    let [a, b, c, d] = quarters.map(|film| film.map(|film| film.finish().layer("radiance").to_vec()));
-    let product = |a: &[f32], b: &[f32]| relative(&|i| (f64::from(a[i]) - right[i]) * (f64::from(b[i]) - right[i]));
-    let (Some(a), Some(b), Some(c), Some(d)) = (a, b, c, d) else { return Ok((rows, 0.0)) };
-    let (early, late) = (product(&a, &b), product(&c, &d));
-    let [wide, narrow] = bandwidths.map(|bandwidth: f64| bandwidth.powi(2));
-    Ok((rows, ((late * wide - early * narrow) / (wide - narrow)).max(0.0)))
-}
-
-/// Means of even and of odd passes so far.
-fn both_halves(quarters: &[Option<Film>; 4]) -> Option<(Vec<f32>, Vec<f32>)> {
-    let half = |first: usize| -> Option<Vec<f32>> {
-        let mut sum = quarters[first].clone()?;
-        if let Some(later) = &quarters[first + 2] {
-            sum.merge(later).ok()?;
-        }
-        Some(sum.finish().layer("radiance").to_vec())
-    };
-    Some((half(0)?, half(1)?))
+    Ok(rows)
 }
 
 /// Means of blocks of 8 x 8 pixels.
@@ -126,19 +114,19 @@ fn blocks(radiance: &[[f32; 3]]) -> Vec<[f32; 3]> {
     means
 }
 
-fn truth(row: &Row, noise: f64) -> f64 {
-    (row.squared - noise).max(0.0).sqrt()
+fn truth(row: &Row) -> f64 {
+    (row.squared - REFERENCE_NOISE).max(0.0).sqrt()
 }
 
-fn print(name: &str, rows: &[Row], noise: f64) {
-    println!("{SCENE}, {name}: {PHOTONS} photons a map; noise of the reference {:.2} %", 100.0 * noise.sqrt());
+fn print(name: &str, rows: &[Row]) {
+    println!("{name}: {PHOTONS} photons a map; noise of the reference {:.2} %", 100.0 * REFERENCE_NOISE.sqrt());
     println!(
         "{:>7} {:>8} {:>10} {:>9} {:>9} {:>9} {:>9} {:>11}",
         "passes", "mean", "8x8 relMSE", "noise %", "est. %", "bias e. %", "error %", "est. / true"
     );
     for row in rows {
         let estimate = row.estimate.unwrap_or(ErrorEstimate { noise: f64::NAN, bias: f64::NAN });
-        let (Row { passes, mean, blocks, .. }, error) = (row, truth(row, noise));
+        let (Row { passes, mean, blocks, .. }, error) = (row, truth(row));
         println!(
             "{passes:>7} {mean:>8.4} {blocks:>10.2e} {:>9.2} {:>9.2} {:>9.2} {:>9.2} {:>11.2}",
             100.0 * row.noise,
@@ -157,13 +145,13 @@ fn print(name: &str, rows: &[Row], noise: f64) {
             points.iter().fold((0.0, 0.0), |(a, b), (px, py)| (a + (px - x) * (py - y), b + (px - x).powi(2)));
         above / below
     };
-    println!("slopes: noise {:.2}, error {:.2}\n", slope(&|row| row.noise), slope(&|row| truth(row, noise)));
+    println!("slopes: noise {:.2}, error {:.2}\n", slope(&|row| row.noise), slope(&|row| truth(row)));
 }
 
 /// Draws estimated and true errors over the number of passes.
-fn plot(path: &Path, curves: &[(&str, Vec<Row>, f64)]) -> Result<(), Box<dyn Error>> {
+fn plot(path: &Path, curves: &[(&str, Vec<Row>)]) -> Result<(), Box<dyn Error>> {
     let colors = [RGBColor(0, 114, 178), RGBColor(213, 94, 0)];
-    let most = curves.iter().flat_map(|(_, rows, _)| rows.iter().map(|row| row.passes)).max().ok_or("no pass")?;
+    let most = curves.iter().flat_map(|(_, rows)| rows.iter().map(|row| row.passes)).max().ok_or("no pass")?;
     let area = SVGBackend::new(path, (680, 420)).into_drawing_area();
     let mut chart = ChartBuilder::on(&area)
         .margin(12)
@@ -172,8 +160,8 @@ fn plot(path: &Path, curves: &[(&str, Vec<Row>, f64)]) -> Result<(), Box<dyn Err
         .y_label_area_size(60)
         .build_cartesian_2d((1.0..f64::from(most)).log_scale(), (0.5..20.0_f64).log_scale())?;
     chart.configure_mesh().x_desc("passes").y_desc("relative error, %").draw()?;
-    for ((name, rows, noise), color) in curves.iter().zip(colors) {
-        let points = rows.iter().map(|row| (f64::from(row.passes), 100.0 * truth(row, *noise)));
+    for ((name, rows), color) in curves.iter().zip(colors) {
+        let points = rows.iter().map(|row| (f64::from(row.passes), 100.0 * truth(row)));
         chart
             .draw_series(LineSeries::new(points, color.stroke_width(2)))?
             .label(*name)

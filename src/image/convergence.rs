@@ -12,7 +12,7 @@ const FLOOR: f64 = 0.1;
 pub struct ErrorEstimate {
     /// Standard error of the means.
     pub noise: f64,
-    /// Bias of the estimate's kernel, beyond what its own noise explains; 0 if radii do not shrink.
+    /// Bias of the estimate's kernel, beyond what its own noise explains.
     pub bias: f64,
 }
 
@@ -42,7 +42,20 @@ impl ErrorEstimate {
             let ratio = film.bias_noise().unwrap_or(0.0);
             (mean_square(&biases) - ratio * ratio * noise).max(0.0)
         };
-        Some(Self { noise: noise.sqrt(), bias: biases.map_or(0.0, unexplained).sqrt() })
+        let term = |place: usize, squares: [f64; 3]| {
+            let of_channel = |c: usize| {
+                let x = f64::from(frame.layer("radiance")[3 * place + c]);
+                squares[c] / (x * x + floor).max(f64::MIN_POSITIVE)
+            };
+            (0..3).map(of_channel).sum::<f64>() / 3.0
+        };
+        let checked = film.check.as_ref().and_then(|check| check.squares(film.whole, film.window)).and_then(|all| {
+            let all = all.filter(|(place, _)| is_in(*place)).map(|(place, squares)| term(place, squares));
+            let (count, sum) = all.fold((0, 0.0), |(count, sum), term| (count + 1, sum + term));
+            (count > 0).then(|| (sum / f64::from(count)).max(0.0))
+        });
+        let bias = checked.or_else(|| biases.map(unexplained)).unwrap_or(0.0);
+        Some(Self { noise: noise.sqrt(), bias: bias.sqrt() })
     }
 
     /// Both errors together.
@@ -73,6 +86,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::PixelGrid;
 
     /// Two pixels; the second varies between passes.
     fn film(passes: &[(f32, f64)]) -> Film {
@@ -98,6 +112,39 @@ mod tests {
         let estimate = ErrorEstimate::of(&film(&biased), None).expect("passes");
         assert!(estimate.bias > 0.1 && estimate.total() > estimate.noise, "{estimate:?}");
         assert_eq!(ErrorEstimate::of(&film(&biased[..1]), None), None, "one pass");
+    }
+
+    /// A film of a pass whose only checked pixel is `value` where the truth is 1, of 8 x 8 pixels.
+    fn checked(index: u32, value: f32) -> Film {
+        let whole = Crop { column: 0, row: 0, width: 8, height: 8 };
+        let filled = |size: (u32, u32), window: Crop, value: f32| {
+            let mut film = Film::new(size, window, 1);
+            let places = (0..window.height).flat_map(|row| (0..window.width).map(move |column| (column, row)));
+            places.for_each(|place| {
+                film.add(place, &[[value, value, value, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1)
+            });
+            film
+        };
+        let grid = PixelGrid::of((8, 8)).window(whole);
+        let closer = filled((grid.width, grid.height), grid, 1.0);
+        filled((8, 8), whole, value).checked_by(index, &closer, 2.0)
+    }
+
+    #[test]
+    fn bias_is_the_product_of_differences_in_even_and_odd_passes() {
+        let merged = |values: &[f32]| {
+            let mut films = (0..).zip(values).map(|(index, value)| checked(index, *value));
+            let mut merged = films.next().expect("a pass");
+            films.for_each(|film| merged.merge(&film).expect("of one picture"));
+            ErrorEstimate::of(&merged, None).expect("passes")
+        };
+        // Means 1.2 and 1.4 of even and odd passes; the ratio of bias to difference is 2.
+        let estimate = merged(&[1.1, 1.5, 1.3, 1.3]);
+        let expected = (4.0 * 0.2 * 0.4 / (1.3_f64.powi(2) * 1.01)).sqrt();
+        assert!((estimate.bias - expected).abs() < 1e-6, "{estimate:?} {expected}");
+        // Noise alone: differences of opposite signs have no square.
+        assert_eq!(merged(&[1.1, 0.9, 1.1, 0.9]).bias, 0.0);
+        assert_eq!(merged(&[1.0, 1.0]).bias, 0.0, "control: no difference");
     }
 
     #[test]

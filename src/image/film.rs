@@ -6,6 +6,7 @@ use std::array;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    bias_check::BiasCheck,
     cryptomatte::Matte,
     frame::{DataWindow, Frame},
     layers::{EXTRA_LAYERS, LAYERS, Rule, Source, layer_index},
@@ -13,7 +14,7 @@ use super::{
 use crate::{
     error::{Error, Result},
     layout::PixelSums,
-    settings::{Crop, ExtraLayers},
+    settings::{Crop, ExtraLayers, PixelGrid},
 };
 
 /// Number of a film's layers.
@@ -41,6 +42,8 @@ pub struct Film {
     /// Layers that were asked for.
     pub(super) extras: Vec<ExtraSums>,
     pub(super) mattes: Vec<Matte>,
+    /// Differences from estimates of less bias, if there are such for all passes.
+    pub(super) check: Option<BiasCheck>,
     /// Number of samples that were left out, since a sum would not be finite with them.
     pub(super) non_finite: u64,
     /// How samples of pixels that have more of them count.
@@ -125,6 +128,7 @@ impl Film {
             moments: None,
             extras: Vec::new(),
             mattes: Vec::new(),
+            check: None,
             non_finite: 0,
             weights: Weights::default(),
             extra_samples: 0,
@@ -231,6 +235,13 @@ impl Film {
             }
             total.non_finite += film.non_finite;
             total.extra_samples += film.extra_samples;
+            total.check = match (total.check.take(), &film.check) {
+                (Some(mut sum), Some(of_group)) => {
+                    sum.add_light(of_group);
+                    Some(sum)
+                }
+                _ => None,
+            };
         }
         let mut total = total.expect("a group of lights");
         total.extras.extend(lights);
@@ -241,6 +252,19 @@ impl Film {
     #[must_use]
     pub fn with_bandwidth(self, factor: f64) -> Self {
         Self { bandwidth: Bandwidth::of_pass(factor), ..self }
+    }
+
+    /// Notes how far the radiance of pass `index` is from that of `closer`, a film of estimates of
+    /// less bias at the pixels of the picture's [`PixelGrid`] alone. `ratio` is that of the bias to
+    /// this difference.
+    #[must_use]
+    pub(crate) fn checked_by(self, index: u32, closer: &Self, ratio: f32) -> Self {
+        let radiance = layer_index("radiance");
+        let (here, there) = (self.means(), closer.means());
+        let places = PixelGrid::of(self.whole).places(self.window);
+        let numbers = places.flat_map(|place| &here[radiance][3 * place..][..3]);
+        let differences = numbers.zip(&there[radiance]).map(|(a, b)| ratio * (a - b)).collect();
+        Self { check: Some(BiasCheck::of_pass(index, differences)), ..self }
     }
 
     /// Width and height of the whole picture, pixels.
@@ -360,6 +384,13 @@ impl Film {
             layer.sums.iter_mut().zip(&theirs.sums).for_each(|(a, b)| *a += b);
         }
         self.mattes.iter_mut().zip(&other.mattes).for_each(|(matte, theirs)| matte.merge(theirs));
+        self.check = match (self.check.take(), &other.check) {
+            (Some(mut sum), Some(theirs)) => {
+                sum.merge(theirs);
+                Some(sum)
+            }
+            _ => None,
+        };
         self.passes += other.passes;
         self.samples += other.samples;
         self.non_finite += other.non_finite;

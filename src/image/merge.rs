@@ -242,6 +242,7 @@ impl Survey {
 pub fn merge(survey: &Survey, check: &dyn Fn(usize) -> Result<()>) -> Result<(Frame, Attributes)> {
     let mut attributes = survey.attributes.clone();
     attributes.remove("blocks");
+    attributes.remove("partFormat");
     let joined = |of: fn(&(String, String)) -> &String| {
         survey.devices.iter().map(of).collect::<BTreeSet<_>>().into_iter().cloned().collect::<Vec<_>>().join("; ")
     };

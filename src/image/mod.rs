@@ -1,5 +1,6 @@
 //! Pictures: film and frame, EXR and PNG files, tone mapping, error metrics.
 
+mod bias_check;
 #[cfg(feature = "report")]
 mod canvas;
 mod convergence;

@@ -12,6 +12,7 @@ use exr::meta::MetaData;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    bias_check::BiasCheck,
     cryptomatte::{Matte, RANKS},
     exr::{Attributes, channels_of, count_photons, count_samples, encode, failure},
     exr_read::{attributes_of, open, our_attributes, window_of},
@@ -24,9 +25,15 @@ use super::{
 use crate::{
     error::{Error, Result},
     map_kind::ByKind,
-    settings::{Crop, ExtraLayers, PassRange},
+    settings::{Crop, ExtraLayers, PassRange, PixelGrid},
     stats::MapStats,
 };
+
+/// Version of what the channels and `blocks` hold, in the attribute `partFormat`. Parts without one
+/// are of format 1, without differences from estimates of less bias.
+const FORMAT: &str = "2";
+/// Kinds of the channels with differences from estimates of less bias, of even and odd passes.
+const CHECKS: [&str; 2] = ["evenCheck", "oddCheck"];
 
 /// Header of a part: all but its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +67,9 @@ struct BlockRow {
     weights: Weights,
     #[serde(default)]
     extra_samples: u64,
+    /// Number of even and of odd passes that are checked for bias.
+    #[serde(default)]
+    checked: Option<[u32; 2]>,
 }
 
 /// A layer that was asked for.
@@ -99,6 +109,7 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
     let rows: Vec<BlockRow> = sum.blocks.iter().map(row).collect();
     attributes.insert("blocks".to_owned(), serde_json::to_string(&rows).expect("blocks hold numbers only"));
     attributes.insert("passes".to_owned(), range(&rows).to_string());
+    attributes.insert("partFormat".to_owned(), FORMAT.to_owned());
     let frame = total.film.finish();
     let shown = ["radiance", "alpha"].map(|name| LAYERS[layer_index(name)]);
     let mut channels: Vec<_> =
@@ -122,6 +133,16 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
             let numbers = |[hash, count]: &[u32; 2]| [f32::from_bits(*hash), *count as f32];
             let numbers: Vec<f32> = matte.ranks.iter().flatten().flat_map(numbers).collect();
             channels.extend(channels_of(&numbers, &names, &before));
+        }
+        if let Some(check) = &film.check {
+            let names = LAYERS[layer_index("radiance")].channels;
+            for (kind, sums) in CHECKS.iter().zip(&check.sums) {
+                let mut spread = vec![0.0; 3 * frame.pixels()];
+                for (place, numbers) in PixelGrid::of(film.whole).places(film.window).zip(sums.chunks(3)) {
+                    spread[3 * place..][..3].copy_from_slice(numbers);
+                }
+                channels.extend(channels_of(&spread, names, &format!("{before}{kind}.")));
+            }
         }
         if let Some(moments) = &film.moments {
             let names = LAYERS[layer_index("radiance")].channels;
@@ -158,6 +179,7 @@ fn row(block: &PassBlock) -> BlockRow {
         mattes,
         weights: block.film.weights,
         extra_samples: block.film.extra_samples,
+        checked: block.film.check.as_ref().map(|check| check.passes),
     }
 }
 
@@ -240,6 +262,14 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             let ranks = |pixel: &[f32]| std::array::from_fn(|i| rank(pixel, i));
             Ok(Matte { of: *of, ranks: numbers.chunks(2 * RANKS).map(ranks).collect() })
         };
+        let check = |passes: [u32; 2]| -> Result<BiasCheck> {
+            let of = |kind: &str| -> Result<Vec<f32>> {
+                let spread = read(&format!("{before}{kind}."), LAYERS[layer_index("radiance")].channels)?;
+                let places = PixelGrid::of(whole).places(window);
+                Ok(places.flat_map(|place| spread[3 * place..][..3].to_vec()).collect())
+            };
+            Ok(BiasCheck { passes, sums: [of(CHECKS[0])?, of(CHECKS[1])?] })
+        };
         let [mean, deviations, inverse] = row.bandwidth.map(f64::from_bits);
         let film = Film {
             whole,
@@ -251,6 +281,7 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             moments: if row.passes.count() > 1 { Some(moments()?) } else { None },
             extras: row.extras.iter().map(extra).collect::<Result<_>>()?,
             mattes: row.mattes.iter().map(matte).collect::<Result<_>>()?,
+            check: row.checked.map(check).transpose()?,
             non_finite: row.non_finite,
             weights: row.weights,
             extra_samples: row.extra_samples,
@@ -274,7 +305,10 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
     if rows.is_empty() || !consecutive || !rows.iter().all(is_good) {
         return Err(no_part(path));
     }
-    Ok(rows)
+    match attributes.get("partFormat").map_or("1", String::as_str) {
+        FORMAT => Ok(rows),
+        other => Err(failure(path, format!("is a part of format {other}; this version reads and writes {FORMAT}"))),
+    }
 }
 
 fn no_part(path: &Path) -> Error {
@@ -313,10 +347,17 @@ mod tests {
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
                 film.weigh(position, pixel == 2);
             }
-            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3));
+            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3)).checked_by(index, &closer(index), 0.3);
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");
         }
         sum
+    }
+
+    /// An estimate of less bias at the only pixel of the grid in the crop.
+    fn closer(index: u32) -> Film {
+        let mut film = Film::new((1, 1), Crop { column: 0, row: 0, width: 1, height: 1 }, 1);
+        film.add((0, 0), &[[1.0 / (index as f32 + 0.7), 3.0, 1e-7, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
+        film
     }
 
     fn attributes() -> Attributes {
@@ -373,6 +414,15 @@ mod tests {
         std::fs::write(&path, &bytes).unwrap();
         let message = read_part(&path).unwrap_err().to_string();
         assert!(message.contains("is damaged: ") && message.ends_with("131072 x 131072 pixels"), "{message}");
+        let (format, blocks) = (b"partFormat\0", b"string\0\x01\0\0\0");
+        write_part(&path, &sum(0..1), &attributes()).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        let name = [&b"caustica:"[..], format, blocks].concat();
+        let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len();
+        assert_eq!(bytes[at], b'2');
+        bytes[at] = b'1';
+        std::fs::write(&path, &bytes).unwrap();
+        assert!(said(&path).contains("is a part of format 1; this version reads and writes 2"), "{}", said(&path));
         for blocks in ["[]", "{}", "7", r#"[{"passes":{"first":3,"end":9}}]"#] {
             let mut attributes = attributes();
             attributes.insert("blocks".to_owned(), blocks.to_owned());

@@ -8,7 +8,7 @@ use super::exr::Attributes;
 
 /// Attributes that parts of one picture may differ in, since they follow from where and what a part
 /// is.
-const OF_PART: [&str; 11] = [
+const OF_PART: [&str; 12] = [
     "scene",
     // The settings hold it too.
     "seed",
@@ -16,6 +16,7 @@ const OF_PART: [&str; 11] = [
     "driver",
     "passes",
     "blocks",
+    "partFormat",
     "globalEmitted",
     "globalStored",
     "causticEmitted",

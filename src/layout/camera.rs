@@ -124,8 +124,10 @@ pub struct CameraTile {
     /// than the number of those that other tiles of the same square had before.
     pub listed: u32,
     pub listed_at: u32,
-    pub pad1: u32,
-    pub pad2: u32,
+    /// Columns and rows left out between those of a picture of few of the pixels, and the first
+    /// that it has. `first_column` and `first_row` then count those that it has.
+    pub left_out: u32,
+    pub first_kept: u32,
 }
 
 /// First hit of a camera sample.

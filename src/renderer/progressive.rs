@@ -13,8 +13,8 @@ use crate::{
     image::Film,
     map_kind::ByKind,
     passes::{PathRange, PathRanges},
-    progress::Progress,
-    settings::{Emission, PassRange, PassSettings, PhotonSettings, Settings},
+    progress::{Progress, Stage},
+    settings::{Emission, PassRange, PassSettings, PhotonSettings, PixelGrid, Settings},
     stats::{MapStats, Stats},
 };
 
@@ -61,8 +61,14 @@ impl<'a> Progressive<'a> {
         }
         maps.first_sample = Some(index * picture.spp);
         let shrunken = self.passes.estimate(estimate, index);
-        let (film, stats) = self.session.film(&maps, &shrunken, picture, progress)?;
-        Ok((film.with_bandwidth(self.passes.bandwidth(estimate, index)), stats))
+        let (film, mut stats) = self.session.film(&maps, &shrunken, picture, progress)?;
+        let film = film.with_bandwidth(self.passes.bandwidth(estimate, index));
+        if PixelGrid::of(film.whole()).places(film.window()).next().is_none() {
+            return Ok((film, stats));
+        }
+        let (closer, ratio) = PassSettings::closer(&shrunken, photons.final_gather > 0);
+        let closer = self.session.grid_film(&maps, &closer, picture, &mut stats, &Checking(progress))?;
+        Ok((film.checked_by(index, &closer, ratio), stats))
     }
 
     /// Indices of the photon paths of a pass from 1 on.
@@ -79,6 +85,16 @@ impl<'a> Progressive<'a> {
             return Err(Error::Setting { name: "passes.range", value: format!("{index}..{}", index + 1), problem });
         }
         Ok(ranges)
+    }
+}
+
+/// Work that is not reported but may be stopped.
+struct Checking<'a>(&'a dyn Progress);
+
+impl Progress for Checking<'_> {
+    fn report(&self, _: Stage, _: u64, _: u64) {}
+    fn stop_requested(&self) -> bool {
+        self.0.stop_requested()
     }
 }
 

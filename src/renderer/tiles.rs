@@ -17,7 +17,7 @@ use crate::{
     passes::{BrightPlaces, CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile},
     progress::{Progress, Stage},
     scene::{Camera, Scene},
-    settings::{Crop, EstimateSettings, ExtraLayers, PhotonSettings, PictureSettings},
+    settings::{Crop, EstimateSettings, ExtraLayers, PhotonSettings, PictureSettings, PixelGrid},
     stats::{Stats, timed},
     upload::SceneBuffers,
 };
@@ -146,6 +146,14 @@ impl<'a> CameraPass<'a> {
     pub fn of_pass(self, picture: &PictureSettings, first_sample: Option<u32>) -> Result<Self> {
         let Some(first) = first_sample else { return Ok(self) };
         Ok(Self { tracer: self.tracer.of_pass(self.gpu, picture, first)?, ..self })
+    }
+
+    /// Leaves out all pixels but those of the picture's grid. The film has their columns and rows.
+    pub fn at_grid(self) -> Self {
+        let grid = PixelGrid::of(self.size);
+        let whole = grid.window(Crop { column: 0, row: 0, width: self.size.0, height: self.size.1 });
+        let (size, window) = ((whole.width, whole.height), grid.window(self.window));
+        Self { tracer: self.tracer.at_grid(grid), size, window, ..self }
     }
 
     /// Leaves points that are seen as blurred as that, metres, to the gatherer's cells; 0: none.

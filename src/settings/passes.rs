@@ -58,6 +58,28 @@ impl PassSettings {
         }
     }
 
+    /// Estimate of a pass with less bias, for few pixels, and the ratio of the bias of `shrunken`
+    /// to the difference that both have. With final gathering, each point has rays of its own and
+    /// caustics an area of a sixteenth, so that little bias is left. By photons alone, the radius
+    /// is half: the bias of even curvature is 4/3 of the difference, that of edges twice it, as
+    /// root of the mean square over pixels; the geometric mean of both is off by 1.22 at most.
+    #[must_use]
+    pub fn closer(shrunken: &EstimateSettings, gathers_finally: bool) -> (EstimateSettings, f32) {
+        let (area, ratio) = if gathers_finally { (1.0 / 16.0, 1.0) } else { (0.25, (8.0_f32 / 3.0).sqrt()) };
+        let narrow = |radius: f32| radius * f32::sqrt(area);
+        let neighbors = (shrunken.neighbors as f32 * area) as u32;
+        let estimate = EstimateSettings {
+            neighbors: neighbors.max(Self::MIN_NEIGHBORS.min(shrunken.neighbors)),
+            radius: shrunken.radius.map(narrow),
+            max_radius: shrunken.max_radius.map(narrow),
+            gather_spacing: 0,
+            irradiance_cells: 0.0,
+            share_reach: 0.0,
+            ..shrunken.clone()
+        };
+        (estimate, ratio)
+    }
+
     /// Squared radius of the estimate of pass `index`, relative to that of pass 0: the shrinkage,
     /// but for whole numbers of neighbours.
     #[must_use]

@@ -4,16 +4,17 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | S1, S2 | relMSE and mean of the picture | the other scene's reference |
+//! | errors of passes | the estimated error of eight passes is within 1.4 of the true one | their noise alone |
 //! | means | the mean over 2 seeds is within 0.5 % at k = 100 and k = 10 | at most 6 bounces |
 
 use std::path::Path;
 
 use caustica::{
-    image::{difference::rel_mse, read_exr},
+    image::{ErrorEstimate, PassBlock, PassSum, difference::rel_mse, read_exr},
     progress::Silent,
-    renderer::Session,
+    renderer::{Progressive, Session},
     scene::Scene,
-    settings::{EstimateSettings, Mode},
+    settings::{EstimateSettings, Mode, PassSettings, Quality, Settings},
 };
 use support::*;
 
@@ -92,4 +93,43 @@ fn mirror_and_glass() {
 #[test]
 fn diffuse_only() {
     errors("S2", "S1", 256, 0.0045);
+}
+
+/// Eight passes of a picture of S2: their estimated error against the true one.
+fn error_of_passes(estimate: Settings) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
+    let scene = Scene::load(&folder.join("S2.glb")).expect("the scene loads");
+    let reference = read_exr(&folder.join("S2_128.exr")).expect("the reference reads");
+    let settings = estimate.with(|s| {
+        (s.photons.global, s.photons.caustic) = (50_000, 50_000);
+        s.picture.size = Some((128, 128));
+    });
+    let rays = settings.photons.final_gather;
+    let session = Session::open(gpu(), &scene, &settings.lights, &Silent).expect("the scene fits");
+    let passes = Progressive::new(&session, &settings, PassSettings::default()).expect("passes");
+    let mut sum = PassSum::default();
+    for index in 0..8 {
+        let (film, stats) = passes.render(index, &Silent).expect("a pass");
+        sum.push(PassBlock::of_pass(index, film, &stats)).expect("of one picture");
+    }
+    let total = sum.total().expect("of one picture").expect("passes");
+    let estimate = ErrorEstimate::of(total.film(), None).expect("passes");
+    let right = || reference.layer("radiance").iter().map(|x| f64::from(*x));
+    let floor = (0.1 * right().sum::<f64>() / right().count() as f64).powi(2);
+    let frame = total.film().finish();
+    let terms = frame.layer("radiance").iter().zip(right()).map(|(x, y)| (f64::from(*x) - y).powi(2) / (y * y + floor));
+    let truth = (terms.sum::<f64>() / right().count() as f64).sqrt();
+    let ratio = estimate.total() / truth;
+    assert!((1.0 / 1.4..1.4).contains(&ratio), "{rays} rays: {estimate:?} of {truth}");
+    assert!(estimate.noise / truth < 1.0 / 1.4, "control: {rays} rays: {estimate:?} of {truth}");
+}
+
+#[test]
+fn errors_of_passes_by_photons_alone() {
+    error_of_passes(Settings::default());
+}
+
+#[test]
+fn errors_of_passes_with_final_gathering() {
+    error_of_passes(Quality::Normal.settings());
 }

@@ -19,7 +19,7 @@ use crate::{
         wavefront::{Step, Wavefront},
     },
     scene::Camera,
-    settings::{Crop, PhotonSettings, PictureSettings, first_extra_sample},
+    settings::{Crop, PhotonSettings, PictureSettings, PixelGrid, first_extra_sample},
     upload::{SceneBuffers, sampler_constant},
 };
 
@@ -29,6 +29,8 @@ const BRANCHES: u32 = 4;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
+/// Odd factor of the index of a sample that gives a seed (the golden ratio, as a fraction of 2^32).
+const OTHER_SEEDS: u32 = 0x9e37_79b9;
 /// Surfaces before the near plane that a ray passes at most.
 const MAX_UNSEEN: u32 = 1 << 12;
 
@@ -168,15 +170,28 @@ impl CameraTracer {
         Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, first_extra, view, ..self })
     }
 
+    /// Leaves out all pixels but those of a grid. Tiles and data window count its columns and rows.
+    /// Random numbers are none of the picture's, nor of those of other passes: points of one
+    /// sequence make the errors of its parts opposite to each other.
+    #[must_use]
+    pub fn at_grid(self, grid: PixelGrid) -> Self {
+        let seed = self.view.seed ^ self.view.first_sample.wrapping_add(1).wrapping_mul(OTHER_SEEDS);
+        let (left_out, first_kept) = (grid.every() - 1, grid.first());
+        let view = CameraTile { seed, left_out, first_kept, margin: 0, ..self.view };
+        Self { view, window: grid.window(self.window), ..self }
+    }
+
     /// The tiles of the whole picture that overlap the data window, in order. A tile is the same
     /// for every data window, to the last bit.
     #[must_use]
     pub fn tiles(&self) -> Vec<Tile> {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
         let (width, height) = tile_sides(&self.view, self.room);
+        let (columns, rows) = (self.view.width, self.view.height);
+        let kept = |side: u32| (side - self.view.first_kept.min(side)).div_ceil(self.view.left_out + 1);
         let mut tiles = Vec::new();
-        for first_row in (0..self.view.height).step_by(height as usize) {
-            for first_column in (0..self.view.width).step_by(width as usize) {
+        for first_row in (0..kept(rows)).step_by(height as usize) {
+            for first_column in (0..kept(columns)).step_by(width as usize) {
                 if !self.window.touches((first_column, first_row), (width, height)) {
                     continue;
                 }
