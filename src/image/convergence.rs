@@ -121,7 +121,7 @@ mod tests {
             let mut film = Film::new(size, window, 1);
             let places = (0..window.height).flat_map(|row| (0..window.width).map(move |column| (column, row)));
             places.for_each(|place| {
-                film.add(place, &[[value, value, value, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1)
+                film.add(place, &[[value, value, value, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1)
             });
             film
         };

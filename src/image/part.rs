@@ -356,7 +356,11 @@ mod tests {
     /// An estimate of less bias at the only pixel of the grid in the crop.
     fn closer(index: u32) -> Film {
         let mut film = Film::new((1, 1), Crop { column: 0, row: 0, width: 1, height: 1 }, 1);
-        film.add((0, 0), &[[1.0 / (index as f32 + 0.7), 3.0, 1e-7, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
+        film.add(
+            (0, 0),
+            &[[1.0 / (index as f32 + 0.7), 3.0, 1e-7, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]],
+            1,
+        );
         film
     }
 
