@@ -9,12 +9,16 @@ use super::{
     overlap::{Shape, coincide, reach},
 };
 use crate::{
-    layout::{INSTANCE, Instance, Primitive, SPHERE_BIT},
+    layout::{INSTANCE, Instance, MAX_RANK, Primitive, SPHERE_BIT},
     scene::Bounds,
 };
 
 /// Primitives of instances that are asked at most whether they lie in those of other ones.
 const MAX_ASKED: usize = 1 << 25;
+
+/// Patches that are looked for in the surface of a primitive of the scene at most: there are no
+/// more ranks to tell them apart.
+const MAX_TOUCHED: usize = MAX_RANK as usize + 1;
 
 /// The hierarchy as it is searched.
 pub(super) struct Search<'a> {
@@ -37,7 +41,8 @@ impl Search<'_> {
         self.patches.get(primitive.id as usize).copied()
     }
 
-    /// What lies in the surface of a primitive of the scene, but for the patch `apart`.
+    /// What lies in the surface of a primitive of the scene, but for the patch `apart`; of a crowd,
+    /// some.
     pub fn touching(&self, primitive: &Primitive, apart: Option<u32>) -> Vec<Touched> {
         let is_apart = |patch: Option<u32>| patch.is_some() && patch == apart;
         if is_apart(self.of_nodes[0]) {
@@ -70,6 +75,9 @@ impl Search<'_> {
                     let touched = Touched { patch, of_instance: None };
                     if !found.contains(&touched) && coincide(primitive, other) {
                         found.push(touched);
+                        if found.len() >= MAX_TOUCHED {
+                            return found;
+                        }
                     }
                 }
             }

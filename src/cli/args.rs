@@ -347,6 +347,7 @@ mod tests {
         );
         let expected = Settings::default().with(|s| {
             s.photons.max_paths = Some(3_000_000);
+            s.photons.global = 200_000;
             s.estimate.neighbors = 50;
             s.estimate.kernel = DensityKernel::Gaussian;
             s.estimate.raw = true;

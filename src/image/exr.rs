@@ -292,10 +292,11 @@ mod tests {
             ("globalStored", "7"),
             ("causticEmitted", "11"),
             ("causticStored", "3"),
+            ("extraSamples", "0"),
         ] {
             assert_eq!(found[name], value, "{name}");
         }
-        assert_eq!(found.len(), 12);
+        assert_eq!(found.len(), 13);
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Lists of a pass: late rays, and pixels of a tile.
 //!
-//! Late rays need more than the loop budget of an invocation, and go on in further dispatches: a kernel lists the paths or points with such rays. It then runs again for a slice of the list at
-//! a time, as often as its rays take: each is kept where it stopped. What a ray finds does not
-//! depend on where it stopped, nor on the order of the list.
+//! Late rays need more than the loop budget of an invocation, and go on in further dispatches: a
+//! kernel lists the paths or points with such rays. It then runs again for a slice of the list at a
+//! time, as often as its rays take: each is kept where it stopped. What a ray finds does not depend
+//! on where it stopped, nor on the order of the list.
 
 use std::mem::offset_of;
 
@@ -56,8 +57,8 @@ impl Lists {
         gpu.write(&self.buffer, u64::from(self.pixels_at()) * WORD, pixels);
     }
 
-    /// Traces the rays of the first `listed` entries to their ends: of each slice of the list, those
-    /// of one kernel after the other, as [`Self::kernel`] gives them. Leaves
+    /// Traces the rays of the first `listed` entries to their ends: of each slice of the list,
+    /// those of one kernel after the other, as [`Self::kernel`] gives them. Leaves
     /// [`Counters::unfinished`] 0, and returns how many rays are given up.
     ///
     /// # Errors

@@ -39,8 +39,8 @@ pub struct Step<'b> {
 }
 
 impl Wavefront {
-    /// Room for `slots` paths in a scene, and for a list of `pixels`; `name` is in the labels of its
-    /// buffers.
+    /// Room for `slots` paths in a scene, and for a list of `pixels`; `name` is in the labels of
+    /// its buffers.
     ///
     /// # Errors
     /// Limits of the adapter.

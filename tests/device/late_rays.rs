@@ -16,7 +16,7 @@ use glam::{Vec3, vec3};
 use serde_json::json;
 use support::{
     gltf::{lambert, push, read_with},
-    meshes::{Mesh, file_of, glass_of},
+    meshes::{Mesh, file_of, glass_of, scene_of},
     *,
 };
 
@@ -57,16 +57,12 @@ fn rays_of_many_dispatches_find_the_same() {
     }
 }
 
-/// Copies of a ball, each a little aside.
+/// A mesh of copies of a ball, each a little aside.
 fn copies(count: u32) -> Scene {
-    let mut file = file_of(&[(Mesh::ball(Vec3::ZERO, 0.5, 6), 0)], &[lambert([0.7; 3])]);
-    for i in 1..count {
-        let aside = [1e-6 * f64::from(i % 97), 1e-6 * f64::from(i % 89), 1e-6 * f64::from(i % 83)];
-        let node = push(&mut file, "nodes", json!({ "mesh": 0, "translation": aside }));
-        file["scenes"][0]["nodes"].as_array_mut().expect("a list").push(json!(node));
-    }
-    let mut scene =
-        read_with(&file, &LoadOptions { share_from: usize::MAX, ..LoadOptions::default() }).expect("a scene");
+    let aside = |i: u32| 1e-6 * vec3((i % 97) as f32, (i % 89) as f32, (i % 83) as f32);
+    let ball = |i: u32| Mesh::ball(aside(i), 0.5, 6);
+    let all = (1..count).fold(ball(0), |all, i| all.with(&ball(i)));
+    let mut scene = scene_of(&[(all, 0)], &[lambert([0.7; 3])]);
     scene.cameras = vec![camera(vec3(1.0, 1.5, 2.0), Vec3::ZERO, 40.0)];
     scene.lights.push(point_light(vec3(1.0, 2.0, 3.0), 10.0));
     scene

@@ -143,7 +143,7 @@ fn memory_is_bounded_by_photons_alone() {
     };
     let (few, many) = (peak(1000, 16, 1), peak(500_000, 16, 1));
     // Each of the two maps has its own capacity.
-    let (per_photon, tile) = (96 * 2, 35 * MIB * gpu.batch.div_ceil(1 << 16));
+    let (per_photon, tile) = (96 * 2, 36 * MIB * gpu.batch.div_ceil(1 << 16));
     let bound = |photons: u64| per_photon * photons + tile;
     assert!(few <= bound(1000), "{few} bytes for 1 k photons");
     assert!(many <= bound(500_000), "{many} bytes for 500 k photons");
