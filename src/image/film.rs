@@ -139,7 +139,7 @@ impl Film {
     #[must_use]
     pub fn with_extra_samples(mut self, extra: u32) -> Self {
         let spp = self.samples as u32;
-        let divisor = (1..=spp.max(1)).rev().find(|d| spp % d == 0 && extra % d == 0).unwrap_or(1);
+        let divisor = (1..=spp.max(1)).rev().find(|d| spp.is_multiple_of(*d) && extra.is_multiple_of(*d)).unwrap_or(1);
         if extra > 0 {
             self.weights = Weights { plain: (spp + extra) / divisor, uneven: spp / divisor, extra };
         }
