@@ -50,7 +50,7 @@ impl LightCluster {
     }
 }
 
-/// The lights of a table in at most [`CLUSTERS`] clusters, each at infinity for itself. What lies
+/// The lights of a table in at most `CLUSTERS` clusters, each at infinity for itself. What lies
 /// within `fine` metres stays together.
 #[must_use]
 pub fn light_clusters(table: &LightTable, fine: f32) -> Vec<LightCluster> {

@@ -135,7 +135,7 @@ impl Film {
         }
     }
 
-    /// Has some pixels take so many samples more, see [`Self::weigh`].
+    /// Has some pixels take so many samples more, see `Self::weigh`.
     #[must_use]
     pub fn with_extra_samples(mut self, extra: u32) -> Self {
         let spp = self.samples as u32;

@@ -78,12 +78,12 @@ fn small_lights_keep_their_mean() {
     let of = |seed: u32, most: u32| {
         render_scene(&scene, &sampled(48, most).with(|s| (s.photons.seed, s.picture.light_samples) = (seed, 1)))
     };
-    let expected = mean(&render_scene(&scene, &sampled(48, 0).with(|s| s.picture.spp = 1024)));
-    let adaptive = Estimate::over_seeds(16, |seed| mean(&of(seed, 16)));
+    let expected = mean(&render_scene(&scene, &sampled(48, 0).with(|s| s.picture.spp = 600)));
+    let adaptive = Estimate::over_seeds(8, |seed| mean(&of(seed, 16)));
     println!("{adaptive:?}, expected {expected}");
     assert!(adaptive.z(expected) < 4.0 && within(adaptive.mean, expected, 0.01), "{adaptive:?} and {expected}");
     // Control: where a pixel's own samples decide, and are counted in.
-    let own = Estimate::over_seeds(16, |seed| {
+    let own = Estimate::over_seeds(4, |seed| {
         let (few, many) =
             (of(seed, 0), render_scene(&scene, &sampled(48, 0).with(|s| (s.photons.seed, s.picture.spp) = (seed, 12))));
         let sums = few.frame.radiance().iter().zip(many.frame.radiance()).map(|(a, b)| {
@@ -157,7 +157,7 @@ fn passes_have_further_samples_of_their_own() {
     let mut both = first.clone();
     both.merge(&second).expect("of one picture");
     assert_eq!(both.extra_samples(), first.extra_samples() + second.extra_samples());
-    let many = render_scene(&scene, &settings.clone().with(|s| (s.picture.spp, s.picture.max_spp) = (128, None)));
+    let many = render_scene(&scene, &settings.clone().with(|s| (s.picture.spp, s.picture.max_spp) = (64, None)));
     let error = |film: &caustica::image::Film| rel_mse(film.finish().radiance(), many.frame.radiance(), None);
     assert!(error(&both) < 0.75 * error(&first), "{} and {}", error(&both), error(&first));
     let plain = Session::film(
