@@ -24,6 +24,14 @@ impl BiasCheck {
         check
     }
 
+    /// Adds another one by `add`; what is not known of both is not known of the sum.
+    pub fn join(into: &mut Option<Self>, other: Option<&Self>, add: fn(&mut Self, &Self)) {
+        match (&mut *into, other) {
+            (Some(sum), Some(other)) => add(sum, other),
+            _ => *into = None,
+        }
+    }
+
     /// Adds the passes of another one at the same pixels.
     pub fn merge(&mut self, other: &Self) {
         for half in 0..2 {

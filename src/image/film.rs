@@ -1,13 +1,11 @@
-//! The film: sums over camera samples, from which a frame is made, and the second moments of merged
-//! passes.
+//! The film: sums over camera samples, from which a frame is made.
 
 use std::array;
-
-use serde::{Deserialize, Serialize};
 
 use super::{
     bias_check::BiasCheck,
     cryptomatte::Matte,
+    film_sums::{Bandwidth, ExtraSums, LAYER_COUNT, Moments, Weights},
     frame::{DataWindow, Frame},
     layers::{EXTRA_LAYERS, LAYERS, Rule, Source, layer_index},
 };
@@ -16,9 +14,6 @@ use crate::{
     layout::PixelSums,
     settings::{Crop, ExtraLayers, PixelGrid},
 };
-
-/// Number of a film's layers.
-const LAYER_COUNT: usize = LAYERS.len();
 
 /// Sums of every layer over the samples of one pass, or of several that were merged.
 ///
@@ -52,66 +47,6 @@ pub struct Film {
     pub(super) extra_samples: u64,
 }
 
-/// How the samples of a pass count in pixels of different numbers of samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Weights {
-    /// Factors on counts of samples where a pixel has those that every pixel has, and where it has
-    /// more: both give a pixel the same total. The first is also that of the number of samples.
-    pub plain: u32,
-    pub uneven: u32,
-    /// Samples that a pixel has more.
-    pub extra: u32,
-}
-
-/// Every pixel has the same number.
-impl Default for Weights {
-    fn default() -> Self {
-        Self { plain: 1, uneven: 1, extra: 0 }
-    }
-}
-
-/// Sums of a layer that was asked for.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct ExtraSums {
-    pub channels: Vec<String>,
-    pub rule: Rule,
-    /// Source of the numbers in the table.
-    pub source: Option<Source>,
-    /// Sums pixel by pixel; with [`Rule::PerCount`], of one number more than there are channels.
-    pub sums: Vec<f32>,
-}
-
-impl ExtraSums {
-    /// Numbers of a pixel.
-    pub fn count(&self) -> usize {
-        self.channels.len() + usize::from(self.rule == Rule::PerCount)
-    }
-}
-
-/// Squared radius of the estimates of passes, relative to that of pass 0: its mean over the passes,
-/// the sum of its squared deviations from the mean, and the mean of its inverse.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bandwidth {
-    pub mean: f64,
-    pub deviations: f64,
-    pub inverse: f64,
-}
-
-impl Bandwidth {
-    fn of_pass(factor: f64) -> Self {
-        Self { mean: factor, deviations: 0.0, inverse: 1.0 / factor }
-    }
-}
-
-/// Second moments of the means of passes.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Moments {
-    /// Sums of squared deviations of the layers' means, in the order of [`LAYERS`].
-    pub deviations: [Vec<f32>; LAYER_COUNT],
-    /// Sums of the products of the deviations of radiance and bandwidth.
-    pub with_bandwidth: Vec<f32>,
-}
-
 impl Film {
     /// Creates an empty film of one pass of `spp` samples a pixel, for a part of a picture.
     #[must_use]
@@ -132,34 +67,6 @@ impl Film {
             non_finite: 0,
             weights: Weights::default(),
             extra_samples: 0,
-        }
-    }
-
-    /// Has some pixels take so many samples more, see `Self::weigh`.
-    #[must_use]
-    pub fn with_extra_samples(mut self, extra: u32) -> Self {
-        let spp = self.samples as u32;
-        let divisor = (1..=spp.max(1)).rev().find(|d| spp.is_multiple_of(*d) && extra.is_multiple_of(*d)).unwrap_or(1);
-        if extra > 0 {
-            self.weights = Weights { plain: (spp + extra) / divisor, uneven: spp / divisor, extra };
-        }
-        self
-    }
-
-    /// Weighs what a pixel has so far as that number of samples that every pixel has. `is_uneven`:
-    /// it has more.
-    pub(crate) fn weigh(&mut self, (column, row): (u32, u32), is_uneven: bool) {
-        let pixel = row as usize * self.window.width as usize + column as usize;
-        let Weights { plain, uneven, extra } = self.weights;
-        self.mattes.iter_mut().for_each(|matte| matte.weigh(pixel, if is_uneven { uneven } else { plain }));
-        if is_uneven {
-            self.extra_samples += u64::from(extra);
-            let weight = uneven as f32 / plain as f32;
-            let all = LAYERS.iter().map(|layer| layer.channels.len()).zip(&mut self.sums);
-            let extras = self.extras.iter_mut().map(|layer| (layer.count(), &mut layer.sums));
-            for (count, sums) in all.chain(extras) {
-                sums[pixel * count..][..count].iter_mut().for_each(|sum| *sum *= weight);
-            }
         }
     }
 
@@ -235,23 +142,11 @@ impl Film {
             }
             total.non_finite += film.non_finite;
             total.extra_samples += film.extra_samples;
-            total.check = match (total.check.take(), &film.check) {
-                (Some(mut sum), Some(of_group)) => {
-                    sum.add_light(of_group);
-                    Some(sum)
-                }
-                _ => None,
-            };
+            BiasCheck::join(&mut total.check, film.check.as_ref(), BiasCheck::add_light);
         }
         let mut total = total.expect("a group of lights");
         total.extras.extend(lights);
         total
-    }
-
-    /// Notes the squared radius of the pass's estimates, relative to that of pass 0.
-    #[must_use]
-    pub fn with_bandwidth(self, factor: f64) -> Self {
-        Self { bandwidth: Bandwidth::of_pass(factor), ..self }
     }
 
     /// Notes how far the radiance of pass `index` is from that of `closer`, a film of estimates of
@@ -328,10 +223,8 @@ impl Film {
         }
     }
 
-    /// Adds the passes of another film of the same part of the same picture. Second moments are
-    /// merged without cancellation (Chan, Golub and LeVeque 1983, "Algorithms for Computing the
-    /// Sample Variance", equation 2.1). Sums round, so that the order of merges decides the last
-    /// bits: [`super::PassSum`] fixes it.
+    /// Adds the passes of another film of the same part of the same picture. Sums round, so that
+    /// the order of merges decides the last bits: [`super::PassSum`] fixes it.
     ///
     /// # Errors
     /// [`Error::Differs`] if size or window differ.
@@ -355,28 +248,7 @@ impl Film {
                 part(other)
             )));
         }
-        let (n, m) = (f64::from(self.passes), f64::from(other.passes));
-        // Weight of the product of the distances between both means.
-        let weight = n * m / (n + m);
-        let (here, there) = (self.means(), other.means());
-        let shift = other.bandwidth.mean - self.bandwidth.mean;
-        let mut moments = self.moments.take().unwrap_or_else(|| self.no_moments());
-        for i in 0..LAYER_COUNT {
-            let theirs = other.moments.as_ref().map(|moments| moments.deviations[i].as_slice());
-            let distances = here[i].iter().zip(&there[i]).map(|(a, b)| f64::from(*b) - f64::from(*a));
-            let products = distances.map(|d| d * d * weight);
-            add(&mut moments.deviations[i], theirs, products);
-        }
-        let radiance = layer_index("radiance");
-        let theirs = other.moments.as_ref().map(|moments| moments.with_bandwidth.as_slice());
-        let distances = here[radiance].iter().zip(&there[radiance]).map(|(a, b)| f64::from(*b) - f64::from(*a));
-        add(&mut moments.with_bandwidth, theirs, distances.map(|d| d * shift * weight));
-        self.moments = Some(moments);
-        self.bandwidth = Bandwidth {
-            mean: self.bandwidth.mean + shift * m / (n + m),
-            deviations: self.bandwidth.deviations + other.bandwidth.deviations + shift * shift * weight,
-            inverse: (n * self.bandwidth.inverse + m * other.bandwidth.inverse) / (n + m),
-        };
+        self.merge_moments(other);
         for (a, b) in self.sums.iter_mut().zip(&other.sums) {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
         }
@@ -384,13 +256,7 @@ impl Film {
             layer.sums.iter_mut().zip(&theirs.sums).for_each(|(a, b)| *a += b);
         }
         self.mattes.iter_mut().zip(&other.mattes).for_each(|(matte, theirs)| matte.merge(theirs));
-        self.check = match (self.check.take(), &other.check) {
-            (Some(mut sum), Some(theirs)) => {
-                sum.merge(theirs);
-                Some(sum)
-            }
-            _ => None,
-        };
+        BiasCheck::join(&mut self.check, other.check.as_ref(), BiasCheck::merge);
         self.passes += other.passes;
         self.samples += other.samples;
         self.non_finite += other.non_finite;
@@ -434,70 +300,18 @@ impl Film {
         }
     }
 
-    /// Standard error over the passes of each of a layer's means; `None` for one pass.
-    ///
-    /// # Panics
-    /// If [`LAYERS`] has no layer of that name.
-    #[must_use]
-    pub fn standard_error(&self, layer: &str) -> Option<Vec<f32>> {
-        let (i, passes) = (layer_index(layer), f64::from(self.passes));
-        let deviations = &self.moments.as_ref()?.deviations[i];
-        let error = |deviations: &f32| (f64::from(*deviations) / (passes - 1.0) / passes).sqrt() as f32;
-        Some(deviations.iter().map(error).collect())
-    }
-
-    /// Estimate of the bias of each of the means of radiance, by linear regression of the passes'
-    /// means on their squared radii, to which the bias is proportional at first order (Silverman
-    /// 1986, "Density Estimation", section 3.3); `None` unless passes differ in radius. It has a
-    /// noise of its own, [`Self::bias_noise`] times the standard error.
-    #[must_use]
-    pub fn bias(&self) -> Option<Vec<f32>> {
-        let moments = self.moments.as_ref().filter(|_| self.bandwidth.deviations > 0.0)?;
-        let scale = self.bandwidth.mean / self.bandwidth.deviations;
-        Some(moments.with_bandwidth.iter().map(|product| (f64::from(*product) * scale) as f32).collect())
-    }
-
-    /// Standard error of [`Self::bias`] relative to [`Self::standard_error`], if the variance of a
-    /// pass is inverse to its squared radius, as that of a number of photons relative to it is.
-    #[must_use]
-    pub fn bias_noise(&self) -> Option<f64> {
-        let Bandwidth { mean, deviations, inverse } = self.bandwidth;
-        let passes = f64::from(self.passes);
-        // The variance v/f of a pass of squared radius f gives the mean the variance v Σ 1/f / n²,
-        // and the slope v Σ (f − mean)²/f / deviations². The latter sum is n mean (mean inverse −
-        // 1).
-        let ratio = mean * (mean * inverse - 1.0).max(0.0) / inverse;
-        (deviations > 0.0).then(|| mean * passes / deviations * ratio.sqrt())
-    }
-
     /// The mean of each number, by its layer's rule.
-    fn means(&self) -> [Vec<f32>; LAYER_COUNT] {
+    pub(super) fn means(&self) -> [Vec<f32>; LAYER_COUNT] {
         array::from_fn(|i| {
             let count = LAYERS[i].channels.len();
             let scale = self.scale_of(LAYERS[i].rule);
             self.sums[i].iter().enumerate().map(|(at, sum)| sum * scale(at / count)).collect()
         })
     }
-
-    /// The moments of one pass.
-    fn no_moments(&self) -> Moments {
-        Moments {
-            deviations: array::from_fn(|i| vec![0.0; self.sums[i].len()]),
-            with_bandwidth: vec![0.0; self.sums[layer_index("radiance")].len()],
-        }
-    }
-}
-
-/// Adds the moments of another film, and the products of the distances between both means.
-fn add(moments: &mut [f32], theirs: Option<&[f32]>, products: impl Iterator<Item = f64>) {
-    for (i, (moment, product)) in moments.iter_mut().zip(products).enumerate() {
-        let theirs = theirs.map_or(0.0, |moments| f64::from(moments[i]));
-        *moment = (f64::from(*moment) + theirs + product) as f32;
-    }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     const WHOLE: (u32, u32) = (3, 2);
@@ -511,7 +325,7 @@ mod tests {
         [radiance, normal, albedo, [7.0 * hits, 8.0 * hits, 9.0 * hits, 0.0], [0.0; 4], [0.0; 4]]
     }
 
-    fn film(values: &[f32], spp: u32) -> Film {
+    pub fn film(values: &[f32], spp: u32) -> Film {
         let mut film = Film::new(WHOLE, ALL, spp);
         for (i, v) in (0..).zip(values) {
             film.add((i % 3, i / 3), &sums(*v, spp), spp);
@@ -541,44 +355,6 @@ mod tests {
         // Control: a third pass changes the mean.
         merged.merge(&second).expect("they are of one picture");
         assert_ne!(merged.finish().radiance()[0][0], mean);
-    }
-
-    #[test]
-    fn passes_tell_their_standard_error() {
-        let mut merged = film(&[1.0; 6], 4);
-        assert_eq!(merged.standard_error("radiance"), None);
-        for value in [2.0, 3.0, 6.0] {
-            merged.merge(&film(&[value; 6], 4)).expect("they are of one picture");
-        }
-        // The values 1, 2, 3, 6 of four passes have the mean 3 and the variance 14/3.
-        let error = merged.standard_error("radiance").expect("four passes")[0];
-        assert!((error - (14.0_f32 / 3.0 / 4.0).sqrt()).abs() < 1e-6, "{error}");
-        let mut equal = film(&[1.0; 6], 4);
-        equal.merge(&film(&[1.0; 6], 4)).expect("they are of one picture");
-        assert_eq!(equal.standard_error("radiance").expect("two passes")[0], 0.0, "control: equal passes");
-    }
-
-    #[test]
-    fn passes_of_smaller_radii_tell_the_bias() {
-        // Means 3 + 2 f of squared radii f: a bias of 2 times the mean of f.
-        let bandwidths = [1.0, 0.5, 0.25, 0.125];
-        let merged = |value: &dyn Fn(f64) -> f32| {
-            let pass = |f: f64| film(&[value(f); 6], 4).with_bandwidth(f);
-            let mut merged = pass(bandwidths[0]);
-            bandwidths[1..].iter().for_each(|f| merged.merge(&pass(*f)).expect("they are of one picture"));
-            merged
-        };
-        let biased = merged(&|f| (3.0 + 2.0 * f) as f32);
-        let bias = biased.bias().expect("radii differ")[0];
-        assert!((bias - 2.0 * 1.875 / 4.0).abs() < 1e-6, "{bias}");
-        assert!((biased.finish().radiance()[0][0] - bias - 3.0).abs() < 1e-6, "without it, the truth is left");
-        assert_eq!(merged(&|_| 3.0).bias().expect("radii differ")[0], 0.0, "control: no bias");
-        assert!(film(&[1.0; 6], 4).bias().is_none(), "one pass tells nothing");
-        // The slope of two passes is the difference: mean/(f₀ − f₁) times √(v/f₀ + v/f₁), and the
-        // standard error half of that root.
-        let mut two = film(&[1.0; 6], 4);
-        two.merge(&film(&[2.0; 6], 4).with_bandwidth(0.5)).expect("they are of one picture");
-        assert!((two.bias_noise().expect("radii differ") - 2.0 * 0.75 / 0.5).abs() < 1e-12);
     }
 
     #[test]

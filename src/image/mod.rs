@@ -11,10 +11,12 @@ mod exr;
 mod exr_read;
 mod file;
 pub mod film;
+mod film_sums;
 pub mod flip;
 mod frame;
 pub mod layers;
 mod merge;
+mod moments;
 mod orientation;
 mod part;
 mod part_identity;
@@ -22,6 +24,7 @@ mod pass_sum;
 mod png;
 mod radiance;
 mod tonemap;
+mod weights;
 
 #[cfg(feature = "report")]
 pub use canvas::{Canvas, Rgb8};

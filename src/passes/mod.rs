@@ -7,11 +7,12 @@ pub mod maps;
 pub mod photons;
 pub mod wavefront;
 
-pub use camera::{BrightPlaces, CameraKernels, CameraTracer, FinalGather, FinalRays, RayEnd, StepCount, Tile};
+pub use camera::{
+    BrightPlaces, CameraKernels, CameraTracer, FinalGather, FinalRays, RayEnd, StepCount, Tile, morton_number,
+};
 pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
     Records, SharedPoints, filter_footprint, record_spacing,
 };
-pub use lists::Lists;
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
 pub use photons::{PathRange, PathRanges, PhotonTracer, RawMap, TracedPhotons};

@@ -3,6 +3,7 @@
 //!
 //! [`Session`] offers the single stages, for several pictures of the same photons.
 
+mod film_layers;
 mod gatherer;
 mod light_groups;
 mod maps;

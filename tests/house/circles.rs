@@ -213,6 +213,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "maps",
             "unevenness",
             "tiles",
+            "film_layers",
             "preview",
             "gatherer",
             "session",

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::{
     direct_light::DirectLighting,
-    tile::{PIXEL_SAMPLES, StepCount, Tile, margin_cells, room_for, tile_sides},
+    tile::{StepCount, Tile, margin_cells, room_for, tile_sides},
     view::{UNCLIPPED, view},
 };
 use crate::{
@@ -85,7 +85,7 @@ pub struct CameraTracer {
     pixel_rows: Buffer,
     filter_table: Buffer,
     pub(super) view: CameraTile,
-    window: Crop,
+    pub(super) window: Crop,
     /// Index of the first sample beyond those that every pixel has.
     pub(super) first_extra: u32,
     /// Samples of a pixel that has more than every one.
@@ -181,31 +181,6 @@ impl CameraTracer {
         Self { view, window: grid.window(self.window), ..self }
     }
 
-    /// The tiles of the whole picture that overlap the data window, in order. A tile is the same
-    /// for every data window, to the last bit.
-    #[must_use]
-    pub fn tiles(&self) -> Vec<Tile> {
-        let samples = self.view.spp.min(PIXEL_SAMPLES);
-        let (width, height) = tile_sides(&self.view, self.room);
-        let (columns, rows) = (self.view.width, self.view.height);
-        let kept = |side: u32| (side - self.view.first_kept.min(side)).div_ceil(self.view.left_out + 1);
-        let mut tiles = Vec::new();
-        for first_row in (0..kept(rows)).step_by(height as usize) {
-            for first_column in (0..kept(columns)).step_by(width as usize) {
-                if !self.window.touches((first_column, first_row), (width, height)) {
-                    continue;
-                }
-                for first_sample in (0..self.view.spp).step_by(samples as usize) {
-                    let samples = samples.min(self.view.spp - first_sample);
-                    let first_sample = self.view.first_sample + first_sample;
-                    let pixels = width * height;
-                    tiles.push(Tile { pixels, first_column, first_row, first_sample, samples, listed: None });
-                }
-            }
-        }
-        tiles
-    }
-
     /// Maximum number of visible points of this tile, without its margin.
     #[must_use]
     pub fn point_count(&self, tile: &Tile) -> u32 {
@@ -255,17 +230,6 @@ impl CameraTracer {
             radiance: &self.radiance,
             gathered: &self.gathered,
         }
-    }
-
-    /// Column and row of the `i`-th pixel of a tile within the data window; `None` outside of it.
-    #[must_use]
-    pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
-        let i = tile.listed.as_ref().map_or(i, |listed| listed.pixels[i as usize]);
-        let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
-        let (x, y) = (tile.first_column + even_bits(i), tile.first_row + even_bits(i >> 1));
-        let window = &self.window;
-        let (x, y) = (x.checked_sub(window.column)?, y.checked_sub(window.row)?);
-        (x < window.width && y < window.height).then_some((x, y))
     }
 
     /// Traces the tile's camera paths to their visible points, and sets all radiance to 0.

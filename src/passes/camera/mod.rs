@@ -3,13 +3,13 @@
 pub mod bright_places;
 pub mod camera_tracer;
 mod direct_light;
-mod extra_tiles;
 pub mod final_gather;
 pub mod tile;
+mod tiling;
 mod view;
 mod waiting_points;
 
 pub use bright_places::{BrightPlaces, RayEnd};
 pub use camera_tracer::{CameraKernels, CameraTracer};
 pub use final_gather::{FinalGather, FinalRays};
-pub use tile::{Listed, StepCount, Tile};
+pub use tile::{StepCount, Tile, morton_number};

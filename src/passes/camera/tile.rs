@@ -34,6 +34,14 @@ pub struct Tile {
     pub listed: Option<Listed>,
 }
 
+impl Tile {
+    /// Columns and rows of a tile without a list.
+    #[must_use]
+    pub fn sides(&self) -> (u32, u32) {
+        sides_of(self.pixels)
+    }
+}
+
 /// Some pixels of a square.
 #[derive(Clone, Debug)]
 pub struct Listed {
@@ -95,10 +103,42 @@ pub(super) fn tile_sides(view: &CameraTile, room: u64) -> (u32, u32) {
     let side_bits = |side: u32| side.next_power_of_two().ilog2();
     let needed = 2 * side_bits(view.width.max(view.height)).max(MIN_TILE_PIXELS.ilog2() / 2);
     let bits = pixels.ilog2().min(needed);
+    sides_of(1 << bits)
+}
+
+/// Sides of a square, or half of one, of so many pixels, a power of 2.
+fn sides_of(pixels: u32) -> (u32, u32) {
+    let bits = pixels.ilog2();
     (1 << bits.div_ceil(2), 1 << (bits / 2))
+}
+
+/// Number of a pixel of a tile in Morton order, by its column and row there.
+#[must_use]
+pub fn morton_number(column: u32, row: u32) -> u32 {
+    let spread = |x: u32| (0..16).fold(0, |sum, bit| sum | ((x >> bit) & 1) << (2 * bit));
+    spread(column) | (spread(row) << 1)
+}
+
+/// Column and row of the pixel of that number.
+pub(super) fn morton_place(number: u32) -> (u32, u32) {
+    let even_bits = |i: u32| (0..16).fold(0, |sum, bit| sum | ((i >> bit) & (1 << bit)));
+    (even_bits(number), even_bits(number >> 1))
 }
 
 /// Number of cells in the margin of a tile of that size.
 pub(super) fn margin_cells((width, height): (u32, u32)) -> u32 {
     2 * (width / MARGIN_CELL + 2) + 2 * (height / MARGIN_CELL)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_places_are_inverse() {
+        for place in [(0, 0), (1, 0), (0, 1), (5, 3), (300, 255)] {
+            assert_eq!(morton_place(morton_number(place.0, place.1)), place);
+        }
+        assert_eq!([(0, 0), (1, 0), (0, 1), (1, 1), (2, 0)].map(|(x, y)| morton_number(x, y)), [0, 1, 2, 3, 4]);
+    }
 }

@@ -21,6 +21,7 @@ pub fn trace(scene: &Scene, constants: &[(&str, f64)], rays: &[(Vec3, Vec3)]) ->
     let path = |&(origin, direction): &(Vec3, Vec3)| Path {
         origin: origin.to_array(),
         direction: direction.normalize().to_array(),
+        beta: [1.0; 3],
         left: NOTHING_LEFT,
         ..Path::default()
     };

@@ -1,0 +1,68 @@
+//! Sums that a film holds: of layers that were asked for, of passes, and how samples count in them.
+
+use serde::{Deserialize, Serialize};
+
+use super::layers::{LAYERS, Rule, Source};
+
+/// Number of a film's layers.
+pub(super) const LAYER_COUNT: usize = LAYERS.len();
+
+/// Sums of a layer that was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ExtraSums {
+    pub channels: Vec<String>,
+    pub rule: Rule,
+    /// Source of the numbers in the table.
+    pub source: Option<Source>,
+    /// Sums pixel by pixel; with [`Rule::PerCount`], of one number more than there are channels.
+    pub sums: Vec<f32>,
+}
+
+impl ExtraSums {
+    /// Numbers of a pixel.
+    pub fn count(&self) -> usize {
+        self.channels.len() + usize::from(self.rule == Rule::PerCount)
+    }
+}
+
+/// Squared radius of the estimates of passes, relative to that of pass 0: its mean over the passes,
+/// the sum of its squared deviations from the mean, and the mean of its inverse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bandwidth {
+    pub mean: f64,
+    pub deviations: f64,
+    pub inverse: f64,
+}
+
+impl Bandwidth {
+    pub fn of_pass(factor: f64) -> Self {
+        Self { mean: factor, deviations: 0.0, inverse: 1.0 / factor }
+    }
+}
+
+/// Second moments of the means of passes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Moments {
+    /// Sums of squared deviations of the layers' means, in the order of [`LAYERS`].
+    pub deviations: [Vec<f32>; LAYER_COUNT],
+    /// Sums of the products of the deviations of radiance and bandwidth.
+    pub with_bandwidth: Vec<f32>,
+}
+
+/// How the samples of a pass count in pixels of different numbers of samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Weights {
+    /// Factors on counts of samples where a pixel has those that every pixel has, and where it has
+    /// more: both give a pixel the same total. The first is also that of the number of samples.
+    pub plain: u32,
+    pub uneven: u32,
+    /// Samples that a pixel has more.
+    pub extra: u32,
+}
+
+/// Every pixel has the same number.
+impl Default for Weights {
+    fn default() -> Self {
+        Self { plain: 1, uneven: 1, extra: 0 }
+    }
+}

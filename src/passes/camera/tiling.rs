@@ -1,0 +1,69 @@
+//! The tiles of a picture, those of further samples in a few pixels of a tile, and their pixels.
+
+use super::{
+    camera_tracer::CameraTracer,
+    tile::{Listed, PIXEL_SAMPLES, Tile, morton_place, tile_sides},
+};
+
+/// Samples of a pixel in a tile of further samples at most: of a small tile's room, they take what
+/// a pixel without a list may take too.
+const EXTRA_SAMPLES: u32 = 64;
+
+impl CameraTracer {
+    /// The tiles of the whole picture that overlap the data window, in order. A tile is the same
+    /// for every data window, to the last bit.
+    #[must_use]
+    pub fn tiles(&self) -> Vec<Tile> {
+        let samples = self.view.spp.min(PIXEL_SAMPLES);
+        let (width, height) = tile_sides(&self.view, self.room);
+        let (columns, rows) = (self.view.width, self.view.height);
+        let kept = |side: u32| (side - self.view.first_kept.min(side)).div_ceil(self.view.left_out + 1);
+        let mut tiles = Vec::new();
+        for first_row in (0..kept(rows)).step_by(height as usize) {
+            for first_column in (0..kept(columns)).step_by(width as usize) {
+                if !self.window.touches((first_column, first_row), (width, height)) {
+                    continue;
+                }
+                for first_sample in (0..self.view.spp).step_by(samples as usize) {
+                    let samples = samples.min(self.view.spp - first_sample);
+                    let first_sample = self.view.first_sample + first_sample;
+                    let pixels = width * height;
+                    tiles.push(Tile { pixels, first_column, first_row, first_sample, samples, listed: None });
+                }
+            }
+        }
+        tiles
+    }
+
+    /// Tiles of the samples that the given pixels of a tile have besides, in order. Their indices
+    /// follow each other from one far from those of all other samples on.
+    #[must_use]
+    pub fn extra_tiles(&self, tile: &Tile, pixels: &[u32]) -> Vec<Tile> {
+        let step = self.extra.clamp(1, EXTRA_SAMPLES);
+        let at_once = (self.room as u32 / (self.view.branches * step)).max(1);
+        let mut tiles = Vec::new();
+        for first in (0..self.extra).step_by(step as usize) {
+            for (before, some) in (0..).step_by(at_once as usize).zip(pixels.chunks(at_once as usize)) {
+                tiles.push(Tile {
+                    pixels: some.len() as u32,
+                    first_sample: self.first_extra + first,
+                    samples: step.min(self.extra - first),
+                    listed: Some(Listed { pixels: some.into(), before }),
+                    ..*tile
+                });
+            }
+        }
+        tiles
+    }
+
+    /// Column and row of the `i`-th pixel of a tile within the data window; `None` outside of it.
+    #[must_use]
+    pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
+        let i = tile.listed.as_ref().map_or(i, |listed| listed.pixels[i as usize]);
+        let (column, row) = morton_place(i);
+        let (x, y) = (tile.first_column + column, tile.first_row + row);
+        let window = &self.window;
+        let (x, y) = (x.checked_sub(window.column)?, y.checked_sub(window.row)?);
+        (x < window.width && y < window.height).then_some((x, y))
+    }
+}
