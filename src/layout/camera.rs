@@ -128,6 +128,12 @@ pub struct CameraTile {
     /// that it has. `first_column` and `first_row` then count those that it has.
     pub left_out: u32,
     pub first_kept: u32,
+    /// Binary logarithm of the side of squares of pixels whose samples are one set of random
+    /// numbers, pixels in Morton order; 0: the samples of each pixel are a set.
+    pub square_bits: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// First hit of a camera sample.

@@ -53,6 +53,9 @@ impl Settings {
     }
 }
 
+/// Squares of 256 x 256 pixels: further apart, no eye compares them.
+const MOST_SQUARE_BITS: u32 = 8;
+
 /// Checks that 32-bit indices of the numbers for sampling suffice for a picture. They count over
 /// all samples of a pixel and, within a sample, over its four paths, light samples or rays of final
 /// gathering.
@@ -91,6 +94,15 @@ pub(super) fn most_samples(photons: &PhotonSettings, picture: &PictureSettings) 
 /// well distributed among themselves.
 pub(crate) fn first_extra_sample(photons: &PhotonSettings, picture: &PictureSettings) -> u32 {
     if picture.extra_samples() > 0 { most_samples(photons, picture) as u32 } else { 0 }
+}
+
+/// Binary logarithm of the side of a square of pixels that share a set of numbers, 0 to
+/// [`MOST_SQUARE_BITS`]: as wide as 32-bit indices allow.
+pub(crate) fn square_bits(photons: &PhotonSettings, picture: &PictureSettings) -> u32 {
+    let each = picture.light_samples.max(photons.final_gather).max(4);
+    let of_pixel = u64::from(each).next_power_of_two() * u64::from(picture.spp).next_power_of_two();
+    let pixels = ((1_u64 << 32) / of_pixel).max(1);
+    (pixels.ilog2() / 2).min(MOST_SQUARE_BITS)
 }
 
 /// The largest power of two of which there are two.

@@ -19,7 +19,7 @@ use crate::{
         wavefront::{Step, Wavefront},
     },
     scene::Camera,
-    settings::{Crop, PhotonSettings, PictureSettings, PixelGrid, first_extra_sample},
+    settings::{Crop, PhotonSettings, PictureSettings, PixelGrid, first_extra_sample, square_bits},
     upload::{SceneBuffers, sampler_constant},
 };
 
@@ -132,7 +132,7 @@ impl CameraTracer {
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
             first_extra: first_extra_sample(photons, picture),
             extra: picture.extra_samples(),
-            view: CameraTile { margin, ..view },
+            view: CameraTile { margin, square_bits: square_bits(photons, picture), ..view },
             window: picture.window(size),
             room,
         })
@@ -159,14 +159,16 @@ impl CameraTracer {
     }
 
     /// Takes the samples of a pass from index `first` on. All passes together have many samples a
-    /// pixel, so that even a single one is spread over the pixel filter.
+    /// pixel, so that even a single one is spread over the pixel filter, and those of a pixel are
+    /// one set.
     ///
     /// # Errors
     /// Limits of the adapter.
     pub fn of_pass(self, gpu: &Gpu, picture: &PictureSettings, first: u32) -> Result<Self> {
         let offsets = picture.pixel_filter.offsets();
         let first_extra = self.first_extra + first / self.view.spp * self.extra;
-        let view = CameraTile { first_sample: first, filter_steps: offsets.len() as u32 - 1, ..self.view };
+        let filter_steps = offsets.len() as u32 - 1;
+        let view = CameraTile { first_sample: first, filter_steps, square_bits: 0, ..self.view };
         Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, first_extra, view, ..self })
     }
 

@@ -273,6 +273,7 @@ fn rays_as_samples(view: &CameraTile, rays: FinalRays) -> CameraTile {
         first_sample: 0,
         gathers: 1,
         listed: 0,
+        square_bits: 0,
         ..*view
     }
 }
