@@ -5,7 +5,7 @@ use std::array;
 use super::{
     bias_check::BiasCheck,
     cryptomatte::Matte,
-    film_sums::{Bandwidth, ExtraSums, LAYER_COUNT, Moments, Weights},
+    film_sums::{Bandwidth, ExtraSums, LAYER_COUNT, Moments},
     frame::{DataWindow, Frame},
     layers::{EXTRA_LAYERS, LAYERS, Rule, Source, layer_index},
 };
@@ -41,8 +41,8 @@ pub struct Film {
     pub(super) check: Option<BiasCheck>,
     /// Number of samples that were left out, since a sum would not be finite with them.
     pub(super) non_finite: u64,
-    /// How samples of pixels that have more of them count.
-    pub(super) weights: Weights,
+    /// Number of times that the samples of a pixel double at most.
+    pub(super) doublings: u32,
     /// Number of samples beyond those that every pixel has.
     pub(super) extra_samples: u64,
 }
@@ -65,7 +65,7 @@ impl Film {
             mattes: Vec::new(),
             check: None,
             non_finite: 0,
-            weights: Weights::default(),
+            doublings: 0,
             extra_samples: 0,
         }
     }
@@ -234,7 +234,7 @@ impl Film {
         if (layers(self), mattes(self)) != (layers(other), mattes(other)) {
             return Err(Error::Differs("films of different layers cannot be merged".to_owned()));
         }
-        if self.weights != other.weights {
+        if self.doublings != other.doublings {
             return Err(Error::Differs("films of different numbers of samples cannot be merged".to_owned()));
         }
         if (self.whole, self.window) != (other.whole, other.window) {
@@ -282,7 +282,7 @@ impl Film {
         }
         for matte in &self.mattes {
             matte
-                .channels(self.samples * u64::from(self.weights.plain))
+                .channels(self.samples << self.doublings)
                 .into_iter()
                 .for_each(|(name, numbers)| frame.add_extra(&name, numbers));
         }

@@ -18,7 +18,7 @@ use super::{
     exr_read::{attributes_of, open, our_attributes, window_of},
     file::{open_regular, write_file},
     film::Film,
-    film_sums::{Bandwidth, ExtraSums, Moments, Weights},
+    film_sums::{Bandwidth, ExtraSums, Moments},
     frame::DataWindow,
     layers::{EXTRA_LAYERS, LAYERS, Rule, layer_index},
     pass_sum::{PassBlock, PassSum, is_block},
@@ -26,13 +26,13 @@ use super::{
 use crate::{
     error::{Error, Result},
     map_kind::ByKind,
-    settings::{Crop, ExtraLayers, PassRange, PixelGrid},
+    settings::{Crop, ExtraLayers, PassRange, PictureSettings, PixelGrid},
     stats::MapStats,
 };
 
 /// Version of what the channels and `blocks` hold, in the attribute `partFormat`. Parts without one
 /// are of format 1, without differences from estimates of less bias.
-const FORMAT: &str = "2";
+const FORMAT: &str = "3";
 /// Kinds of the channels with differences from estimates of less bias, of even and odd passes.
 const CHECKS: [&str; 2] = ["evenCheck", "oddCheck"];
 
@@ -64,8 +64,9 @@ struct BlockRow {
     extras: Vec<ExtraRow>,
     #[serde(default)]
     mattes: Vec<ExtraLayers>,
+    /// Number of times that the samples of a pixel double at most.
     #[serde(default)]
-    weights: Weights,
+    doublings: u32,
     #[serde(default)]
     extra_samples: u64,
     /// Number of even and of odd passes that are checked for bias.
@@ -178,7 +179,7 @@ fn row(block: &PassBlock) -> BlockRow {
         caustic: block.photons.caustic,
         extras,
         mattes,
-        weights: block.film.weights,
+        doublings: block.film.doublings,
         extra_samples: block.film.extra_samples,
         checked: block.film.check.as_ref().map(|check| check.passes),
     }
@@ -284,7 +285,7 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             mattes: row.mattes.iter().map(matte).collect::<Result<_>>()?,
             check: row.checked.map(check).transpose()?,
             non_finite: row.non_finite,
-            weights: row.weights,
+            doublings: row.doublings,
             extra_samples: row.extra_samples,
         };
         let photons = ByKind { global: row.global, caustic: row.caustic };
@@ -300,7 +301,11 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
     let is_good = |row: &BlockRow| {
         let is_finite = row.bandwidth.iter().all(|bits| f64::from_bits(*bits).is_finite());
         let in_reach = row.passes.first < row.passes.end && PassRange::END.contains(row.passes.end);
-        in_reach && is_block(row.passes) && row.samples > 0 && row.weights.plain > 0 && is_finite
+        in_reach
+            && is_block(row.passes)
+            && row.samples > 0
+            && row.doublings <= PictureSettings::MOST_DOUBLINGS
+            && is_finite
     };
     let consecutive = rows.windows(2).all(|pair| pair[0].passes.end == pair[1].passes.first);
     if rows.is_empty() || !consecutive || !rows.iter().all(is_good) {
@@ -331,7 +336,7 @@ mod tests {
     fn sum(passes: std::ops::Range<u32>) -> PassSum {
         let mut sum = PassSum::default();
         for index in passes {
-            let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL).with_extra_samples(12);
+            let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL).with_doublings(2);
             for pixel in 0..6 {
                 let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
                 let position = (pixel % 3, pixel / 3);
@@ -346,7 +351,7 @@ mod tests {
                 film.add(position, &rows, 4);
                 film.add_to(Source::Estimate(MapKind::Caustic), position, &[value, 3.0, 1.0]);
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
-                film.weigh(position, pixel == 2);
+                film.weigh(position, if pixel == 2 { 2 } else { 0 });
             }
             let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3)).checked_by(index, &closer(index), 0.3);
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");
@@ -424,10 +429,10 @@ mod tests {
         let mut bytes = std::fs::read(&path).unwrap();
         let name = [&b"caustica:"[..], format, blocks].concat();
         let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len();
-        assert_eq!(bytes[at], b'2');
+        assert_eq!(bytes[at], b'3');
         bytes[at] = b'1';
         std::fs::write(&path, &bytes).unwrap();
-        assert!(said(&path).contains("is a part of format 1; this version reads and writes 2"), "{}", said(&path));
+        assert!(said(&path).contains("is a part of format 1; this version reads and writes 3"), "{}", said(&path));
         for blocks in ["[]", "{}", "7", r#"[{"passes":{"first":3,"end":9}}]"#] {
             let mut attributes = attributes();
             attributes.insert("blocks".to_owned(), blocks.to_owned());

@@ -129,7 +129,8 @@ pub struct CameraTile {
     pub left_out: u32,
     pub first_kept: u32,
     /// Binary logarithm of the side of squares of pixels whose samples are one set of random
-    /// numbers, pixels in Morton order; 0: the samples of each pixel are a set.
+    /// numbers, pixels in Morton order; 0: the samples of each pixel are a set. Those from
+    /// [`Self::spp`] on always are.
     pub square_bits: u32,
     pub pad0: u32,
     pub pad1: u32,

@@ -88,8 +88,8 @@ pub struct CameraTracer {
     pub(super) window: Crop,
     /// Index of the first sample beyond those that every pixel has.
     pub(super) first_extra: u32,
-    /// Samples of a pixel that has more than every one.
-    pub(super) extra: u32,
+    /// Samples of a pixel at most besides those of every pixel.
+    extra: u32,
     /// Maximum number of visible points of a tile, without its margin.
     pub(super) room: u64,
 }
@@ -159,16 +159,14 @@ impl CameraTracer {
     }
 
     /// Takes the samples of a pass from index `first` on. All passes together have many samples a
-    /// pixel, so that even a single one is spread over the pixel filter, and those of a pixel are
-    /// one set.
+    /// pixel, so that even a single one is spread over the pixel filter.
     ///
     /// # Errors
     /// Limits of the adapter.
     pub fn of_pass(self, gpu: &Gpu, picture: &PictureSettings, first: u32) -> Result<Self> {
         let offsets = picture.pixel_filter.offsets();
         let first_extra = self.first_extra + first / self.view.spp * self.extra;
-        let filter_steps = offsets.len() as u32 - 1;
-        let view = CameraTile { first_sample: first, filter_steps, square_bits: 0, ..self.view };
+        let view = CameraTile { first_sample: first, filter_steps: offsets.len() as u32 - 1, ..self.view };
         Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, first_extra, view, ..self })
     }
 

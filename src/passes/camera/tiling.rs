@@ -35,22 +35,30 @@ impl CameraTracer {
         tiles
     }
 
-    /// Tiles of the samples that the given pixels of a tile have besides, in order. Their indices
-    /// follow each other from one far from those of all other samples on.
+    /// Tiles of the samples that pixels of a tile have besides, in order: `doubled` is the number
+    /// of times that those of each pixel double. Their indices follow each other from one far from
+    /// those of all other samples on.
     #[must_use]
-    pub fn extra_tiles(&self, tile: &Tile, pixels: &[u32]) -> Vec<Tile> {
-        let step = self.extra.clamp(1, EXTRA_SAMPLES);
-        let at_once = (self.room as u32 / (self.view.branches * step)).max(1);
+    pub fn extra_tiles(&self, tile: &Tile, doubled: &[u32]) -> Vec<Tile> {
+        let most = doubled.iter().copied().max().unwrap_or(0);
         let mut tiles = Vec::new();
-        for first in (0..self.extra).step_by(step as usize) {
-            for (before, some) in (0..).step_by(at_once as usize).zip(pixels.chunks(at_once as usize)) {
-                tiles.push(Tile {
-                    pixels: some.len() as u32,
-                    first_sample: self.first_extra + first,
-                    samples: step.min(self.extra - first),
-                    listed: Some(Listed { pixels: some.into(), before }),
-                    ..*tile
-                });
+        for doubling in 1..=most {
+            let is_doubled = |pixel: &u32| doubled[*pixel as usize] >= doubling;
+            let pixels: Vec<u32> = (0..tile.pixels).filter(is_doubled).collect();
+            let samples = self.view.spp << doubling;
+            let had = samples / 2;
+            let step = had.min(EXTRA_SAMPLES);
+            let at_once = (self.room as u32 / (self.view.branches * step)).max(1);
+            for first in (had..samples).step_by(step as usize) {
+                for (before, some) in (0..).step_by(at_once as usize).zip(pixels.chunks(at_once as usize)) {
+                    tiles.push(Tile {
+                        pixels: some.len() as u32,
+                        first_sample: self.first_extra + first - self.view.spp,
+                        samples: step.min(samples - first),
+                        listed: Some(Listed { pixels: some.into(), before, samples }),
+                        ..*tile
+                    });
+                }
             }
         }
         tiles
