@@ -14,6 +14,7 @@ mod references;
 mod refraction;
 mod seen;
 mod sessions;
+mod smooth_shading;
 mod solids;
 mod spaced_gathering;
 mod transport;
