@@ -17,14 +17,14 @@ use support::{
     *,
 };
 
-const CENTER: Vec3 = vec3(0.0, 0.6, 0.0);
+const CENTER: Vec3 = vec3(0.0, 1.2, 0.0);
 
 /// A floor that a lamp lights through a ball of few faces, whose normals are those of a sphere
 /// where `smooth`. `bound`: see `LoadOptions::caustic_roughness`.
 fn ball(roughness: f32, smooth: bool, bound: f32) -> Scene {
     let mut glass = glass_of(1.5);
     glass["pbrMetallicRoughness"]["roughnessFactor"] = json!(roughness);
-    let mut scene = scene_of(&[(Mesh::ball(CENTER, 0.5, 8), 0)], &[glass]);
+    let mut scene = scene_of(&[(Mesh::ball(CENTER, 0.5, 6), 0)], &[glass]);
     // Where the file's centre lies now.
     let center = CENTER - scene.center.as_vec3();
     for triangle in &mut scene.triangles {
@@ -35,10 +35,10 @@ fn ball(roughness: f32, smooth: bool, bound: f32) -> Scene {
     scene.options.caustic_roughness = bound;
     scene.materials.extend([Material::new("floor", diffuse(0.5)), emissive("lamp", 0.0, 20.0, false)]);
     let at = center - Vec3::Y * CENTER.y;
-    add_quad(&mut scene, at + vec3(-1.0, 0.0, 1.0), Vec3::X * 2.0, Vec3::Z * -2.0, 1);
-    add_quad(&mut scene, at + vec3(-0.4, 2.0, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8, 2);
-    // From the side, below the ball.
-    scene.cameras = vec![camera(at + vec3(0.0, 0.25, 2.0), at, 16.0)];
+    add_quad(&mut scene, at + vec3(-1.0, 0.0, 1.0), Vec3::X * 2.0, Vec3::Z * -4.5, 1);
+    add_quad(&mut scene, at + vec3(-0.5, 2.5, -0.5), Vec3::X, Vec3::Z, 2);
+    // From the side, below the ball: nothing but the floor is seen.
+    scene.cameras = vec![camera(at + vec3(0.0, 0.6, 2.0), at, 20.0)];
     scene
 }
 
