@@ -211,8 +211,7 @@ fn clearcoat_lies_above_any_surface() {
 fn anisotropy_takes_the_tangents_of_the_file() {
     let read = |attributes: &[(&str, &str, &[f32])]| {
         let mut gltf = triangle();
-        gltf["materials"][0] =
-            with(json!({}), json!({ "KHR_materials_anisotropy": { "anisotropyStrength": 0.5 } }));
+        gltf["materials"][0] = with(json!({}), json!({ "KHR_materials_anisotropy": { "anisotropyStrength": 0.5 } }));
         for (name, kind, of_vertex) in attributes {
             let accessor = add_accessor(&mut gltf, &floats(&of_vertex.repeat(3)), 5126, 3, kind);
             gltf["meshes"][0]["primitives"][0]["attributes"][*name] = accessor.into();

@@ -7,6 +7,7 @@ mod few_photons;
 mod flat_surfaces;
 mod instances;
 mod lights;
+mod material_references;
 mod modes;
 mod narrow_things;
 mod pixels;
