@@ -56,7 +56,7 @@ pub struct LobePoint {
     /// Halves, as all that follow: reflectance along the normal; of rough glass the tint of what is
     /// transmitted.
     pub f0: [u32; 2],
-    /// Reflectance at grazing angles.
+    /// Reflectance at grazing angles; of rough glass the members of its film.
     pub f90: [u32; 2],
     /// Factor of light that is reflected more than once.
     pub compensation: [u32; 2],
