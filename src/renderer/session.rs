@@ -12,7 +12,6 @@ use super::{
     size::picture_size,
     tally,
     tiles::{CameraPass, Gatherer},
-    unevenness::UNEVENNESS_REACH,
 };
 use crate::{
     bvh::{Bvh, Media, MediaProbe, contacts},
@@ -311,7 +310,7 @@ impl<'a> Session<'a> {
             gatherer.prepare(&preview, &mut stats, progress)?;
         }
         if estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty() {
-            let coarse = coarser(picture, pass.size, estimate, pass.tracer.branches());
+            let coarse = coarser(picture, &pass, estimate);
             let single = EstimateSettings { share_reach: 0.0, ..estimate.clone() };
             let records = CameraPass::new(self.gpu, scene, camera, maps.settings(), &single, &coarse)?;
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
@@ -325,24 +324,21 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Settings of a coarser version of the part of the picture that is rendered, and what surrounds it
-/// as far as the filter of records reaches.
-fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSettings, branches: u32) -> PictureSettings {
-    let spacing = record_spacing(size, estimate.gather_spacing, branches);
+/// Settings of a coarser version of the part of the picture that is traced, and what surrounds it as
+/// far as the filter of records reaches. It has records for all of a tile: what they leave to
+/// further rays, and whether a pixel's neighbours are uneven, is then the same whatever the crop.
+fn coarser(picture: &PictureSettings, pass: &CameraPass, estimate: &EstimateSettings) -> PictureSettings {
+    let (size, traced) = (pass.size, pass.tracer.tiled());
+    let spacing = record_spacing(size, estimate.gather_spacing, pass.tracer.branches());
     let reach = filter_footprint(estimate.gather_radius, spacing);
-    let window = picture.window(size);
-    // Those around a pixel tell whether it has more samples.
-    let around = if picture.extra_samples() > 0 { UNEVENNESS_REACH } else { 0 };
     let along = |pixels: u32, origin: u32, count: u32| {
-        let end = (origin + count + around).min(pixels);
-        let origin = origin.saturating_sub(around);
         let side = pixels.div_ceil(spacing);
         let scaled = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
         let first = scaled(origin).saturating_sub(reach + 1);
-        (side, first, (scaled(end) + reach + 2).min(side) - first)
+        (side, first, (scaled(origin + count) + reach + 2).min(side) - first)
     };
-    let (columns, column, width) = along(size.0, window.column, window.width);
-    let (rows, row, height) = along(size.1, window.row, window.height);
+    let (columns, column, width) = along(size.0, traced.column, traced.width);
+    let (rows, row, height) = along(size.1, traced.row, traced.height);
     PictureSettings {
         size: Some((columns, rows)),
         spp: 1,

@@ -299,12 +299,12 @@ impl<'a> CameraPass<'a> {
         if chosen.is_empty() {
             return Ok(done);
         }
-        gather.choose(self.gpu, &chosen);
         // The rays of a pixel are those of all its samples.
         let each = match tile.listed {
             Some(_) => (gather.rays() * self.spp).div_ceil(self.spp + self.extra),
             None => gather.rays(),
         };
+        gather.choose(self.gpu, &self.tracer, tile, (&chosen, each));
         let at_once = (self.tracer.room() as u32 / chosen.len() as u32).min(each);
         for first in (0..each).step_by(at_once as usize) {
             progress.check()?;

@@ -71,7 +71,7 @@ impl CameraKernels {
 #[derive(Debug)]
 pub struct CameraTracer {
     kernels: CameraKernels,
-    wavefront: Wavefront,
+    pub(super) wavefront: Wavefront,
     /// A [`VisiblePoint`] per path slot; some slots have no point.
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
@@ -120,9 +120,10 @@ impl CameraTracer {
         let margin = if shares { margin_cells(tile_sides(&view, room)) * MARGIN_SAMPLES } else { 0 };
         let samples = room / u64::from(branches) + u64::from(margin);
         let slots = samples * u64::from(branches);
+        let keys = if photons.final_gather > 0 { room } else { 0 };
         Ok(Self {
             kernels: CameraKernels::new(gpu, scene, photons, picture.light_samples),
-            wavefront: Wavefront::new(gpu, scene, "camera", (slots, room / u64::from(branches)))?,
+            wavefront: Wavefront::new(gpu, scene, "camera", (slots, room / u64::from(branches)), keys)?,
             points: gpu.storage::<VisiblePoint>("visible points", slots)?,
             radiance: gpu.storage::<[f32; 4]>("radiance", slots)?,
             gathered: gpu.storage::<Gathered>("gathered", room)?,
@@ -240,7 +241,7 @@ impl CameraTracer {
         let view = self.tile_view(tile);
         let uniform = gpu.uniform("camera tile", &view);
         if let Some(listed) = &tile.listed {
-            self.wavefront.lists.write_pixels(gpu, &listed.pixels);
+            self.wavefront.lists.write_pixels(gpu, listed);
         }
         let own = [("tile", &uniform), ("points", &self.points), ("filter_table", &self.filter_table)];
         let start = Step { kernel: &self.kernels.start, buffers: &own };
@@ -367,7 +368,7 @@ impl CameraTracer {
             pixels: tile.pixels,
             first_sample: tile.first_sample,
             samples: tile.samples,
-            listed: tile.listed.as_ref().map_or(0, |listed| listed.before + 1),
+            listed: tile.listed.is_some().into(),
             listed_at: self.wavefront.lists.pixels_at(),
             margin: if tile.listed.is_none() { self.view.margin } else { 0 },
             ..self.view

@@ -30,8 +30,8 @@ pub struct Tile {
     pub first_sample: u32,
     /// Samples of each pixel.
     pub samples: u32,
-    /// Some pixels of the square; `None`: all.
-    pub listed: Option<Listed>,
+    /// Numbers, in Morton order, of some pixels of the square; `None`: all.
+    pub listed: Option<Arc<[u32]>>,
 }
 
 impl Tile {
@@ -40,15 +40,6 @@ impl Tile {
     pub fn sides(&self) -> (u32, u32) {
         sides_of(self.pixels)
     }
-}
-
-/// Some pixels of a square.
-#[derive(Clone, Debug)]
-pub struct Listed {
-    /// Their numbers in Morton order.
-    pub pixels: Arc<[u32]>,
-    /// Number of pixels of the same square in lists before this one.
-    pub before: u32,
 }
 
 /// Counts of one step, for the statistics.

@@ -104,10 +104,11 @@ impl Records {
     /// clamping).
     fn distance(&self, slot: usize) -> f32 {
         let here = Vec3::from(self.records[slot].position);
-        let row = self.columns * self.branches;
-        let around = [-1, 0, 1]
-            .map(|rows: isize| [-1, 0, 1].map(|columns: isize| rows * row as isize + columns * self.branches as isize));
-        let neighbors = around.as_flattened().iter().filter_map(|step| slot.checked_add_signed(*step));
+        let (pixel, branch) = (slot / self.branches, slot % self.branches);
+        let (row, column) = (pixel / self.columns, pixel % self.columns);
+        let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
+        let around = (row.saturating_sub(1)..row + 2).flat_map(|row| columns.clone().map(move |column| (row, column)));
+        let neighbors = around.map(|(row, column)| (row * self.columns + column) * self.branches + branch);
         let there = neighbors.filter_map(|n| Some((self.records.get(n)?, self.distances[n])));
         there
             .filter(|(record, _)| record.irradiance[0] >= 0.0)
