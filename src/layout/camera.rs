@@ -125,10 +125,11 @@ pub struct CameraTile {
     pub listed: u32,
     /// Where that list begins; of rays, the list of keys of their points.
     pub listed_at: u32,
-    /// Columns and rows left out between those of a picture of few of the pixels, and the first
-    /// that it has. `first_column` and `first_row` then count those that it has.
+    /// Of a picture of one pixel of each square cell, [`PixelGrid`](crate::settings::PixelGrid):
+    /// the side of a cell less 1, and pixels by which that of the next cell is shifted.
+    /// `first_column` and `first_row` then count cells.
     pub left_out: u32,
-    pub first_kept: u32,
+    pub shift: u32,
 }
 
 /// First hit of a camera sample.

@@ -29,8 +29,6 @@ const BRANCHES: u32 = 4;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
-/// Odd factor of the index of a sample that gives a seed (the golden ratio, as a fraction of 2^32).
-const OTHER_SEEDS: u32 = 0x9e37_79b9;
 /// Surfaces before the near plane that a ray passes at most.
 const MAX_UNSEEN: u32 = 1 << 12;
 
@@ -171,14 +169,11 @@ impl CameraTracer {
         Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, first_extra, view, ..self })
     }
 
-    /// Leaves out all pixels but those of a grid. Tiles and data window count its columns and rows.
-    /// Random numbers are none of the picture's, nor of those of other passes: points of one
-    /// sequence make the errors of its parts opposite to each other.
+    /// Leaves out all pixels but those of a grid. Tiles and data window count its cells.
     #[must_use]
     pub fn at_grid(self, grid: PixelGrid) -> Self {
-        let seed = self.view.seed ^ self.view.first_sample.wrapping_add(1).wrapping_mul(OTHER_SEEDS);
-        let (left_out, first_kept) = (grid.every() - 1, grid.first());
-        let view = CameraTile { seed, left_out, first_kept, margin: 0, ..self.view };
+        let (left_out, shift) = (grid.every() - 1, grid.shift());
+        let view = CameraTile { left_out, shift, margin: 0, ..self.view };
         Self { view, window: grid.window(self.window), ..self }
     }
 

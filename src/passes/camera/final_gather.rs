@@ -198,8 +198,8 @@ impl FinalGather {
         self.light(gpu, scene, tracer, (tile, rays), (&self.ends, &self.found))
     }
 
-    /// Adds direct light at the first ends of a buffer, as if they were of the rays of one point, to
-    /// what they found.
+    /// Adds direct light at the first ends of a buffer, as if they were of the rays of one point,
+    /// to what they found.
     ///
     /// # Errors
     /// Faults of the driver.

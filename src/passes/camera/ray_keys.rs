@@ -33,9 +33,10 @@ impl CameraTracer {
         let start = |slot: u32| {
             let sample = slot / view.branches;
             let (column, row) = Self::place(tile, sample / tile.samples);
-            let in_picture = |along: u32| along * (view.left_out + 1) + view.first_kept;
+            let every = view.left_out + 1;
+            let in_picture = |along: u32, other: u32| along * every + other * view.shift % every;
             Start {
-                pixel: (in_picture(column), in_picture(row)),
+                pixel: (in_picture(column, row), in_picture(row, column)),
                 sample: tile.first_sample + sample % tile.samples,
                 branch: slot % view.branches,
             }

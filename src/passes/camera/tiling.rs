@@ -18,7 +18,7 @@ impl CameraTracer {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
         let (width, height) = tile_sides(&self.view, self.room);
         let (columns, rows) = (self.view.width, self.view.height);
-        let kept = |side: u32| (side - self.view.first_kept.min(side)).div_ceil(self.view.left_out + 1);
+        let kept = |side: u32| side.div_ceil(self.view.left_out + 1);
         let mut tiles = Vec::new();
         for first_row in (0..kept(rows)).step_by(height as usize) {
             for first_column in (0..kept(columns)).step_by(width as usize) {

@@ -170,6 +170,22 @@ mod tests {
     use super::*;
 
     #[test]
+    fn neighbours_are_in_the_next_column() {
+        let reach = |near: (u32, u32)| {
+            let mut records = Records::new((4, 2), 1);
+            let light = |nearness: f32| ArrivingLight { light: 1.0, nearness, ..Default::default() };
+            for (place, nearness) in [((0, 1), 1.0), (near, 100.0)] {
+                let point = VisiblePoint { ng: [0.0, 1.0, 0.0], ..Default::default() };
+                records.put(place, 0, &point, [1.0; 4], &light(nearness), 1);
+            }
+            // What is near at one limits the other: the distance is 1.5 units, or a hundredth.
+            records.finish(|_| 3.0)[4].direction_and_reach >> 24
+        };
+        assert_eq!(reach((1, 0)), snorm8(0.01), "above and beside it");
+        assert_eq!(reach((3, 0)), snorm8(0.5), "control: the end of the row before");
+    }
+
+    #[test]
     fn records_of_any_picture_fit_a_binding() {
         assert_eq!(record_spacing((256, 256), 2, 4), 2);
         assert_eq!(record_spacing((2048, 2048), 2, 4), 2);
