@@ -37,7 +37,7 @@ pub struct Film {
     /// Layers that were asked for.
     pub(super) extras: Vec<ExtraSums>,
     pub(super) mattes: Vec<Matte>,
-    /// Differences from estimates of less bias, if there are such for all passes.
+    /// Estimates of less bias, if there are such for all passes.
     pub(super) check: Option<BiasCheck>,
     /// Number of samples that were left out, since a sum would not be finite with them.
     pub(super) non_finite: u64,
@@ -149,17 +149,14 @@ impl Film {
         total
     }
 
-    /// Notes how far the radiance of pass `index` is from that of `closer`, a film of estimates of
-    /// less bias at the pixels of the picture's [`PixelGrid`] alone. `ratio` is that of the bias to
-    /// this difference.
+    /// Notes the radiance of `closer`, a film of estimates of less bias of one pass, at the pixels
+    /// of the picture's [`PixelGrid`] alone.
     #[must_use]
-    pub(crate) fn checked_by(self, index: u32, closer: &Self, ratio: f32) -> Self {
-        let radiance = layer_index("radiance");
-        let (here, there) = (self.means(), closer.means());
-        let places = PixelGrid::of(self.whole).places(self.window);
-        let numbers = places.flat_map(|place| &here[radiance][3 * place..][..3]);
-        let differences = numbers.zip(&there[radiance]).map(|(a, b)| ratio * (a - b)).collect();
-        Self { check: Some(BiasCheck::of_pass(index, differences)), ..self }
+    pub(crate) fn checked_by(self, closer: &Self) -> Self {
+        let [radiance, ..] = closer.means();
+        let cells = PixelGrid::of(self.whole).pixels(self.window);
+        let numbers = cells.flat_map(|(cell, _)| radiance[3 * cell..][..3].to_vec()).collect();
+        Self { check: Some(BiasCheck::of_pass(numbers)), ..self }
     }
 
     /// Width and height of the whole picture, pixels.

@@ -31,10 +31,10 @@ use crate::{
 };
 
 /// Version of what the channels and `blocks` hold, in the attribute `partFormat`. Parts without one
-/// are of format 1, without differences from estimates of less bias.
+/// are of format 1, without estimates of less bias; those of format 2 have differences from them.
 const FORMAT: &str = "3";
-/// Kinds of the channels with differences from estimates of less bias, of even and odd passes.
-const CHECKS: [&str; 2] = ["evenCheck", "oddCheck"];
+/// Kinds of the channels of estimates of less bias: sums, and of several passes their deviations.
+const CHECKS: [&str; 2] = ["closer", "closerDeviations"];
 
 /// Header of a part: all but its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,9 +69,9 @@ struct BlockRow {
     doublings: u32,
     #[serde(default)]
     extra_samples: u64,
-    /// Number of even and of odd passes that are checked for bias.
+    /// Whether the passes have estimates of less bias.
     #[serde(default)]
-    checked: Option<[u32; 2]>,
+    has_closer: bool,
 }
 
 /// A layer that was asked for.
@@ -138,7 +138,8 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
         }
         if let Some(check) = &film.check {
             let names = LAYERS[layer_index("radiance")].channels;
-            for (kind, sums) in CHECKS.iter().zip(&check.sums) {
+            let kinds = CHECKS.iter().zip([&check.sums, &check.deviations]);
+            for (kind, sums) in kinds.take(1 + usize::from(check.passes > 1)) {
                 let mut spread = vec![0.0; 3 * frame.pixels()];
                 for (place, numbers) in PixelGrid::of(film.whole).places(film.window).zip(sums.chunks(3)) {
                     spread[3 * place..][..3].copy_from_slice(numbers);
@@ -181,7 +182,7 @@ fn row(block: &PassBlock) -> BlockRow {
         mattes,
         doublings: block.film.doublings,
         extra_samples: block.film.extra_samples,
-        checked: block.film.check.as_ref().map(|check| check.passes),
+        has_closer: block.film.check.is_some(),
     }
 }
 
@@ -264,13 +265,15 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             let ranks = |pixel: &[f32]| std::array::from_fn(|i| rank(pixel, i));
             Ok(Matte { of: *of, ranks: numbers.chunks(2 * RANKS).map(ranks).collect() })
         };
-        let check = |passes: [u32; 2]| -> Result<BiasCheck> {
+        let check = || -> Result<BiasCheck> {
             let of = |kind: &str| -> Result<Vec<f32>> {
                 let spread = read(&format!("{before}{kind}."), LAYERS[layer_index("radiance")].channels)?;
                 let places = PixelGrid::of(whole).places(window);
                 Ok(places.flat_map(|place| spread[3 * place..][..3].to_vec()).collect())
             };
-            Ok(BiasCheck { passes, sums: [of(CHECKS[0])?, of(CHECKS[1])?] })
+            let sums = BiasCheck::of_pass(of(CHECKS[0])?);
+            let passes = row.passes.count();
+            Ok(if passes > 1 { BiasCheck { passes, deviations: of(CHECKS[1])?, ..sums } } else { sums })
         };
         let [mean, deviations, inverse] = row.bandwidth.map(f64::from_bits);
         let film = Film {
@@ -283,7 +286,7 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             moments: if row.passes.count() > 1 { Some(moments()?) } else { None },
             extras: row.extras.iter().map(extra).collect::<Result<_>>()?,
             mattes: row.mattes.iter().map(matte).collect::<Result<_>>()?,
-            check: row.checked.map(check).transpose()?,
+            check: row.has_closer.then(check).transpose()?,
             non_finite: row.non_finite,
             doublings: row.doublings,
             extra_samples: row.extra_samples,
@@ -353,20 +356,20 @@ mod tests {
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
                 film.weigh(position, if pixel == 2 { 2 } else { 0 });
             }
-            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3)).checked_by(index, &closer(index), 0.3);
+            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3)).checked_by(&closer(index));
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");
         }
         sum
     }
 
-    /// An estimate of less bias at the only pixel of the grid in the crop.
+    /// Estimates of less bias at the pixels of the grid in the crop, which are all.
     fn closer(index: u32) -> Film {
-        let mut film = Film::new((1, 1), Crop { column: 0, row: 0, width: 1, height: 1 }, 1);
-        film.add(
-            (0, 0),
-            &[[1.0 / (index as f32 + 0.7), 3.0, 1e-7, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]],
-            1,
-        );
+        let mut film = Film::new((5, 7), WINDOW, 1);
+        for pixel in 0..6 {
+            let value = 1.0 / ((index + pixel) as f32 + 0.7);
+            let position = (pixel % 3, pixel / 3);
+            film.add(position, &[[value, 3.0, 1e-7, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
+        }
         film
     }
 

@@ -306,10 +306,10 @@ impl<'a> CameraPass<'a> {
         if chosen.is_empty() {
             return Ok(done);
         }
-        gather.choose(self.gpu, &chosen);
         // The rays of a pixel are those of all its samples.
         let samples = tile.listed.as_ref().map_or(self.spp, |listed| listed.samples);
         let each = (gather.rays() * self.spp).div_ceil(samples);
+        gather.choose(self.gpu, &self.tracer, tile, (&chosen, each));
         let at_once = (self.tracer.room() as u32 / chosen.len() as u32).min(each);
         for first in (0..each).step_by(at_once as usize) {
             progress.check()?;

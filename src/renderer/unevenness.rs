@@ -14,9 +14,6 @@ const UNEVEN: f32 = 0.005;
 /// Radiance below which errors count less, as a fraction of that around.
 const DARK: f32 = 0.1;
 
-/// Pixels on each side of a pixel that tell whether it has more samples.
-pub const UNEVENNESS_REACH: u32 = 2;
-
 /// Steps to the neighbours of a pixel, in turn around it.
 const AROUND: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 

@@ -2,6 +2,7 @@
 
 mod analytic;
 mod contacts;
+mod crops;
 mod extremes;
 mod few_photons;
 mod flat_surfaces;
