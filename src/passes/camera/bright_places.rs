@@ -9,7 +9,7 @@ use glam::Vec3;
 use crate::layout::BrightPatch;
 
 /// Patches at most: every ray reads them all.
-const MAX_PATCHES: usize = 16;
+const MAX_PATCHES: usize = 8;
 /// Radiance of a bright end, in units of the mean over all rays.
 const BRIGHT: f64 = 8.0;
 /// Fraction of the rays' variance that bright ends must cause for any ray to be aimed.
