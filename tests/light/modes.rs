@@ -75,7 +75,7 @@ fn final_gathering_has_the_mean_of_the_estimate() {
     let plain = mean(&render_scene(&scene, &settings));
     let gathered = |scene: &Scene, emission| {
         let gathers = settings.clone().with(|s| {
-            s.photons.final_gather = 6;
+            s.photons.final_gather = 32;
             s.photons.emission = emission;
         });
         mean(&render_scene(scene, &gathers))

@@ -158,7 +158,8 @@ impl Estimate {
         Self::of(&(0..seeds).map(of_seed).collect::<Vec<_>>())
     }
 
-    fn of(values: &[f64]) -> Self {
+    /// Estimate of the mean of what the values are drawn from.
+    pub fn of(values: &[f64]) -> Self {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
