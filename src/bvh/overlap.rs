@@ -10,9 +10,9 @@ use crate::{
 
 /// Distance below which two surfaces are one, over their largest coordinate: 2^-21, four steps of
 /// 32-bit numbers.
-const TOLERANCE: f64 = 1.0 / (1 << 21) as f64;
+pub(super) const TOLERANCE: f64 = 1.0 / (1 << 21) as f64;
 /// Largest sine of the angle between the planes of two surfaces that are one.
-const MAX_SINE: f64 = 1e-3;
+pub(super) const MAX_SINE: f64 = 1e-3;
 /// Fraction of the size of the smaller triangle by which two must overlap.
 const MIN_OVERLAP: f64 = 1e-4;
 
@@ -116,25 +116,47 @@ pub(super) fn coincide(a: &Primitive, b: &Primitive) -> bool {
         let on_a = a0 + p.x * tangent + p.y * na.cross(tangent);
         ((on_a - b0).dot(nb) / na.dot(nb)).abs()
     };
-    area(&overlap).abs() > MIN_OVERLAP * size && overlap.iter().all(|p| height(*p) <= tolerance)
+    area(overlap.corners()).abs() > MIN_OVERLAP * size && overlap.corners().iter().all(|p| height(*p) <= tolerance)
 }
 
-fn corners(primitive: &Primitive) -> [DVec3; 3] {
+pub(super) fn corners(primitive: &Primitive) -> [DVec3; 3] {
     let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(|v| Vec3::from_array(v).as_dvec3());
     [v0, v0 + e1, v0 + e2]
 }
 
+/// A convex polygon of few corners; each of three cuts adds one at most.
+#[derive(Clone, Copy, Default)]
+struct Polygon {
+    corners: [DVec2; 6],
+    count: usize,
+}
+
+impl Polygon {
+    fn corners(&self) -> &[DVec2] {
+        &self.corners[..self.count]
+    }
+
+    fn push(&mut self, corner: DVec2) {
+        // Rounding may let an edge cross a line more than twice.
+        if self.count < self.corners.len() {
+            self.corners[self.count] = corner;
+            self.count += 1;
+        }
+    }
+}
+
 /// The part of one triangle that lies in another one, corner by corner (Sutherland and Hodgman
 /// 1974).
-fn clipped(subject: &[DVec2; 3], clip: &[DVec2; 3]) -> Vec<DVec2> {
+fn clipped(subject: &[DVec2; 3], clip: &[DVec2; 3]) -> Polygon {
     let turn = area(clip).signum();
-    let mut polygon = subject.to_vec();
+    let mut polygon = Polygon::default();
+    subject.iter().for_each(|corner| polygon.push(*corner));
     for edge in 0..3 {
         let (from, to) = (clip[edge], clip[(edge + 1) % 3]);
         let side = |p: DVec2| turn * (to - from).perp_dot(p - from);
-        let mut kept = Vec::with_capacity(polygon.len() + 1);
-        for (i, &p) in polygon.iter().enumerate() {
-            let q = polygon[(i + 1) % polygon.len()];
+        let mut kept = Polygon::default();
+        for (i, &p) in polygon.corners().iter().enumerate() {
+            let q = polygon.corners()[(i + 1) % polygon.count];
             let (here, next) = (side(p), side(q));
             if here >= 0.0 {
                 kept.push(p);
