@@ -286,11 +286,12 @@ mod tests {
             let picture = settings(line).picture;
             (picture.spp, picture.extra_samples())
         };
-        assert_eq!(samples(""), (4, 12));
+        assert_eq!(samples(""), (4, 60));
         assert_eq!(samples("--spp 4"), (4, 0));
-        assert_eq!(samples("--spp 4 --max-spp 7"), (4, 3));
+        assert_eq!(samples("--spp 4 --max-spp 31"), (4, 12));
+        assert_eq!(samples("--spp 4 --max-spp 7"), (4, 0));
         assert_eq!(samples("--max-spp 1"), (4, 0));
-        assert_eq!(samples("--quality high"), (16, 48));
+        assert_eq!(samples("--quality high"), (16, 112));
         assert_eq!(samples("--quality draft"), (1, 0));
         assert_eq!(samples("--final-gather 0"), (4, 0));
         assert_eq!(samples("--final-gather 0 --max-spp 64"), (4, 60));

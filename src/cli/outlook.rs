@@ -15,8 +15,9 @@ const CAUSTICS: f64 = 2.8;
 const LIGHT_SAMPLE: f64 = 1.0;
 /// The same under an environment: rays that escape to it take little.
 const SKY_SAMPLE: f64 = 2.0;
-/// Part of the pixels that have more samples than every one, where some may.
-const UNEVEN: f64 = 0.07;
+/// Samples that a pixel has besides for each time that some may double, as a fraction of those of
+/// every pixel.
+const UNEVEN: f64 = 0.05;
 /// Part of a stage that has to be done, beyond its first report, before its pace is trusted: the
 /// top of a picture may be sky. More where something is known already.
 const TRUSTED: f64 = 1.0 / 16.0;
@@ -46,7 +47,7 @@ impl Plan {
             + light_sample * f64::from(picture.light_samples)
             + if scene.has_specular() { CAUSTICS } else { 0.0 };
         let rays = f64::from(photons.final_gather) / f64::from(estimate.gather_spacing).powi(2);
-        let samples = f64::from(picture.spp) + UNEVEN * f64::from(picture.extra_samples());
+        let samples = f64::from(picture.spp) * (1.0 + UNEVEN * f64::from(picture.doublings()));
         let by_group = picture.layers.contains(&ExtraLayers::Lights);
         let groups = if by_group { scene.light_groups()?.len().max(1) } else { 1 };
         Ok(Self { camera: has_records.then(|| samples * sample / rays), groups })

@@ -1,27 +1,24 @@
-//! Differences between a picture and estimates of less bias at some of its pixels, summed over
-//! passes.
+//! Estimates of less bias at some of a picture's pixels, summed over passes: how far the picture is
+//! from their mean.
 
 use crate::settings::{Crop, PixelGrid};
 
-/// Sums over passes of the difference between the mean radiance of a pixel and that of an estimate
-/// of less bias, at the pixels of a grid. Even and odd passes are apart: their noise is
-/// independent, so that the product of their means is the square of the bias on average.
+/// Sums over passes of the radiance of closer estimates, at the pixels of a grid. Each pass has
+/// photons, samples and rays for them that no other has, nor the picture: their mean is independent
+/// of it, and they tell their own noise.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BiasCheck {
-    /// Number of even and of odd passes.
-    pub passes: [u32; 2],
-    /// Sums of the differences, three numbers for each pixel.
-    pub sums: [Vec<f32>; 2],
+    pub passes: u32,
+    /// Sums of the estimates, three numbers for each pixel.
+    pub sums: Vec<f32>,
+    /// Sums of the squares of their deviations from their mean.
+    pub deviations: Vec<f32>,
 }
 
 impl BiasCheck {
-    /// The differences of one pass.
-    pub fn of_pass(index: u32, differences: Vec<f32>) -> Self {
-        let mut check = Self { passes: [0, 0], sums: [vec![0.0; differences.len()], vec![0.0; differences.len()]] };
-        let half = index as usize % 2;
-        check.passes[half] = 1;
-        check.sums[half] = differences;
-        check
+    /// The estimates of one pass.
+    pub fn of_pass(radiance: Vec<f32>) -> Self {
+        Self { passes: 1, deviations: vec![0.0; radiance.len()], sums: radiance }
     }
 
     /// Adds another one by `add`; what is not known of both is not known of the sum.
@@ -32,27 +29,39 @@ impl BiasCheck {
         }
     }
 
-    /// Adds the passes of another one at the same pixels.
+    /// Adds the passes of another one at the same pixels, as [`super::Film::merge`] does.
     pub fn merge(&mut self, other: &Self) {
-        for half in 0..2 {
-            self.passes[half] += other.passes[half];
-            self.sums[half].iter_mut().zip(&other.sums[half]).for_each(|(a, b)| *a += b);
+        let (n, m) = (f64::from(self.passes), f64::from(other.passes));
+        for i in 0..self.sums.len() {
+            let apart = f64::from(other.sums[i]) / m - f64::from(self.sums[i]) / n;
+            let both = f64::from(self.deviations[i]) + f64::from(other.deviations[i]);
+            self.deviations[i] = (both + apart * apart * (n * m / (n + m))) as f32;
+            self.sums[i] += other.sums[i];
         }
+        self.passes += other.passes;
     }
 
-    /// Adds light that is summed with that of the same passes.
+    /// Adds light that is summed with that of the same pass.
     pub fn add_light(&mut self, other: &Self) {
-        let passes = self.passes;
-        self.merge(other);
-        self.passes = passes;
+        debug_assert!((self.passes, other.passes) == (1, 1), "of one pass");
+        self.sums.iter_mut().zip(&other.sums).for_each(|(a, b)| *a += b);
     }
 
-    /// Estimates of the squared bias of each number, with the index of its pixel in a part of a
-    /// picture of that size; `None` unless there are passes of both kinds.
-    pub fn squares(&self, whole: (u32, u32), window: Crop) -> Option<impl Iterator<Item = (usize, [f64; 3])> + '_> {
-        let [even, odd] = self.passes.map(f64::from);
-        let product = move |i: usize| f64::from(self.sums[0][i]) / even * (f64::from(self.sums[1][i]) / odd);
-        let of_pixel = move |(i, place): (usize, usize)| (place, [0, 1, 2].map(|c| product(3 * i + c)));
-        (even > 0.0 && odd > 0.0).then(|| PixelGrid::of(whole).places(window).enumerate().map(of_pixel))
+    /// Estimates of the squared error of each number of a picture of the same passes, given its
+    /// radiance, with the index of its pixel: the squared distance to the mean of the closer
+    /// estimates, less the variance of that. `None` for one pass.
+    pub fn squares<'a>(
+        &'a self,
+        radiance: &'a [f32],
+        whole: (u32, u32),
+        window: Crop,
+    ) -> Option<impl Iterator<Item = (usize, [f64; 3])> + 'a> {
+        let passes = f64::from(self.passes);
+        let square = move |i: usize, place: usize, c: usize| {
+            let apart = f64::from(radiance[3 * place + c]) - f64::from(self.sums[3 * i + c]) / passes;
+            apart * apart - f64::from(self.deviations[3 * i + c]) / (passes - 1.0) / passes
+        };
+        let of_pixel = move |(i, place)| (place, [0, 1, 2].map(|c| square(i, place, c)));
+        (self.passes > 1).then(|| PixelGrid::of(whole).places(window).enumerate().map(of_pixel))
     }
 }

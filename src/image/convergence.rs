@@ -6,13 +6,16 @@ use crate::settings::Crop;
 /// Fraction of the mean radiance of all pixels that is added to each pixel's own, so that dark
 /// pixels do not decide. Where the mean is 1, the square of the error estimates relMSE.
 const FLOOR: f64 = 0.1;
+/// Fraction of the squared standard error that is noise at least, whatever closer estimates say.
+const LEAST_NOISE: f64 = 0.5;
 
 /// Relative errors of a picture, root mean squares over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorEstimate {
-    /// Standard error of the means.
+    /// Standard error of the means; less where closer estimates say so, for points of one sequence
+    /// spread more from pass to pass than their mean is off.
     pub noise: f64,
-    /// Bias of the estimate's kernel, beyond what its own noise explains.
+    /// What the error is more than that.
     pub bias: f64,
 }
 
@@ -42,20 +45,24 @@ impl ErrorEstimate {
             let ratio = film.bias_noise().unwrap_or(0.0);
             (mean_square(&biases) - ratio * ratio * noise).max(0.0)
         };
-        let term = |place: usize, squares: [f64; 3]| {
+        let radiance = frame.layer("radiance");
+        // Squared error beyond the noise, of one pixel.
+        let beyond = |(place, squares): (usize, [f64; 3])| {
             let of_channel = |c: usize| {
-                let x = f64::from(frame.layer("radiance")[3 * place + c]);
-                squares[c] / (x * x + floor).max(f64::MIN_POSITIVE)
+                let (x, error) = (f64::from(radiance[3 * place + c]), f64::from(errors[3 * place + c]));
+                (squares[c] - error * error) / (x * x + floor).max(f64::MIN_POSITIVE)
             };
             (0..3).map(of_channel).sum::<f64>() / 3.0
         };
-        let checked = film.check.as_ref().and_then(|check| check.squares(film.whole, film.window)).and_then(|all| {
-            let all = all.filter(|(place, _)| is_in(*place)).map(|(place, squares)| term(place, squares));
+        let squares = film.check.as_ref().and_then(|check| check.squares(radiance, film.whole, film.window));
+        let checked = squares.and_then(|all| {
+            let all = all.filter(|(place, _)| is_in(*place)).map(beyond);
             let (count, sum) = all.fold((0, 0.0), |(count, sum), term| (count + 1, sum + term));
-            (count > 0).then(|| (sum / f64::from(count)).max(0.0))
+            (count > 0).then(|| sum / f64::from(count))
         });
-        let bias = checked.or_else(|| biases.map(unexplained)).unwrap_or(0.0);
-        Some(Self { noise: noise.sqrt(), bias: bias.sqrt() })
+        let more = checked.or_else(|| biases.map(unexplained)).unwrap_or(0.0);
+        let noise = (noise + more.min(0.0)).max(LEAST_NOISE * noise);
+        Some(Self { noise: noise.sqrt(), bias: more.max(0.0).sqrt() })
     }
 
     /// Both errors together.
@@ -114,8 +121,9 @@ mod tests {
         assert_eq!(ErrorEstimate::of(&film(&biased[..1]), None), None, "one pass");
     }
 
-    /// A film of a pass whose only checked pixel is `value` where the truth is 1, of 8 x 8 pixels.
-    fn checked(index: u32, value: f32) -> Film {
+    /// A film of a pass of 8 x 8 pixels of that value, and of a closer one at its only checked
+    /// pixel.
+    fn checked(value: f32, closer: f32) -> Film {
         let whole = Crop { column: 0, row: 0, width: 8, height: 8 };
         let filled = |size: (u32, u32), window: Crop, value: f32| {
             let mut film = Film::new(size, window, 1);
@@ -126,25 +134,31 @@ mod tests {
             film
         };
         let grid = PixelGrid::of((8, 8)).window(whole);
-        let closer = filled((grid.width, grid.height), grid, 1.0);
-        filled((8, 8), whole, value).checked_by(index, &closer, 2.0)
+        filled((8, 8), whole, value).checked_by(&filled((grid.width, grid.height), grid, closer))
     }
 
     #[test]
-    fn bias_is_the_product_of_differences_in_even_and_odd_passes() {
-        let merged = |values: &[f32]| {
-            let mut films = (0..).zip(values).map(|(index, value)| checked(index, *value));
+    fn errors_are_distances_to_closer_estimates_less_their_noise() {
+        let merged = |values: [f32; 4], closer: [f32; 4]| {
+            let mut films = values.into_iter().zip(closer).map(|(value, closer)| checked(value, closer));
             let mut merged = films.next().expect("a pass");
             films.for_each(|film| merged.merge(&film).expect("of one picture"));
             ErrorEstimate::of(&merged, None).expect("passes")
         };
-        // Means 1.2 and 1.4 of even and odd passes; the ratio of bias to difference is 2.
-        let estimate = merged(&[1.1, 1.5, 1.3, 1.3]);
-        let expected = (4.0 * 0.2 * 0.4 / (1.3_f64.powi(2) * 1.01)).sqrt();
-        assert!((estimate.bias - expected).abs() < 1e-6, "{estimate:?} {expected}");
-        // Noise alone: differences of opposite signs have no square.
-        assert_eq!(merged(&[1.1, 0.9, 1.1, 0.9]).bias, 0.0);
-        assert_eq!(merged(&[1.0, 1.0]).bias, 0.0, "control: no difference");
+        let relative = |square: f64| (square / (1.3_f64.powi(2) * 1.01)).sqrt();
+        let is_near = |a: f64, b: f64| (a - b).abs() < 1e-5;
+        // The mean of the closer ones is 1, its variance 0.02/(3 · 4).
+        let (even, around) = ([1.3; 4], [0.9, 1.1, 1.0, 1.0]);
+        let estimate = merged(even, around);
+        assert!(estimate.noise == 0.0 && is_near(estimate.bias, relative(0.09 - 0.02 / 12.0)), "{estimate:?}");
+        // Noise of the picture is a part of that error.
+        let noisy = [1.1, 1.5, 1.3, 1.3];
+        let noise = merged(noisy, around);
+        assert!(is_near(noise.noise, relative(0.08 / 12.0)) && is_near(noise.total(), estimate.total()), "{noise:?}");
+        // Passes that err oppositely: closer estimates say that their mean is right.
+        let opposite = merged(noisy, [1.3; 4]);
+        assert!(opposite.bias == 0.0 && is_near(opposite.noise, relative(LEAST_NOISE * 0.08 / 12.0)), "{opposite:?}");
+        assert_eq!(merged(even, [1.3; 4]).total(), 0.0, "control: no difference");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::array;
 use super::{
     bias_check::BiasCheck,
     cryptomatte::Matte,
-    film_sums::{Bandwidth, ExtraSums, LAYER_COUNT, Moments, Weights},
+    film_sums::{Bandwidth, ExtraSums, LAYER_COUNT, Moments},
     frame::{DataWindow, Frame},
     layers::{EXTRA_LAYERS, LAYERS, Rule, Source, layer_index},
 };
@@ -37,12 +37,12 @@ pub struct Film {
     /// Layers that were asked for.
     pub(super) extras: Vec<ExtraSums>,
     pub(super) mattes: Vec<Matte>,
-    /// Differences from estimates of less bias, if there are such for all passes.
+    /// Estimates of less bias, if there are such for all passes.
     pub(super) check: Option<BiasCheck>,
     /// Number of samples that were left out, since a sum would not be finite with them.
     pub(super) non_finite: u64,
-    /// How samples of pixels that have more of them count.
-    pub(super) weights: Weights,
+    /// Number of times that the samples of a pixel double at most.
+    pub(super) doublings: u32,
     /// Number of samples beyond those that every pixel has.
     pub(super) extra_samples: u64,
 }
@@ -65,7 +65,7 @@ impl Film {
             mattes: Vec::new(),
             check: None,
             non_finite: 0,
-            weights: Weights::default(),
+            doublings: 0,
             extra_samples: 0,
         }
     }
@@ -149,17 +149,14 @@ impl Film {
         total
     }
 
-    /// Notes how far the radiance of pass `index` is from that of `closer`, a film of estimates of
-    /// less bias at the pixels of the picture's [`PixelGrid`] alone. `ratio` is that of the bias to
-    /// this difference.
+    /// Notes the radiance of `closer`, a film of estimates of less bias of one pass, at the pixels
+    /// of the picture's [`PixelGrid`] alone.
     #[must_use]
-    pub(crate) fn checked_by(self, index: u32, closer: &Self, ratio: f32) -> Self {
-        let radiance = layer_index("radiance");
-        let (here, there) = (self.means(), closer.means());
-        let places = PixelGrid::of(self.whole).places(self.window);
-        let numbers = places.flat_map(|place| &here[radiance][3 * place..][..3]);
-        let differences = numbers.zip(&there[radiance]).map(|(a, b)| ratio * (a - b)).collect();
-        Self { check: Some(BiasCheck::of_pass(index, differences)), ..self }
+    pub(crate) fn checked_by(self, closer: &Self) -> Self {
+        let [radiance, ..] = closer.means();
+        let cells = PixelGrid::of(self.whole).pixels(self.window);
+        let numbers = cells.flat_map(|(cell, _)| radiance[3 * cell..][..3].to_vec()).collect();
+        Self { check: Some(BiasCheck::of_pass(numbers)), ..self }
     }
 
     /// Width and height of the whole picture, pixels.
@@ -234,7 +231,7 @@ impl Film {
         if (layers(self), mattes(self)) != (layers(other), mattes(other)) {
             return Err(Error::Differs("films of different layers cannot be merged".to_owned()));
         }
-        if self.weights != other.weights {
+        if self.doublings != other.doublings {
             return Err(Error::Differs("films of different numbers of samples cannot be merged".to_owned()));
         }
         if (self.whole, self.window) != (other.whole, other.window) {
@@ -282,7 +279,7 @@ impl Film {
         }
         for matte in &self.mattes {
             matte
-                .channels(self.samples * u64::from(self.weights.plain))
+                .channels(self.samples << self.doublings)
                 .into_iter()
                 .for_each(|(name, numbers)| frame.add_extra(&name, numbers));
         }

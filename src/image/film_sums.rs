@@ -1,6 +1,4 @@
-//! Sums that a film holds: of layers that were asked for, of passes, and how samples count in them.
-
-use serde::{Deserialize, Serialize};
+//! Sums that a film holds: of layers that were asked for, and of passes.
 
 use super::layers::{LAYERS, Rule, Source};
 
@@ -47,22 +45,4 @@ pub(super) struct Moments {
     pub deviations: [Vec<f32>; LAYER_COUNT],
     /// Sums of the products of the deviations of radiance and bandwidth.
     pub with_bandwidth: Vec<f32>,
-}
-
-/// How the samples of a pass count in pixels of different numbers of samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Weights {
-    /// Factors on counts of samples where a pixel has those that every pixel has, and where it has
-    /// more: both give a pixel the same total. The first is also that of the number of samples.
-    pub plain: u32,
-    pub uneven: u32,
-    /// Samples that a pixel has more.
-    pub extra: u32,
-}
-
-/// Every pixel has the same number.
-impl Default for Weights {
-    fn default() -> Self {
-        Self { plain: 1, uneven: 1, extra: 0 }
-    }
 }

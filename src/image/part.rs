@@ -18,7 +18,7 @@ use super::{
     exr_read::{attributes_of, open, our_attributes, window_of},
     file::{open_regular, write_file},
     film::Film,
-    film_sums::{Bandwidth, ExtraSums, Moments, Weights},
+    film_sums::{Bandwidth, ExtraSums, Moments},
     frame::DataWindow,
     layers::{EXTRA_LAYERS, LAYERS, Rule, layer_index},
     pass_sum::{PassBlock, PassSum, is_block},
@@ -26,15 +26,15 @@ use super::{
 use crate::{
     error::{Error, Result},
     map_kind::ByKind,
-    settings::{Crop, ExtraLayers, PassRange, PixelGrid},
+    settings::{Crop, ExtraLayers, PassRange, PictureSettings, PixelGrid},
     stats::MapStats,
 };
 
 /// Version of what the channels and `blocks` hold, in the attribute `partFormat`. Parts without one
-/// are of format 1, without differences from estimates of less bias.
-const FORMAT: &str = "2";
-/// Kinds of the channels with differences from estimates of less bias, of even and odd passes.
-const CHECKS: [&str; 2] = ["evenCheck", "oddCheck"];
+/// are of format 1, without estimates of less bias; those of format 2 have differences from them.
+const FORMAT: &str = "3";
+/// Kinds of the channels of estimates of less bias: sums, and of several passes their deviations.
+const CHECKS: [&str; 2] = ["closer", "closerDeviations"];
 
 /// Header of a part: all but its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,13 +64,14 @@ struct BlockRow {
     extras: Vec<ExtraRow>,
     #[serde(default)]
     mattes: Vec<ExtraLayers>,
+    /// Number of times that the samples of a pixel double at most.
     #[serde(default)]
-    weights: Weights,
+    doublings: u32,
     #[serde(default)]
     extra_samples: u64,
-    /// Number of even and of odd passes that are checked for bias.
+    /// Whether the passes have estimates of less bias.
     #[serde(default)]
-    checked: Option<[u32; 2]>,
+    has_closer: bool,
 }
 
 /// A layer that was asked for.
@@ -137,7 +138,8 @@ pub fn write_part(path: &Path, sum: &PassSum, attributes: &Attributes) -> Result
         }
         if let Some(check) = &film.check {
             let names = LAYERS[layer_index("radiance")].channels;
-            for (kind, sums) in CHECKS.iter().zip(&check.sums) {
+            let kinds = CHECKS.iter().zip([&check.sums, &check.deviations]);
+            for (kind, sums) in kinds.take(1 + usize::from(check.passes > 1)) {
                 let mut spread = vec![0.0; 3 * frame.pixels()];
                 for (place, numbers) in PixelGrid::of(film.whole).places(film.window).zip(sums.chunks(3)) {
                     spread[3 * place..][..3].copy_from_slice(numbers);
@@ -178,9 +180,9 @@ fn row(block: &PassBlock) -> BlockRow {
         caustic: block.photons.caustic,
         extras,
         mattes,
-        weights: block.film.weights,
+        doublings: block.film.doublings,
         extra_samples: block.film.extra_samples,
-        checked: block.film.check.as_ref().map(|check| check.passes),
+        has_closer: block.film.check.is_some(),
     }
 }
 
@@ -263,13 +265,15 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             let ranks = |pixel: &[f32]| std::array::from_fn(|i| rank(pixel, i));
             Ok(Matte { of: *of, ranks: numbers.chunks(2 * RANKS).map(ranks).collect() })
         };
-        let check = |passes: [u32; 2]| -> Result<BiasCheck> {
+        let check = || -> Result<BiasCheck> {
             let of = |kind: &str| -> Result<Vec<f32>> {
                 let spread = read(&format!("{before}{kind}."), LAYERS[layer_index("radiance")].channels)?;
                 let places = PixelGrid::of(whole).places(window);
                 Ok(places.flat_map(|place| spread[3 * place..][..3].to_vec()).collect())
             };
-            Ok(BiasCheck { passes, sums: [of(CHECKS[0])?, of(CHECKS[1])?] })
+            let sums = BiasCheck::of_pass(of(CHECKS[0])?);
+            let passes = row.passes.count();
+            Ok(if passes > 1 { BiasCheck { passes, deviations: of(CHECKS[1])?, ..sums } } else { sums })
         };
         let [mean, deviations, inverse] = row.bandwidth.map(f64::from_bits);
         let film = Film {
@@ -282,9 +286,9 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
             moments: if row.passes.count() > 1 { Some(moments()?) } else { None },
             extras: row.extras.iter().map(extra).collect::<Result<_>>()?,
             mattes: row.mattes.iter().map(matte).collect::<Result<_>>()?,
-            check: row.checked.map(check).transpose()?,
+            check: row.has_closer.then(check).transpose()?,
             non_finite: row.non_finite,
-            weights: row.weights,
+            doublings: row.doublings,
             extra_samples: row.extra_samples,
         };
         let photons = ByKind { global: row.global, caustic: row.caustic };
@@ -300,7 +304,11 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
     let is_good = |row: &BlockRow| {
         let is_finite = row.bandwidth.iter().all(|bits| f64::from_bits(*bits).is_finite());
         let in_reach = row.passes.first < row.passes.end && PassRange::END.contains(row.passes.end);
-        in_reach && is_block(row.passes) && row.samples > 0 && row.weights.plain > 0 && is_finite
+        in_reach
+            && is_block(row.passes)
+            && row.samples > 0
+            && row.doublings <= PictureSettings::MOST_DOUBLINGS
+            && is_finite
     };
     let consecutive = rows.windows(2).all(|pair| pair[0].passes.end == pair[1].passes.first);
     if rows.is_empty() || !consecutive || !rows.iter().all(is_good) {
@@ -331,7 +339,7 @@ mod tests {
     fn sum(passes: std::ops::Range<u32>) -> PassSum {
         let mut sum = PassSum::default();
         for index in passes {
-            let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL).with_extra_samples(12);
+            let mut film = Film::new((5, 7), WINDOW, 4).with_layers(&ExtraLayers::ALL).with_doublings(2);
             for pixel in 0..6 {
                 let value = 0.1 * (pixel + 1) as f32 + 1.0 / (index as f32 + 3.0);
                 let position = (pixel % 3, pixel / 3);
@@ -346,22 +354,22 @@ mod tests {
                 film.add(position, &rows, 4);
                 film.add_to(Source::Estimate(MapKind::Caustic), position, &[value, 3.0, 1.0]);
                 film.add_to_matte(ExtraLayers::Objects, position, [hash("a"), hash("b"), hash("a")].into_iter());
-                film.weigh(position, pixel == 2);
+                film.weigh(position, if pixel == 2 { 2 } else { 0 });
             }
-            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3)).checked_by(index, &closer(index), 0.3);
+            let film = film.with_bandwidth(1.0 / (f64::from(index) + 0.3)).checked_by(&closer(index));
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).expect("of one picture");
         }
         sum
     }
 
-    /// An estimate of less bias at the only pixel of the grid in the crop.
+    /// Estimates of less bias at the pixels of the grid in the crop, which are all.
     fn closer(index: u32) -> Film {
-        let mut film = Film::new((1, 1), Crop { column: 0, row: 0, width: 1, height: 1 }, 1);
-        film.add(
-            (0, 0),
-            &[[1.0 / (index as f32 + 0.7), 3.0, 1e-7, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]],
-            1,
-        );
+        let mut film = Film::new((5, 7), WINDOW, 1);
+        for pixel in 0..6 {
+            let value = 1.0 / ((index + pixel) as f32 + 0.7);
+            let position = (pixel % 3, pixel / 3);
+            film.add(position, &[[value, 3.0, 1e-7, 0.0], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]], 1);
+        }
         film
     }
 
@@ -424,10 +432,10 @@ mod tests {
         let mut bytes = std::fs::read(&path).unwrap();
         let name = [&b"caustica:"[..], format, blocks].concat();
         let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len();
-        assert_eq!(bytes[at], b'2');
+        assert_eq!(bytes[at], b'3');
         bytes[at] = b'1';
         std::fs::write(&path, &bytes).unwrap();
-        assert!(said(&path).contains("is a part of format 1; this version reads and writes 2"), "{}", said(&path));
+        assert!(said(&path).contains("is a part of format 1; this version reads and writes 3"), "{}", said(&path));
         for blocks in ["[]", "{}", "7", r#"[{"passes":{"first":3,"end":9}}]"#] {
             let mut attributes = attributes();
             attributes.insert("blocks".to_owned(), blocks.to_owned());

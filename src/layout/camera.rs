@@ -56,7 +56,7 @@ pub struct LobePoint {
     /// Halves, as all that follow: reflectance along the normal; of rough glass the tint of what is
     /// transmitted.
     pub f0: [u32; 2],
-    /// Reflectance at grazing angles.
+    /// Reflectance at grazing angles; of rough glass the members of its film.
     pub f90: [u32; 2],
     /// Factor of light that is reflected more than once.
     pub compensation: [u32; 2],
@@ -90,7 +90,8 @@ pub struct CameraTile {
     /// Pixel of the tile's upper left corner.
     pub first_column: u32,
     pub first_row: u32,
-    /// First sample of each pixel, and samples of each pixel, in this tile.
+    /// First sample of each pixel, and samples of each pixel, in this tile. Of rays of final
+    /// gathering, the first of each point, and how many of each follow each other.
     pub first_sample: u32,
     pub samples: u32,
     /// 1: the paths are rays of final gathering; 0: they start at the camera.
@@ -120,14 +121,22 @@ pub struct CameraTile {
     /// Width of what a sample sees by rough lobes, metres, from which on irradiance kept in cells
     /// will do; 0: nowhere.
     pub cells_from: f32,
-    /// 0: the tile's pixels are all of a square. Otherwise a list of some of them, and one more
-    /// than the number of those that other tiles of the same square had before.
+    /// 0: the tile's pixels are all of a square. 1: a list of some of them.
     pub listed: u32,
+    /// Where that list begins; of rays, the list of keys of their points.
     pub listed_at: u32,
-    /// Columns and rows left out between those of a picture of few of the pixels, and the first
-    /// that it has. `first_column` and `first_row` then count those that it has.
+    /// Of a picture of one pixel of each square cell, [`PixelGrid`](crate::settings::PixelGrid):
+    /// the side of a cell less 1, and pixels by which that of the next cell is shifted.
+    /// `first_column` and `first_row` then count cells.
     pub left_out: u32,
-    pub first_kept: u32,
+    pub shift: u32,
+    /// Binary logarithm of the side of squares of pixels whose samples are one set of random
+    /// numbers, pixels in Morton order; 0: the samples of each pixel are a set. Those from
+    /// [`Self::spp`] on always are.
+    pub square_bits: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// First hit of a camera sample.
@@ -167,9 +176,8 @@ pub struct FinalStep {
     pub rays: u32,
     /// Chosen points.
     pub chosen: u32,
-    /// 1: the rays of all points of the picture are one set of numbers, those of neighbours follow
-    /// each other. 0: the rays of a pixel are a set.
-    pub joint: u32,
+    /// Of the directions in which they start.
+    pub seed: u32,
     /// Bright patches that rays are aimed at.
     pub patches: u32,
     /// Irradiance by all but these patches on average, in the units of [`BrightPatch::power`].

@@ -1,4 +1,4 @@
-//! Lists of a pass: late rays, and pixels of a tile.
+//! Lists of a pass: late rays, pixels of a tile, and keys of rays.
 //!
 //! Late rays need more than the loop budget of an invocation, and go on in further dispatches: a
 //! kernel lists the paths or points with such rays. It then runs again for a slice of the list at a
@@ -20,24 +20,26 @@ const MOST_DISPATCHES: u32 = 1 << 16;
 const KEPT_WORDS: u64 = (LATE_SLICE * LATE_WORDS) as u64;
 const WORD: u64 = size_of::<u32>() as u64;
 
-/// Paths or points with late rays, pixels, and what is kept of the rays of a slice.
+/// Paths or points with late rays, pixels, keys, and what is kept of the rays of a slice.
 #[derive(Debug)]
 pub struct Lists {
     buffer: Buffer,
     /// Number of paths or points that there is room for.
     room: u64,
     pixels: u64,
+    keys: u64,
 }
 
 impl Lists {
-    /// Room for as many paths or points, if rays of the scene can be late, and for as many pixels.
+    /// Room for as many paths or points, if rays of the scene can be late, and for as many pixels
+    /// and keys.
     ///
     /// # Errors
     /// Limits of the adapter.
-    pub fn new(gpu: &Gpu, scene: &SceneBuffers, room: u64, pixels: u64) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, room: u64, (pixels, keys): (u64, u64)) -> Result<Self> {
         let (room, kept) = if scene.has_late_rays(gpu) { (room, KEPT_WORDS) } else { (0, 0) };
-        let buffer = gpu.storage::<u32>("lists", u64::from(LATE_HEADER) + room + pixels + kept)?;
-        Ok(Self { buffer, room, pixels })
+        let buffer = gpu.storage::<u32>("lists", u64::from(LATE_HEADER) + room + pixels + 2 * keys + kept)?;
+        Ok(Self { buffer, room, pixels, keys })
     }
 
     /// The binding of kernels that use them.
@@ -55,6 +57,17 @@ impl Lists {
     /// Lists pixels.
     pub fn write_pixels(&self, gpu: &Gpu, pixels: &[u32]) {
         gpu.write(&self.buffer, u64::from(self.pixels_at()) * WORD, pixels);
+    }
+
+    /// Word at which the keys begin.
+    #[must_use]
+    pub fn keys_at(&self) -> u32 {
+        self.pixels_at() + self.pixels as u32
+    }
+
+    /// Lists keys.
+    pub fn write_keys(&self, gpu: &Gpu, keys: &[[u32; 2]]) {
+        gpu.write(&self.buffer, u64::from(self.keys_at()) * WORD, keys);
     }
 
     /// Traces the rays of the first `listed` entries to their ends: of each slice of the list,
@@ -75,7 +88,7 @@ impl Lists {
                 for dispatch in 0..MOST_DISPATCHES {
                     let mut encoder = gpu.encoder();
                     if dispatch == 0 {
-                        encoder.clear_buffer(&self.buffer, (u64::from(self.pixels_at()) + self.pixels) * WORD, None);
+                        encoder.clear_buffer(&self.buffer, (u64::from(self.keys_at()) + 2 * self.keys) * WORD, None);
                     }
                     encoder.clear_buffer(counters, unfinished, Some(WORD));
                     kernel.dispatch(&mut encoder, bindings, count.into());

@@ -27,7 +27,7 @@ pub struct Wavefront {
     /// One [`Counters`], cleared by each run.
     pub counters: Buffer,
     dispatch_arguments: Buffer,
-    /// Of paths whose rays need more than one dispatch, and of pixels.
+    /// Of paths whose rays need more than one dispatch, of pixels and of keys.
     pub lists: Lists,
 }
 
@@ -39,19 +39,19 @@ pub struct Step<'b> {
 }
 
 impl Wavefront {
-    /// Room for `slots` paths in a scene, and for a list of `pixels`; `name` is in the labels of
-    /// its buffers.
+    /// Room for `slots` paths in a scene, and for lists of `pixels` and `keys`; `name` is in the
+    /// labels of its buffers.
     ///
     /// # Errors
     /// Limits of the adapter.
-    pub fn new(gpu: &Gpu, scene: &SceneBuffers, name: &str, (slots, pixels): (u64, u64)) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers, name: &str, (slots, pixels): (u64, u64), keys: u64) -> Result<Self> {
         Ok(Self {
             advance: Kernel::new(gpu, "advance_queue", &[]),
             paths: gpu.storage::<Path>(&format!("{name} paths"), slots)?,
             queues: gpu.storage::<u32>(&format!("{name} queues"), 2 * slots)?,
             counters: gpu.storage::<Counters>(&format!("{name} counters"), 1)?,
             dispatch_arguments: gpu.storage::<[u32; 3]>(&format!("{name} dispatch arguments"), 1)?,
-            lists: Lists::new(gpu, scene, slots, pixels)?,
+            lists: Lists::new(gpu, scene, slots, (pixels, keys))?,
         })
     }
 

@@ -14,12 +14,18 @@ use crate::{
     map_kind::ByKind,
     passes::{PathRange, PathRanges},
     progress::{Progress, Stage},
-    settings::{Emission, PassRange, PassSettings, PhotonSettings, PixelGrid, Settings},
-    stats::{MapStats, Stats},
+    reference::mix,
+    settings::{Emission, EstimateSettings, PassRange, PassSettings, PhotonSettings, PixelGrid, Settings},
+    stats::{MapStats, Seconds, Stats},
 };
 
 /// Standard deviations of a Poisson count by which a pass stays below the capacity of a map.
 const DEVIATIONS: f64 = 8.0;
+/// Rays of final gathering of each pixel of a grid, which has one sample.
+const CLOSER_RAYS: u32 = 4;
+/// Offset of the numbers that give the seeds of closer estimates (the golden ratio, as a fraction
+/// of 2^32).
+const CLOSER_SEEDS: u32 = 0x9e37_79b9;
 /// Number of a path from which on its random numbers would be those of another light: the upper
 /// word of a round has 16 bits for itself.
 const PATHS: u64 = 1 << 48;
@@ -66,9 +72,34 @@ impl<'a> Progressive<'a> {
         if PixelGrid::of(film.whole()).places(film.window()).next().is_none() {
             return Ok((film, stats));
         }
-        let (closer, ratio) = PassSettings::closer(&shrunken, photons.final_gather > 0);
-        let closer = self.session.grid_film(&maps, &closer, picture, &mut stats, &Checking(progress))?;
-        Ok((film.checked_by(index, &closer, ratio), stats))
+        drop(maps);
+        let closer = self.closer_film(&shrunken, index, &mut stats, &Checking(progress))?;
+        Ok((film.checked_by(&closer), stats))
+    }
+
+    /// Renders the pixels of the grid by estimates of less bias, from photons and by samples of
+    /// their own in each pass: points of the picture's sequences would err as it does, and those of
+    /// one sequence opposite to each other.
+    fn closer_film(
+        &self,
+        shrunken: &EstimateSettings,
+        index: u32,
+        stats: &mut Stats,
+        progress: &dyn Progress,
+    ) -> Result<Film> {
+        let Settings { photons, picture, .. } = self.settings;
+        let rays = if photons.mode.gathers_finally() { CLOSER_RAYS } else { 0 };
+        let seed = mix(photons.seed ^ mix(index.wrapping_add(CLOSER_SEEDS)));
+        let own = PhotonSettings { seed, final_gather: rays, ..photons.clone() };
+        let ranges = self.paths(index.max(1), progress)?;
+        let from_first = |range: PathRange| PathRange { first: 0, ..range };
+        let paths = ByKind { global: from_first(ranges.global), caustic: from_first(ranges.caustic) };
+        let mut maps = self.session.photon_maps_of(&own, &paths, progress)?;
+        maps.first_sample = Some(0);
+        let Seconds { photons, grid, .. } = maps.stats().seconds;
+        let seconds = Seconds { photons, grid, ..Seconds::default() };
+        stats.add(&Stats { rays: maps.stats().rays, seconds, ..Stats::default() });
+        self.session.grid_film(&maps, &PassSettings::closer(shrunken), picture, stats, progress)
     }
 
     /// Indices of the photon paths of a pass from 1 on.

@@ -12,7 +12,6 @@ use super::{
     size::picture_size,
     tally,
     tiles::{CameraPass, Gatherer},
-    unevenness::UNEVENNESS_REACH,
 };
 use crate::{
     bvh::{Bvh, Media, MediaProbe, contacts},
@@ -32,10 +31,6 @@ use crate::{
     stats::{DeviceStats, Stats, timed},
     upload::SceneBuffers,
 };
-
-/// Rays of final gathering of each pixel of a grid, for all of its samples. With eight, their noise
-/// hides a bias of 3 % in 16 passes of S1.
-const GRID_RAYS: u32 = 64;
 
 /// Rays of final gathering that the preview of a picture traces at most, in all and for each pixel
 /// of the picture.
@@ -222,8 +217,8 @@ impl<'a> Session<'a> {
         self.observed_film(maps, estimate, picture, None, progress)
     }
 
-    /// Renders the pixels of the picture's grid alone, each with rays of final gathering of its
-    /// own. `stats` counts the time and the rays that it takes.
+    /// Renders one sample of each pixel of the picture's grid. `stats` counts the time and the rays
+    /// that it takes.
     pub(super) fn grid_film(
         &self,
         maps: &PhotonMaps,
@@ -233,10 +228,8 @@ impl<'a> Session<'a> {
         progress: &dyn Progress,
     ) -> Result<Film> {
         let mut gatherer = MapGatherer::new(self.gpu, &self.buffers, maps, estimate, None)?;
-        let picture = PictureSettings { layers: Vec::new(), max_spp: None, ..picture.clone() };
-        let rays = GRID_RAYS.min(maps.settings().final_gather).div_ceil(picture.spp);
-        let photons = PhotonSettings { final_gather: rays, ..maps.settings().clone() };
-        let pass = self.pass(maps, &photons, estimate, &picture)?.at_grid();
+        let picture = PictureSettings { layers: Vec::new(), spp: 1, max_spp: None, ..picture.clone() };
+        let pass = self.pass(maps, estimate, &picture)?.at_grid();
         let mut own = Stats::default();
         let mut films = pass.render(&mut gatherer, Stage::Camera, &mut own, progress)?;
         tally::finish_stats(self.gpu, &mut own);
@@ -249,14 +242,13 @@ impl<'a> Session<'a> {
     fn pass(
         &self,
         maps: &PhotonMaps,
-        photons: &PhotonSettings,
         estimate: &EstimateSettings,
         picture: &PictureSettings,
     ) -> Result<CameraPass<'_>> {
         let number = self.scene.camera_number(picture.camera.as_deref())?;
         let camera = (&self.scene.cameras[number], self.camera_media[number]);
         let scene = (self.scene, &self.buffers);
-        let pass = CameraPass::new(self.gpu, scene, camera, photons, estimate, picture)?;
+        let pass = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, picture)?;
         pass.of_pass(picture, maps.first_sample)
     }
 
@@ -299,7 +291,7 @@ impl<'a> Session<'a> {
         let number = self.scene.camera_number(picture.camera.as_deref())?;
         let camera = (&self.scene.cameras[number], self.camera_media[number]);
         let scene = (self.scene, &self.buffers);
-        let pass = self.pass(maps, maps.settings(), estimate, picture)?;
+        let pass = self.pass(maps, estimate, picture)?;
         let mut stats = maps.stats().clone();
         if estimate.keeps_irradiance() && pass.final_rays() > 0 && !maps.maps().is_empty() {
             let small = preview_of(picture, pass.size, maps.settings().final_gather);
@@ -311,7 +303,7 @@ impl<'a> Session<'a> {
             gatherer.prepare(&preview, &mut stats, progress)?;
         }
         if estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty() {
-            let coarse = coarser(picture, pass.size, estimate, pass.tracer.branches());
+            let coarse = coarser(picture, &pass, estimate);
             let single = EstimateSettings { share_reach: 0.0, ..estimate.clone() };
             let records = CameraPass::new(self.gpu, scene, camera, maps.settings(), &single, &coarse)?;
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
@@ -325,24 +317,21 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Settings of a coarser version of the part of the picture that is rendered, and what surrounds it
-/// as far as the filter of records reaches.
-fn coarser(picture: &PictureSettings, size: (u32, u32), estimate: &EstimateSettings, branches: u32) -> PictureSettings {
-    let spacing = record_spacing(size, estimate.gather_spacing, branches);
+/// Settings of a coarser version of the part of the picture that is traced, and what surrounds it
+/// as far as the filter of records reaches. It has records for all of a tile: what they leave to
+/// further rays, and whether a pixel's neighbours are uneven, is then the same whatever the crop.
+fn coarser(picture: &PictureSettings, pass: &CameraPass, estimate: &EstimateSettings) -> PictureSettings {
+    let (size, traced) = (pass.size, pass.tracer.tiled());
+    let spacing = record_spacing(size, estimate.gather_spacing, pass.tracer.branches());
     let reach = filter_footprint(estimate.gather_radius, spacing);
-    let window = picture.window(size);
-    // Those around a pixel tell whether it has more samples.
-    let around = if picture.extra_samples() > 0 { UNEVENNESS_REACH } else { 0 };
     let along = |pixels: u32, origin: u32, count: u32| {
-        let end = (origin + count + around).min(pixels);
-        let origin = origin.saturating_sub(around);
         let side = pixels.div_ceil(spacing);
         let scaled = |pixel: u32| (f64::from(pixel) * f64::from(side) / f64::from(pixels)) as u32;
         let first = scaled(origin).saturating_sub(reach + 1);
-        (side, first, (scaled(end) + reach + 2).min(side) - first)
+        (side, first, (scaled(origin + count) + reach + 2).min(side) - first)
     };
-    let (columns, column, width) = along(size.0, window.column, window.width);
-    let (rows, row, height) = along(size.1, window.row, window.height);
+    let (columns, column, width) = along(size.0, traced.column, traced.width);
+    let (rows, row, height) = along(size.1, traced.row, traced.height);
     PictureSettings {
         size: Some((columns, rows)),
         spp: 1,

@@ -2,7 +2,12 @@
 
 use std::cell::RefCell;
 
-use super::{ray_start::ray_start, size::picture_size, tally, unevenness::Square};
+use super::{
+    ray_start::ray_start,
+    size::picture_size,
+    tally,
+    unevenness::{Square, doublings},
+};
 use crate::{
     bvh::Media,
     error::Result,
@@ -84,8 +89,8 @@ pub(crate) struct CameraPass<'a> {
     pub size: (u32, u32),
     pub window: Crop,
     spp: u32,
-    /// Samples of a pixel with uneven neighbours besides.
-    extra: u32,
+    /// Number of times that the samples of a pixel with uneven neighbours double at most.
+    doublings: u32,
     /// Direct light comes from shadow rays.
     direct: bool,
     pub(super) geometry: &'a Scene,
@@ -125,7 +130,7 @@ impl<'a> CameraPass<'a> {
             size,
             window: picture.window(size),
             spp: picture.spp,
-            extra: picture.extra_samples(),
+            doublings: picture.doublings(),
             direct: photons.mode.direct_by_rays(),
             geometry,
             finished: RefCell::default(),
@@ -181,20 +186,21 @@ impl<'a> CameraPass<'a> {
         stats: &mut Stats,
         progress: &dyn Progress,
     ) -> Result<Vec<Film>> {
-        let film = Film::new(self.size, self.window, self.spp).with_layers(&self.layers).with_extra_samples(self.extra);
+        let film = Film::new(self.size, self.window, self.spp).with_layers(&self.layers).with_doublings(self.doublings);
         let mut films = vec![film; gatherer.pictures()];
         self.for_each_tile(Some(stage), stats, progress, &mut |tile, stats| {
             let sums = self.light(tile, gatherer, &mut films, stats, progress)?;
-            let uneven = if self.extra > 0 { self.uneven_pixels(tile, &sums) } else { Vec::new() };
-            for extra in self.tracer.extra_tiles(tile, &uneven) {
+            if self.doublings == 0 {
+                return Ok(());
+            }
+            let doubled = self.doubled_pixels(tile, &sums);
+            for extra in self.tracer.extra_tiles(tile, &doubled) {
                 progress.check()?;
                 self.trace(&extra, stats)?;
                 self.light(&extra, gatherer, &mut films, stats, progress)?;
             }
-            let all = if self.extra > 0 { 0..tile.pixels } else { 0..0 };
-            for (pixel, at) in all.filter_map(|pixel| Some((pixel, self.tracer.pixel(tile, pixel)?))) {
-                let is_uneven = uneven.binary_search(&pixel).is_ok();
-                films.iter_mut().for_each(|film| film.weigh(at, is_uneven));
+            for (pixel, at) in (0..tile.pixels).filter_map(|pixel| Some((pixel, self.tracer.pixel(tile, pixel)?))) {
+                films.iter_mut().for_each(|film| film.weigh(at, doubled[pixel as usize]));
             }
             Ok(())
         })?;
@@ -263,16 +269,17 @@ impl<'a> CameraPass<'a> {
         Ok(sums)
     }
 
-    /// Numbers of the tile's pixels that need more samples, in order.
-    fn uneven_pixels(&self, tile: &Tile, sums: &[PixelSums]) -> Vec<u32> {
+    /// Number of times that the samples of each of the tile's pixels double.
+    fn doubled_pixels(&self, tile: &Tile, sums: &[PixelSums]) -> Vec<u32> {
         let (columns, rows) = tile.sides();
         let is_in = |column, row| tile.first_column + column < self.size.0 && tile.first_row + row < self.size.1;
         let of = |column, row| is_in(column, row).then(|| &sums[morton_number(column, row) as usize]);
         let square = Square { columns, rows, samples: tile.samples, sums: &of };
-        let numbers = square.uneven().into_iter().map(|(column, row)| morton_number(column, row));
-        let mut pixels: Vec<u32> = numbers.collect();
-        pixels.sort_unstable();
-        pixels
+        let mut doubled = vec![0; tile.pixels as usize];
+        for ((column, row), error) in square.uneven() {
+            doubled[morton_number(column, row) as usize] = doublings(error).min(self.doublings);
+        }
+        doubled
     }
 
     /// Adds direct light at the tile's visible points by shadow rays.
@@ -299,12 +306,10 @@ impl<'a> CameraPass<'a> {
         if chosen.is_empty() {
             return Ok(done);
         }
-        gather.choose(self.gpu, &chosen);
         // The rays of a pixel are those of all its samples.
-        let each = match tile.listed {
-            Some(_) => (gather.rays() * self.spp).div_ceil(self.spp + self.extra),
-            None => gather.rays(),
-        };
+        let samples = tile.listed.as_ref().map_or(self.spp, |listed| listed.samples);
+        let each = (gather.rays() * self.spp).div_ceil(samples);
+        gather.choose(self.gpu, &self.tracer, tile, (&chosen, each));
         let at_once = (self.tracer.room() as u32 / chosen.len() as u32).min(each);
         for first in (0..each).step_by(at_once as usize) {
             progress.check()?;

@@ -9,13 +9,10 @@ use std::array::from_fn;
 
 use crate::layout::{LAYER_ROWS, PixelSums};
 
-/// Squared relative error of the mean of its samples from which on a pixel is uneven.
+/// Squared relative error of the mean of its samples above which a pixel is uneven.
 const UNEVEN: f32 = 0.005;
 /// Radiance below which errors count less, as a fraction of that around.
 const DARK: f32 = 0.1;
-
-/// Pixels on each side of a pixel that tell whether it has more samples.
-pub const UNEVENNESS_REACH: u32 = 2;
 
 /// Steps to the neighbours of a pixel, in turn around it.
 const AROUND: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
@@ -31,8 +28,9 @@ pub struct Square<'a> {
 }
 
 impl Square<'_> {
-    /// Columns and rows of the pixels between uneven ones, row by row.
-    pub fn uneven(&self) -> Vec<(u32, u32)> {
+    /// Columns and rows of the pixels between uneven ones, row by row, with the error that these
+    /// have.
+    pub fn uneven(&self) -> Vec<((u32, u32), f32)> {
         let places = || (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| (column, row)));
         let spread = |(column, row)| (self.sums)(column, row).map(|sums| Spread::of(sums, self.samples));
         let spreads: Vec<Option<Spread>> = places().map(spread).collect();
@@ -40,20 +38,27 @@ impl Square<'_> {
             let (column, row) = (u32::try_from(column).ok()?, u32::try_from(row).ok()?);
             (column < self.columns && row < self.rows).then(|| spreads[(row * self.columns + column) as usize])?
         };
-        let is_uneven = |&(column, row): &(u32, u32)| {
-            let (column, row) = (column as i32, row as i32);
-            let near = AROUND.map(|(x, y)| at(column + x, row + y));
-            let far = AROUND.map(|(x, y)| at(column + 2 * x, row + 2 * y));
+        let error_through = |(column, row): (u32, u32)| {
+            let (x, y) = (column as i32, row as i32);
+            let near = AROUND.map(|(dx, dy)| at(x + dx, y + dy));
+            let far = AROUND.map(|(dx, dy)| at(x + 2 * dx, y + 2 * dy));
             let all = || near.iter().chain(&far).flatten();
             let dark = DARK * all().map(|one| one.light()).sum::<f32>() / all().count().max(1) as f32;
             let error = |one: &Spread| one.error(dark);
             // Few samples may miss what runs along the rim of the next pixel, but show it in the
             // one after that.
             let toward = |i: usize| Some(error(near[i].as_ref()?).max(far[i].as_ref().map_or(0.0, error)));
-            at(column, row).is_some() && through(&from_fn(toward)) > UNEVEN
+            at(x, y).map(|_| ((column, row), through(&from_fn(toward))))
         };
-        places().filter(is_uneven).collect()
+        places().filter_map(error_through).filter(|(_, error)| *error > UNEVEN).collect()
     }
+}
+
+/// Number of times that the samples of a pixel double by an error above [`UNEVEN`]: once, and again
+/// for each fourfold of it. Samples in proportion to the root of the squared error give the least
+/// sum of errors for their number.
+pub fn doublings(error: f32) -> u32 {
+    1 + (0.5 * (error / UNEVEN).log2()) as u32
 }
 
 /// Mean of a pixel's samples, and the variance of that mean.
@@ -111,7 +116,14 @@ mod tests {
     fn uneven(lit: impl Fn(u32, u32) -> u32) -> Vec<(u32, u32)> {
         let pixels: Vec<_> = (0..SIDE * SIDE).map(|i| pixel(lit(i % SIDE, i / SIDE))).collect();
         let sums = |column: u32, row: u32| Some(&pixels[(row * SIDE + column) as usize]);
-        Square { columns: SIDE, rows: SIDE, samples: 4, sums: &sums }.uneven()
+        let found = Square { columns: SIDE, rows: SIDE, samples: 4, sums: &sums }.uneven();
+        found.into_iter().map(|(place, _)| place).collect()
+    }
+
+    #[test]
+    fn samples_double_with_each_fourfold_error() {
+        let of = |times: f32| doublings(times * UNEVEN);
+        assert_eq!([1.01, 3.9, 4.1, 15.9, 16.1, 1e6].map(of), [1, 1, 2, 2, 3, 10]);
     }
 
     #[test]

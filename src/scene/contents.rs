@@ -162,12 +162,22 @@ impl Scene {
     }
 
     /// Adds a soft uniform sky ([`Environment::sky`]) to a scene without any light, and a warning.
-    /// A scene with a light or an environment keeps it, dark or not.
+    /// A scene with a light or an environment keeps it, dark or not; if all are dark, a warning
+    /// says so.
     pub fn add_default_light(&mut self) {
         if !self.names_light() {
             self.environment = Some(Environment::sky());
             self.warnings.push("no light: lit by a uniform sky of radiance 1".to_owned());
+        } else if self.is_dark() {
+            self.warnings.push("all lights are off: the picture is black".to_owned());
         }
+    }
+
+    /// Whether nothing gives light or shows a colour of its own, before textures.
+    fn is_dark(&self) -> bool {
+        self.lights.is_empty()
+            && self.environment.as_ref().is_none_or(Environment::is_dark)
+            && !self.uses_material(|_, material| material.emission != Vec3::ZERO || material.unlit)
     }
 
     /// Provenance of a picture, for the metadata of its file.

@@ -141,8 +141,14 @@ impl Scene {
             materials: self.materials.iter().map(|material| MaterialInfo::new(material, &self.images)).collect(),
             images: describe_materials::images(self),
             variants: self.variants.clone(),
-            notes: self.warnings.clone(),
+            notes: self.warnings.iter().cloned().chain(self.dark_emitters()).collect(),
         }
+    }
+
+    /// What rendering would say of emitters whose textures leave no light.
+    fn dark_emitters(&self) -> impl Iterator<Item = String> {
+        let dark = self.emitters().into_iter().filter(|emitter| emitter.power == [0.0; 3]);
+        dark.map(|emitter| format!("material {:?} is black wherever it is seen: it gives no light", emitter.name))
     }
 
     fn stored_triangles(&self) -> usize {

@@ -311,7 +311,7 @@ impl Material {
     }
 
     /// Whether the surface has more than a base: clear coat, sheen, anisotropy, iridescence or
-    /// diffuse transmission. Of these glass has iridescence alone.
+    /// diffuse transmission. Of these glass has the clear coat and iridescence.
     #[must_use]
     pub fn is_finished(&self) -> bool {
         let is_finished = self.clearcoat > 0.0
@@ -320,7 +320,7 @@ impl Material {
             || self.iridescence > 0.0
             || self.diffuse_transmission > 0.0;
         let is_opaque = !self.surface.transmits() || self.transmission < 1.0;
-        !self.unlit && ((is_finished && is_opaque) || self.iridescence > 0.0)
+        !self.unlit && ((is_finished && is_opaque) || self.clearcoat > 0.0 || self.iridescence > 0.0)
     }
 
     /// Medium inside the solid that the surface bounds.

@@ -23,4 +23,4 @@ pub use pixel_grid::PixelGrid;
 pub use quality::Quality;
 pub use range::{Number, Range};
 pub use render_settings::Settings;
-pub(crate) use render_settings::{check_samples, first_extra_sample};
+pub(crate) use render_settings::{check_samples, first_extra_sample, square_bits};

@@ -11,6 +11,10 @@ use super::{
 };
 use crate::error::Result;
 
+/// Area of a closer estimate, relative to that of a pass. The bias of even curvature is in
+/// proportion to it, that of edges, as the root of the mean square over pixels, to its fourth root.
+const CLOSER_AREA: f32 = 1.0 / 16.0;
+
 /// Settings that all passes of a picture have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -58,17 +62,13 @@ impl PassSettings {
         }
     }
 
-    /// Estimate of a pass with less bias, for few pixels, and the ratio of the bias of `shrunken`
-    /// to the difference that both have. With final gathering, each point has rays of its own and
-    /// caustics an area of a sixteenth, so that little bias is left. By photons alone, the radius
-    /// is half: the bias of even curvature is 4/3 of the difference, that of edges twice it, as
-    /// root of the mean square over pixels; the geometric mean of both is off by 1.22 at most.
+    /// Estimate of a pass with less bias, for few pixels: by a sixteenth of the area, and of rays
+    /// of final gathering without records and cells.
     #[must_use]
-    pub fn closer(shrunken: &EstimateSettings, gathers_finally: bool) -> (EstimateSettings, f32) {
-        let (area, ratio) = if gathers_finally { (1.0 / 16.0, 1.0) } else { (0.25, (8.0_f32 / 3.0).sqrt()) };
-        let narrow = |radius: f32| radius * f32::sqrt(area);
-        let neighbors = (shrunken.neighbors as f32 * area) as u32;
-        let estimate = EstimateSettings {
+    pub fn closer(shrunken: &EstimateSettings) -> EstimateSettings {
+        let narrow = |radius: f32| radius * f32::sqrt(CLOSER_AREA);
+        let neighbors = (shrunken.neighbors as f32 * CLOSER_AREA) as u32;
+        EstimateSettings {
             neighbors: neighbors.max(Self::MIN_NEIGHBORS.min(shrunken.neighbors)),
             radius: shrunken.radius.map(narrow),
             max_radius: shrunken.max_radius.map(narrow),
@@ -76,8 +76,7 @@ impl PassSettings {
             irradiance_cells: 0.0,
             share_reach: 0.0,
             ..shrunken.clone()
-        };
-        (estimate, ratio)
+        }
     }
 
     /// Squared radius of the estimate of pass `index`, relative to that of pass 0: the shrinkage,

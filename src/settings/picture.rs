@@ -45,9 +45,9 @@ pub struct PictureSettings {
     /// Camera samples per pixel, in [`Self::SPP`]. Many light samples or rays of final gathering
     /// lower the maximum: see [`super::Settings::check`].
     pub spp: u32,
-    /// Samples of a pixel whose neighbours are uneven, if these are more than [`Self::spp`]: edges,
-    /// penumbrae. `None`: every pixel has [`Self::spp`]. Without an effect beyond
-    /// [`Self::MOST_EVEN`] samples, or below two.
+    /// Maximum number of samples of a pixel whose neighbours are uneven: edges, penumbrae. Samples
+    /// double from [`Self::spp`] on as long as they are no more. `None`: every pixel has
+    /// [`Self::spp`]. Without an effect beyond [`Self::MOST_EVEN`] samples, or below two.
     pub max_spp: Option<u32>,
     /// Filter that weighs the light around a pixel's centre.
     pub pixel_filter: PixelFilter,
@@ -88,6 +88,8 @@ impl PictureSettings {
     pub const SPP: Range<u32> = Range::at_least(1);
     /// Samples of every pixel beyond which none has more.
     pub const MOST_EVEN: u32 = 256;
+    /// Maximum of [`Self::doublings`].
+    pub const MOST_DOUBLINGS: u32 = 8;
     /// Range of [`Self::aperture`], metres.
     pub const APERTURE: Range<f32> = Range::at_least(0.0);
     /// Range of [`Self::focus`], metres.
@@ -101,11 +103,17 @@ impl PictureSettings {
         self.crop.unwrap_or(Crop { column: 0, row: 0, width, height })
     }
 
-    /// Samples that a pixel has besides those of every pixel, where its neighbours are uneven.
+    /// Number of times that the samples of a pixel double at most, where its neighbours are uneven.
+    #[must_use]
+    pub fn doublings(&self) -> u32 {
+        let can_tell = (2..=Self::MOST_EVEN).contains(&self.spp);
+        self.max_spp.filter(|_| can_tell).map_or(0, |most| (most / self.spp).max(1).ilog2()).min(Self::MOST_DOUBLINGS)
+    }
+
+    /// Samples that a pixel has at most besides those of every pixel.
     #[must_use]
     pub fn extra_samples(&self) -> u32 {
-        let can_tell = (2..=Self::MOST_EVEN).contains(&self.spp);
-        self.max_spp.filter(|_| can_tell).map_or(0, |most| most.saturating_sub(self.spp))
+        (self.spp << self.doublings()) - self.spp
     }
 
     /// Inverse CDF of the pixel filter, see [`PixelFilter::offsets`]. A single sample with the box

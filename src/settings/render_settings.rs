@@ -53,6 +53,9 @@ impl Settings {
     }
 }
 
+/// Squares of 256 x 256 pixels: further apart, no eye compares them.
+const MOST_SQUARE_BITS: u32 = 8;
+
 /// Checks that 32-bit indices of the numbers for sampling suffice for a picture. They count over
 /// all samples of a pixel and, within a sample, over its four paths, light samples or rays of final
 /// gathering.
@@ -82,15 +85,27 @@ pub(super) fn check_sample_count(
 
 /// Maximum number of samples of a pixel. Those that only some pixels have are as many at most.
 pub(super) fn most_samples(photons: &PhotonSettings, picture: &PictureSettings) -> u64 {
-    let each = picture.light_samples.max(photons.final_gather).max(4);
-    let all = (1_u64 << 32) / u64::from(each);
+    let all = (1_u64 << 32) / numbers_of_sample(photons, picture);
     if picture.extra_samples() > 0 { first_extra(all) } else { all }
+}
+
+/// Indices of numbers that a sample takes, a power of two.
+fn numbers_of_sample(photons: &PhotonSettings, picture: &PictureSettings) -> u64 {
+    u64::from(picture.light_samples.max(photons.final_gather).max(4)).next_power_of_two()
 }
 
 /// Index of the first sample that only some pixels have: a power of two, so that these samples are
 /// well distributed among themselves.
 pub(crate) fn first_extra_sample(photons: &PhotonSettings, picture: &PictureSettings) -> u32 {
     if picture.extra_samples() > 0 { most_samples(photons, picture) as u32 } else { 0 }
+}
+
+/// Binary logarithm of the side of a square of pixels that share a set of numbers, 0 to
+/// [`MOST_SQUARE_BITS`]: as wide as 32-bit indices allow.
+pub(crate) fn square_bits(photons: &PhotonSettings, picture: &PictureSettings) -> u32 {
+    let of_pixel = numbers_of_sample(photons, picture) * u64::from(picture.spp).next_power_of_two();
+    let pixels = ((1_u64 << 32) / of_pixel).max(1);
+    (pixels.ilog2() / 2).min(MOST_SQUARE_BITS)
 }
 
 /// The largest power of two of which there are two.

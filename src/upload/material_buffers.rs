@@ -107,7 +107,8 @@ fn is_layered(material: &Material) -> bool {
 fn is_rough(material: &Material) -> bool {
     let has_gloss = !matches!(material.surface, Surface::Diffuse { .. });
     let is_opaque = !material.surface.transmits() || material.transmission < 1.0;
-    (has_gloss && material.roughness >= SHARP_ROUGHNESS) || (material.is_finished() && is_opaque)
+    let is_rough = (has_gloss && material.roughness >= SHARP_ROUGHNESS) || material.clearcoat > 0.0;
+    is_rough || (material.is_finished() && is_opaque)
 }
 
 /// The attributes of the triangles, in the order of the corners as they are now.

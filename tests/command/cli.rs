@@ -389,6 +389,12 @@ fn light_of_nothing_gives_a_black_picture() {
     let path = |name: &str| folder.path().join(name);
     let dark = SCENE.replace("POSITIONS", TRIANGLE).replace(r#""intensity": 5"#, r#""intensity": 0"#);
     fs::write(path("lamp.gltf"), dark).expect("can be written");
+    let lit = fs::read_to_string(path("dark.gltf")).expect("a scene");
+    let strength = r#""extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 0}}"#;
+    let ember = lit
+        .replace(r#"{"POSITION": 0}"#, r#"{"POSITION": 0}, "material": 0"#)
+        .replace(r#""meshes""#, &format!(r#""materials": [{{"emissiveFactor": [1, 1, 1], {strength}}}], "meshes""#));
+    fs::write(path("ember.gltf"), ember).expect("can be written");
     fs::write(path("sky.hdr"), b"#?RADIANCE\n\n-Y 1 +X 1\n\x80\x80\x80\x81").expect("can be written");
     fs::write(path("black.hdr"), b"#?RADIANCE\n\n-Y 1 +X 1\n\0\0\0\0").expect("can be written");
     let brightest = |words: &str| {
@@ -398,16 +404,23 @@ fn light_of_nothing_gives_a_black_picture() {
         (frame.radiance().as_flattened().iter().copied().fold(0.0, f32::max), ended.stderr)
     };
     for (words, said) in [
-        ("lamp.gltf", r#"light "light 0" has no intensity"#),
+        ("lamp.gltf", r#"light "light 0" has no intensity: it gives no light"#),
+        ("lamp.gltf", "all lights are off: the picture is black"),
+        ("ember.gltf", r#"material "material 0": emissive strength 0 gives no light"#),
         ("lamp.gltf --mode photons --emission unaimed", "has no intensity"),
-        ("dark.gltf --background 0,0,0", "wrote out.exr"),
-        ("dark.gltf --env sky.hdr --env-strength 0", "wrote out.exr"),
+        ("dark.gltf --background 0,0,0", "all lights are off"),
+        ("dark.gltf --env sky.hdr --env-strength 0", "all lights are off"),
         ("dark.gltf --env black.hdr", "black.hdr: is black: it gives no light"),
     ] {
         let (radiance, stderr) = brightest(words);
         assert_eq!(radiance, 0.0, "{words}");
         assert!(stderr.contains(said) && !stderr.contains("sky of radiance"), "{words}: {stderr}");
+        if !words.contains("--") {
+            let info = caustica(folder.path(), &format!("info {words}")).stdout;
+            assert!(info.contains(said) && info.contains("all lights are off"), "info {words}: {info}");
+        }
     }
+    assert!(!caustica(folder.path(), "info scene.gltf").stdout.contains("lights are off"), "control");
     let (radiance, stderr) = brightest("dark.gltf");
     assert!(radiance > 0.9 && stderr.contains("no light: lit by a uniform sky"), "control: {radiance}, {stderr}");
     // Light that the surface reflects comes on top of the background.

@@ -8,6 +8,8 @@
 //! | reciprocity | flux one way is radiance the other way | radiance both ways |
 //! | energy | what is reflected and what goes through are the integrals in f64, at most 1 together | another index |
 //! | sheet | loses what separable masking does, and reflects as a pane | height-correlated masking; one face |
+//! | film | gives its colours what glass without it reflects and lets through together | no film |
+//! | coat and normals | flux one way is radiance the other way, also with a film, under a coat and with a mapped normal | another normal |
 
 use glam::{DVec3, Vec3};
 
@@ -28,11 +30,18 @@ struct Glass {
     thin: bool,
     /// Whether values are those of flux.
     flux: bool,
+    /// Sum of [`FILM`], [`COAT`] and one of [`LEANING`].
+    has: u8,
 }
+
+const FILM: u8 = 2;
+const COAT: u8 = 4;
+/// Shading normals that lean to +x and to -x.
+const LEANING: [u8; 2] = [8, 16];
 
 impl Glass {
     fn solid(roughness: f32, eta: f32) -> Self {
-        Self { roughness, eta, thin: false, flux: false }
+        Self { roughness, eta, thin: false, flux: false, has: 0 }
     }
 
     fn facets(self) -> Facets {
@@ -41,8 +50,8 @@ impl Glass {
 
     fn row(self, a: Vec3, view: DVec3) -> Row {
         let eta = if self.thin { -self.eta } else { self.eta };
-        let flux = if self.flux { 1.0 } else { 0.0 };
-        [[a.x, a.y, a.z, self.roughness], [view.x as f32, view.z as f32, eta, flux]]
+        let has = f32::from(self.has | u8::from(self.flux));
+        [[a.x, a.y, a.z, self.roughness], [view.x as f32, view.z as f32, eta, has]]
     }
 
     fn values(self, view: DVec3, directions: &[Vec3]) -> Vec<[f32; 4]> {
@@ -152,7 +161,8 @@ fn samples_against_density(drawn: Glass, glass: Glass, v: DVec3) -> (Deviate, f6
 fn rough_glass_directions_follow_their_density() {
     let sheets = [0.1, 0.6].map(|r| (Glass { thin: true, ..Glass::solid(r, 1.5) }, 0.5));
     let solids = cases().filter(|(_, eta, _)| *eta != 1.2).map(|(r, eta, mu)| (Glass::solid(r, eta), mu));
-    for (glass, mu) in solids.chain(sheets) {
+    let more = [FILM, COAT, FILM | COAT].map(|has| (Glass { has, ..Glass::solid(0.3, 1.5) }, 0.8));
+    for (glass, mu) in solids.chain(sheets).chain(more) {
         let (found, whole) = samples_against_density(glass, glass, view(mu));
         assert!(found.fits(), "{glass:?}, cosine {mu}: {found:?}, the density integrates to {whole}");
         assert!(whole < 1.001 && whole > 0.5, "{glass:?}, cosine {mu}: the density integrates to {whole}");
@@ -255,6 +265,57 @@ fn rough_glass_is_finite_at_extremes() {
                 let sound = |v: &[f32; 4]| v.iter().all(|x| x.is_finite() && *x >= 0.0);
                 assert!(values.iter().all(sound), "{glass:?}, {mu}: {values:?}");
             }
+        }
+    }
+}
+
+#[test]
+fn a_film_divides_light_between_both_sides() {
+    for (roughness, eta, mu) in [(0.1, 1.5, 0.9), (0.4, 1.5, 0.5), (0.3, 1.0 / 1.5, 0.95)] {
+        let bare = Glass { flux: true, ..Glass::solid(roughness, eta) };
+        for thin in [false, true] {
+            let bare = Glass { thin, eta: if thin { 1.5 } else { eta }, ..bare };
+            let [all, _, reflected] = bare.means(view(mu));
+            let [filmed, half, colour] = Glass { has: FILM, ..bare }.means(view(mu));
+            // The channels have other colours; none gains or loses.
+            assert!((filmed - all).abs() < 0.02, "{bare:?}, {mu}: {filmed} in all for {all}");
+            assert!(filmed < 1.003 && half < filmed, "{bare:?}, {mu}: {filmed}");
+            assert!((colour - reflected).abs() > 0.01, "control: {bare:?}, {mu}: {colour} with and without a film");
+        }
+    }
+}
+
+/// Largest relative difference between flux of `there` and radiance of `back` the other way.
+fn asymmetry(there: Glass, back: Glass, v: DVec3) -> f64 {
+    let directions = there.samples(v, even_numbers(EVEN / 4));
+    let directions: Vec<Vec3> = directions.into_iter().filter(|l| l.y.abs() > 0.15).collect();
+    let found = there.values(v, &directions);
+    // The side of the viewer is up.
+    let turned = |w: Vec3, l: Vec3| if l.y < 0.0 { Vec3::new(w.x, -w.y, w.z) } else { w };
+    let of = |l: &Vec3| {
+        // Seen from below the normal leans the other way, and so does the index.
+        let glass = if l.y < 0.0 { back } else { Glass { has: there.has, eta: there.eta, ..back } };
+        glass.row(turned(v.as_vec3(), *l), turned(*l, *l).as_dvec3())
+    };
+    let others = Probe::new("probe_rough_dielectric_values").run(&directions.iter().map(of).collect::<Vec<_>>());
+    let of = |((l, there), back): ((&Vec3, &[f32; 4]), &[f32; 4])| {
+        let (there, back) = (f64::from(there[0]) * v.y, f64::from(back[0]) * f64::from(l.y.abs()));
+        if there.max(back) < 1e-3 { 0.0 } else { (there - back).abs() / there.max(back) }
+    };
+    directions.iter().zip(&found).zip(&others).map(of).fold(0.0, f64::max)
+}
+
+#[test]
+fn coats_films_and_mapped_normals_keep_both_ways_equal() {
+    for has in [FILM, COAT, LEANING[0], FILM | COAT | LEANING[0]] {
+        for eta in [1.5, 1.0 / 1.5] {
+            let there = Glass { flux: true, has, ..Glass::solid(0.4, eta) };
+            let leans = if has & LEANING[0] == 0 { 0 } else { LEANING[1] };
+            let back = Glass { has: (has & !LEANING[0]) | leans, ..Glass::solid(0.4, 1.0 / eta) };
+            let found = asymmetry(there, back, view(0.8));
+            assert!(found < 3e-2, "{there:?}: {found}");
+            let other = Glass { has: back.has ^ LEANING[1], ..back };
+            assert!(asymmetry(there, other, view(0.8)) > 0.1, "control: another normal than that of {there:?}");
         }
     }
 }

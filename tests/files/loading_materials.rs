@@ -1,9 +1,9 @@
 //! Materials: what their properties and extensions become.
 
 use caustica::scene::{Alpha, LoadOptions, Material, Surface};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use serde_json::{Value, json};
-use support::gltf::{lambert, load, loaded, message, read_with, triangle};
+use support::gltf::{add_accessor, floats, lambert, load, loaded, message, read_with, triangle};
 
 /// The material of a triangle, and the notes on it.
 fn read(material: Value) -> (Material, Vec<String>) {
@@ -208,6 +208,31 @@ fn clearcoat_lies_above_any_surface() {
 }
 
 #[test]
+fn anisotropy_takes_the_tangents_of_the_file() {
+    let read = |attributes: &[(&str, &str, &[f32])]| {
+        let mut gltf = triangle();
+        gltf["materials"][0] = with(json!({}), json!({ "KHR_materials_anisotropy": { "anisotropyStrength": 0.5 } }));
+        for (name, kind, of_vertex) in attributes {
+            let accessor = add_accessor(&mut gltf, &floats(&of_vertex.repeat(3)), 5126, 3, kind);
+            gltf["meshes"][0]["primitives"][0]["attributes"][*name] = accessor.into();
+        }
+        loaded(&gltf)
+    };
+    let normal: (&str, &str, &[f32]) = ("NORMAL", "VEC3", &[0.0, 0.0, 1.0]);
+    let tangent: (&str, &str, &[f32]) = ("TANGENT", "VEC4", &[0.0, 1.0, 0.0, -1.0]);
+    let scene = read(&[normal, tangent]);
+    assert_eq!((scene.materials[0].anisotropy, scene.warnings.len()), (0.5, 0), "{:?}", scene.warnings);
+    assert_eq!(scene.attributes[0].tangents, [Vec4::new(0.0, 1.0, 0.0, -1.0); 3], "as they are in the file");
+    // Without normals those of the file count for nothing (glTF 2.0, 3.7.2.1).
+    for attributes in [&[normal][..], &[tangent]] {
+        let scene = read(attributes);
+        let said = "meshes[0] has no TEXCOORD_0 and no TANGENT: material \"m\" is there without what needs it";
+        assert_eq!((scene.materials[0].anisotropy, scene.attributes.len()), (0.0, 0), "control");
+        assert_eq!(scene.warnings, [said]);
+    }
+}
+
+#[test]
 fn what_lies_above_a_base_is_read() {
     let mut gltf = triangle();
     let extensions = json!({
@@ -224,12 +249,12 @@ fn what_lies_above_a_base_is_read() {
     let scene = loaded(&gltf);
     for material in &scene.materials {
         assert_eq!((material.sheen_color, material.sheen_roughness), (Vec3::new(0.0, 0.5, 1.0), 0.25));
-        assert_eq!((material.anisotropy, material.anisotropy_rotation), (0.5, -1.0));
+        assert_eq!((material.anisotropy, material.anisotropy_rotation), (0.0, -1.0), "it has no direction");
         assert_eq!((material.iridescence, material.iridescence_ior), (0.75, 1.3));
         assert_eq!(material.iridescence_thickness, [200.0, 400.0]);
         assert_eq!((material.diffuse_transmission, material.diffuse_transmission_color), (0.5, Vec3::X));
     }
-    let said = "meshes[0] has no TEXCOORD_0: material \"m\" is there without what needs it";
+    let said = "meshes[0] has no TEXCOORD_0 and no TANGENT: material \"m\" is there without what needs it";
     assert_eq!(scene.warnings, [said], "the direction of the anisotropy");
     // Extensions that have no effect are not named.
     let without = json!({ "KHR_materials_sheen": {}, "KHR_materials_anisotropy": {}, "KHR_materials_iridescence": {},

@@ -154,7 +154,8 @@ fn a_scene_without_light_gets_a_sky_and_one_with_light_keeps_it() {
     asked.environment = Some(Environment::uniform(Vec3::ZERO));
     asked.add_default_light();
     assert!(asked.check_renderable().is_ok());
-    assert_eq!((asked.environment, asked.warnings), (Some(Environment::uniform(Vec3::ZERO)), vec![]));
+    let off = "all lights are off: the picture is black".to_owned();
+    assert_eq!((asked.environment, asked.warnings), (Some(Environment::uniform(Vec3::ZERO)), vec![off]));
     gltf["materials"][0]["emissiveFactor"] = json!([0, 0, 0.5]);
     let mut glowing = loaded(&gltf);
     glowing.add_default_light();

@@ -16,18 +16,19 @@ fn a_light_of_nothing_is_no_reason_for_a_sky() {
         assert!(scene.check_renderable().is_ok());
         (scene.environment.map(|environment| environment.name), scene.warnings)
     };
+    let off = || "all lights are off: the picture is black".to_owned();
     for dark in [json!({ "type": "spot", "intensity": 0 }), json!({ "type": "point", "color": [0, 0, 0] })] {
         let mut gltf = triangle();
         gltf["extensions"]["KHR_lights_punctual"]["lights"][0] = dark;
         // Nothing depends on where it is.
         gltf["nodes"][1]["scale"] = json!([0, 0, 0]);
-        assert_eq!(said(&gltf), (None, vec![r#"light "lamp" has no intensity"#.to_owned()]));
+        assert_eq!(said(&gltf), (None, vec![r#"light "lamp" has no intensity: it gives no light"#.to_owned(), off()]));
     }
     let mut gltf = triangle();
     gltf["scenes"][0]["nodes"] = json!([0, 2]);
     gltf["materials"][0]["emissiveFactor"] = json!([1, 0.5, 0]);
     gltf["materials"][0]["extensions"]["KHR_materials_emissive_strength"] = json!({ "emissiveStrength": 0 });
-    assert_eq!(said(&gltf), (None, vec![r#"material "paint": emissive strength 0 gives no light"#.to_owned()]));
+    assert_eq!(said(&gltf), (None, vec![r#"material "paint": emissive strength 0 gives no light"#.to_owned(), off()]));
     // Controls: a factor of 0, which many exporters write, names no light, nor does a material that
     // nothing has, nor a light that no node has.
     let sky = (Some("default sky".to_owned()), vec!["no light: lit by a uniform sky of radiance 1".to_owned()]);

@@ -2,11 +2,13 @@
 
 mod analytic;
 mod contacts;
+mod crops;
 mod extremes;
 mod few_photons;
 mod flat_surfaces;
 mod instances;
 mod lights;
+mod material_references;
 mod modes;
 mod narrow_things;
 mod pixels;
@@ -14,6 +16,7 @@ mod references;
 mod refraction;
 mod seen;
 mod sessions;
+mod smooth_shading;
 mod solids;
 mod spaced_gathering;
 mod transport;

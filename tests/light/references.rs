@@ -1,4 +1,4 @@
-//! The references at 256 x 256 and 128 x 128, made by other renderers; see
+//! The references S1 and S2 at 256 x 256 and 128 x 128, made by other renderers; see
 //! `tests/references/README.md`.
 //!
 //! | test | claim | negative control |

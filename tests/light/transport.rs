@@ -55,6 +55,7 @@ fn lobes() -> Vec<(&'static str, Material)> {
         ("clear coat over sheen", cloth),
         ("leaf", leaf),
         ("rough glass", rough_glass()),
+        ("coated glass", Material { clearcoat: 1.0, clearcoat_roughness: 0.1, ..Material::new("", glass()) }),
         ("prism", Material { dispersion: 2.0, ..Material::new("prism", glass()) }),
     ]
 }
@@ -90,6 +91,8 @@ fn every_lobe_reflects_what_it_gets() {
         ("rough metal", metal(1.0), 0.985, 1.015),
         ("film", Material { iridescence: 1.0, ..metal(0.3) }, 0.99, 1.01),
         ("film on glass", Material { iridescence: 1.0, ..Material::new("", glass()) }, 0.98, 1.02),
+        ("film on rough glass", Material { iridescence: 1.0, ..rough_glass() }, 0.95, 1.0),
+        ("glass under a clear coat", Material { clearcoat: 1.0, ..Material::new("", glass()) }, 0.98, 1.01),
         ("glass", Material { dispersion: 2.0, ..Material::new("", glass()) }, 0.98, 1.02),
         ("rough glass", rough_glass(), 0.95, 1.0),
         ("white under a coat", Material { surface: white_coated(), roughness: 0.5, ..coated(0.5) }, 0.985, 1.02),

@@ -45,15 +45,15 @@ fn uneven_pixels_have_the_error_of_many_samples() {
     const SIDE: u32 = 128;
     let scene = room();
     let of = |spp: u32, most: u32| render_scene(&scene, &sampled(SIDE, most).with(|s| s.picture.spp = spp));
-    let (even, more, many) = (of(4, 4), of(4, 20), of(64, 64));
+    let (even, more, many) = (of(4, 4), of(4, 64), of(64, 64));
     assert_eq!(even.stats.extra_samples, 0);
-    let part = more.stats.extra_samples as f64 / f64::from(SIDE * SIDE * 16);
-    assert!((0.02..0.5).contains(&part), "{part} of the pixels have more samples");
+    let extra = more.stats.extra_samples as f64 / f64::from(SIDE * SIDE);
+    assert!((0.3..12.0).contains(&extra), "{extra} samples more in the mean");
     let error = |render: &caustica::renderer::Render| rel_mse(render.frame.radiance(), many.frame.radiance(), None);
-    println!("relMSE {:.5} with more samples in {part:.2} of the pixels, {:.5} without", error(&more), error(&even));
+    println!("relMSE {:.5} with {extra:.2} samples more in the mean, {:.5} without", error(&more), error(&even));
     assert!(error(&more) < 0.35 * error(&even), "{} and {}", error(&more), error(&even));
     // Control: as many samples as those have in the mean, but in all pixels.
-    let spread = of((4.0 + 16.0 * part).ceil() as u32, 0);
+    let spread = of((4.0 + extra).ceil() as u32, 0);
     assert!(error(&spread) > 1.5 * error(&more), "control: {}", error(&spread));
 }
 
@@ -97,9 +97,7 @@ fn small_lights_keep_their_mean() {
 
 #[test]
 fn a_crop_has_the_bits_of_the_whole() {
-    let mut scene = room();
-    // Rays of points without records draw numbers by their place among those of the part.
-    scene.spheres.truncate(1);
+    let scene = room();
     let settings = sampled(150, 20).with(|s| {
         s.photons.mode = Mode::Hybrid;
         (s.photons.global, s.photons.caustic, s.photons.final_gather) = (5000, 5000, 8);

@@ -13,7 +13,7 @@ const MAX_PATCHES: usize = 16;
 /// Radiance of a bright end, in units of the mean over all rays.
 const BRIGHT: f64 = 8.0;
 /// Fraction of the rays' variance that bright ends must cause for any ray to be aimed.
-const LEAST_PART: f64 = 0.7;
+const LEAST_PART: f64 = 0.3;
 /// Widths of cells that are tried, in units of the narrowest: few ends are spread over few wide
 /// cells.
 const WIDTHS: [f32; 4] = [1.0, 2.0, 4.0, 8.0];

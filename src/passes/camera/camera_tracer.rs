@@ -19,7 +19,7 @@ use crate::{
         wavefront::{Step, Wavefront},
     },
     scene::Camera,
-    settings::{Crop, PhotonSettings, PictureSettings, PixelGrid, first_extra_sample},
+    settings::{Crop, PhotonSettings, PictureSettings, PixelGrid, first_extra_sample, square_bits},
     upload::{SceneBuffers, sampler_constant},
 };
 
@@ -29,8 +29,6 @@ const BRANCHES: u32 = 4;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
-/// Odd factor of the index of a sample that gives a seed (the golden ratio, as a fraction of 2^32).
-const OTHER_SEEDS: u32 = 0x9e37_79b9;
 /// Surfaces before the near plane that a ray passes at most.
 const MAX_UNSEEN: u32 = 1 << 12;
 
@@ -71,7 +69,7 @@ impl CameraKernels {
 #[derive(Debug)]
 pub struct CameraTracer {
     kernels: CameraKernels,
-    wavefront: Wavefront,
+    pub(super) wavefront: Wavefront,
     /// A [`VisiblePoint`] per path slot; some slots have no point.
     pub points: Buffer,
     /// Radiance that reaches the camera from each visible point, `vec4f`.
@@ -88,8 +86,8 @@ pub struct CameraTracer {
     pub(super) window: Crop,
     /// Index of the first sample beyond those that every pixel has.
     pub(super) first_extra: u32,
-    /// Samples of a pixel that has more than every one.
-    pub(super) extra: u32,
+    /// Samples of a pixel at most besides those of every pixel.
+    extra: u32,
     /// Maximum number of visible points of a tile, without its margin.
     pub(super) room: u64,
 }
@@ -120,9 +118,10 @@ impl CameraTracer {
         let margin = if shares { margin_cells(tile_sides(&view, room)) * MARGIN_SAMPLES } else { 0 };
         let samples = room / u64::from(branches) + u64::from(margin);
         let slots = samples * u64::from(branches);
+        let keys = if photons.final_gather > 0 { room } else { 0 };
         Ok(Self {
             kernels: CameraKernels::new(gpu, scene, photons, picture.light_samples),
-            wavefront: Wavefront::new(gpu, scene, "camera", (slots, room / u64::from(branches)))?,
+            wavefront: Wavefront::new(gpu, scene, "camera", (slots, room / u64::from(branches)), keys)?,
             points: gpu.storage::<VisiblePoint>("visible points", slots)?,
             radiance: gpu.storage::<[f32; 4]>("radiance", slots)?,
             gathered: gpu.storage::<Gathered>("gathered", room)?,
@@ -132,7 +131,7 @@ impl CameraTracer {
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
             first_extra: first_extra_sample(photons, picture),
             extra: picture.extra_samples(),
-            view: CameraTile { margin, ..view },
+            view: CameraTile { margin, square_bits: square_bits(photons, picture), ..view },
             window: picture.window(size),
             room,
         })
@@ -170,14 +169,11 @@ impl CameraTracer {
         Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, first_extra, view, ..self })
     }
 
-    /// Leaves out all pixels but those of a grid. Tiles and data window count its columns and rows.
-    /// Random numbers are none of the picture's, nor of those of other passes: points of one
-    /// sequence make the errors of its parts opposite to each other.
+    /// Leaves out all pixels but those of a grid. Tiles and data window count its cells.
     #[must_use]
     pub fn at_grid(self, grid: PixelGrid) -> Self {
-        let seed = self.view.seed ^ self.view.first_sample.wrapping_add(1).wrapping_mul(OTHER_SEEDS);
-        let (left_out, first_kept) = (grid.every() - 1, grid.first());
-        let view = CameraTile { seed, left_out, first_kept, margin: 0, ..self.view };
+        let (left_out, shift) = (grid.every() - 1, grid.shift());
+        let view = CameraTile { left_out, shift, margin: 0, ..self.view };
         Self { view, window: grid.window(self.window), ..self }
     }
 
@@ -367,7 +363,7 @@ impl CameraTracer {
             pixels: tile.pixels,
             first_sample: tile.first_sample,
             samples: tile.samples,
-            listed: tile.listed.as_ref().map_or(0, |listed| listed.before + 1),
+            listed: tile.listed.is_some().into(),
             listed_at: self.wavefront.lists.pixels_at(),
             margin: if tile.listed.is_none() { self.view.margin } else { 0 },
             ..self.view

@@ -6,6 +6,7 @@ use super::{
     bright_places::BrightPlaces,
     camera_tracer::CameraTracer,
     direct_light::DirectLighting,
+    ray_keys::RaySets,
     tile::{StepCount, Tile},
     waiting_points::WaitingPoints,
 };
@@ -49,8 +50,8 @@ impl FinalKernels {
 pub struct FinalGather {
     kernels: FinalKernels,
     rays: u32,
-    /// Whether the rays of all points are one set of numbers.
-    joint: bool,
+    /// The sets of numbers that points share.
+    sets: RaySets,
     /// Indices of the points that rays start from.
     chosen: Buffer,
     /// Ends of rays: a [`VisiblePoint`] per ray, in the order of the chosen points. Its weight
@@ -98,7 +99,7 @@ impl FinalGather {
         Ok(Self {
             kernels: FinalKernels::new(gpu, scene, sampler),
             rays,
-            joint: false,
+            sets: RaySets::default(),
             chosen: gpu.storage::<u32>("points of final gathering", tracer.room())?,
             ends: gpu.storage::<VisiblePoint>("ends of final-gather rays", tracer.room())?,
             found: gpu.storage::<[f32; 4]>("light of final-gather rays", tracer.room())?,
@@ -120,7 +121,7 @@ impl FinalGather {
     /// spread as evenly as those of one point.
     #[must_use]
     pub fn joint(self) -> Self {
-        Self { joint: true, ..self }
+        Self { sets: RaySets::OfPicture, ..self }
     }
 
     /// Aims a part of the rays at bright patches.
@@ -141,9 +142,10 @@ impl FinalGather {
         self.rays
     }
 
-    /// Chooses the points of the tile that rays start from.
-    pub fn choose(&self, gpu: &Gpu, chosen: &[u32]) {
+    /// Chooses the points of the tile that rays start from, so many from each.
+    pub fn choose(&self, gpu: &Gpu, tracer: &CameraTracer, tile: &Tile, (chosen, each): (&[u32], u32)) {
         gpu.write(&self.chosen, 0, chosen);
+        tracer.wavefront.lists.write_keys(gpu, &tracer.ray_keys(tile, chosen, each, self.sets));
     }
 
     /// Traces rays of the chosen points to the first diffuse surface.
@@ -159,11 +161,10 @@ impl FinalGather {
         rays: FinalRays,
     ) -> Result<StepCount> {
         let view = tracer.tile_view(tile);
-        let step = self.step(gpu, rays);
-        let camera = gpu.uniform("camera tile", &view);
-        let own = gpu.uniform("final gather tile", &rays_as_samples(&view, rays));
+        let step = self.step(gpu, view.seed, rays);
+        let own = gpu.uniform("final gather tile", &rays_as_samples(tracer, &view, rays));
         let started = [
-            ("tile", &camera),
+            ("tile", &own),
             ("final_step", &step),
             ("points", &tracer.points),
             ("seen", &self.ends),
@@ -197,8 +198,8 @@ impl FinalGather {
         self.light(gpu, scene, tracer, (tile, rays), (&self.ends, &self.found))
     }
 
-    /// Adds direct light at the first ends of a buffer, each of a ray of another point, to what
-    /// they found.
+    /// Adds direct light at the first ends of a buffer, as if they were of the rays of one point,
+    /// to what they found.
     ///
     /// # Errors
     /// Faults of the driver.
@@ -210,7 +211,8 @@ impl FinalGather {
         tile: &Tile,
         (ends, found, count): (&Buffer, &Buffer, u32),
     ) -> Result<StepCount> {
-        let rays = FinalRays { first: 0, count: 1, chosen: count, each: 1 };
+        tracer.wavefront.lists.write_keys(gpu, &[[0, 0]]);
+        let rays = FinalRays { first: 0, count, chosen: 1, each: count };
         self.light(gpu, scene, tracer, (tile, rays), (ends, found))
     }
 
@@ -222,13 +224,13 @@ impl FinalGather {
         (tile, rays): (&Tile, FinalRays),
         (ends, found): (&Buffer, &Buffer),
     ) -> Result<StepCount> {
-        let view = rays_as_samples(&tracer.tile_view(tile), rays);
+        let view = rays_as_samples(tracer, &tracer.tile_view(tile), rays);
         tracer.light_points(gpu, scene, &self.kernels.direct, &view, (ends, found, rays.all()))
     }
 
     /// Adds what the rays of a step found to the radiance of their points.
     pub fn add(&self, gpu: &Gpu, tracer: &CameraTracer, rays: FinalRays) {
-        let step = self.step(gpu, rays);
+        let step = self.step(gpu, 0, rays);
         let buffers = [
             ("final_step", &step),
             ("chosen", &self.chosen),
@@ -243,13 +245,13 @@ impl FinalGather {
         gpu.submit(encoder);
     }
 
-    fn step(&self, gpu: &Gpu, rays: FinalRays) -> Buffer {
+    fn step(&self, gpu: &Gpu, seed: u32, rays: FinalRays) -> Buffer {
         let step = FinalStep {
             first_ray: rays.first,
             rays_now: rays.count,
             rays: rays.each,
             chosen: rays.chosen,
-            joint: self.joint.into(),
+            seed,
             patches: self.patch_count,
             other_light: self.other_light,
             ..Default::default()
@@ -258,21 +260,18 @@ impl FinalGather {
     }
 }
 
-/// The rays of a step as samples of one pixel: all of them draw from one set of numbers. At glass,
-/// a ray chooses reflection or refraction at random.
-fn rays_as_samples(view: &CameraTile, rays: FinalRays) -> CameraTile {
-    let listed = if view.listed > 0 { mix(view.listed) } else { 0 };
-    let tile_seed = mix(view.first_row << 16 | view.first_column) ^ mix(view.first_sample) ^ listed;
+/// The rays of a step as samples of the points that they start from. At glass, a ray chooses
+/// reflection or refraction at random: its numbers are none of those of camera paths.
+fn rays_as_samples(tracer: &CameraTracer, view: &CameraTile, rays: FinalRays) -> CameraTile {
     CameraTile {
-        seed: mix(view.seed ^ mix(rays.first.wrapping_add(1))) ^ tile_seed,
+        seed: mix(view.seed ^ mix(1)),
         branches: 1,
-        samples: rays.all(),
-        pixels: 1,
-        first_column: 0,
-        first_row: 0,
-        first_sample: 0,
+        first_sample: rays.first,
+        samples: rays.count,
         gathers: 1,
         listed: 0,
+        listed_at: tracer.wavefront.lists.keys_at(),
+        square_bits: 0,
         ..*view
     }
 }

@@ -4,6 +4,7 @@ pub mod bright_places;
 pub mod camera_tracer;
 mod direct_light;
 pub mod final_gather;
+mod ray_keys;
 pub mod tile;
 mod tiling;
 mod view;

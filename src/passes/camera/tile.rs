@@ -47,8 +47,8 @@ impl Tile {
 pub struct Listed {
     /// Their numbers in Morton order.
     pub pixels: Arc<[u32]>,
-    /// Number of pixels of the same square in lists before this one.
-    pub before: u32,
+    /// Samples of each of these pixels when this tile is done.
+    pub samples: u32,
 }
 
 /// Counts of one step, for the statistics.

@@ -4,6 +4,7 @@ use super::{
     camera_tracer::CameraTracer,
     tile::{Listed, PIXEL_SAMPLES, Tile, morton_place, tile_sides},
 };
+use crate::settings::Crop;
 
 /// Samples of a pixel in a tile of further samples at most: of a small tile's room, they take what
 /// a pixel without a list may take too.
@@ -17,7 +18,7 @@ impl CameraTracer {
         let samples = self.view.spp.min(PIXEL_SAMPLES);
         let (width, height) = tile_sides(&self.view, self.room);
         let (columns, rows) = (self.view.width, self.view.height);
-        let kept = |side: u32| (side - self.view.first_kept.min(side)).div_ceil(self.view.left_out + 1);
+        let kept = |side: u32| side.div_ceil(self.view.left_out + 1);
         let mut tiles = Vec::new();
         for first_row in (0..kept(rows)).step_by(height as usize) {
             for first_column in (0..kept(columns)).step_by(width as usize) {
@@ -35,33 +36,60 @@ impl CameraTracer {
         tiles
     }
 
-    /// Tiles of the samples that the given pixels of a tile have besides, in order. Their indices
-    /// follow each other from one far from those of all other samples on.
+    /// Tiles of the samples that pixels of a tile have besides, in order: `doubled` is the number
+    /// of times that those of each pixel double. Their indices follow each other from one far from
+    /// those of all other samples on.
     #[must_use]
-    pub fn extra_tiles(&self, tile: &Tile, pixels: &[u32]) -> Vec<Tile> {
-        let step = self.extra.clamp(1, EXTRA_SAMPLES);
-        let at_once = (self.room as u32 / (self.view.branches * step)).max(1);
+    pub fn extra_tiles(&self, tile: &Tile, doubled: &[u32]) -> Vec<Tile> {
+        let most = doubled.iter().copied().max().unwrap_or(0);
         let mut tiles = Vec::new();
-        for first in (0..self.extra).step_by(step as usize) {
-            for (before, some) in (0..).step_by(at_once as usize).zip(pixels.chunks(at_once as usize)) {
-                tiles.push(Tile {
-                    pixels: some.len() as u32,
-                    first_sample: self.first_extra + first,
-                    samples: step.min(self.extra - first),
-                    listed: Some(Listed { pixels: some.into(), before }),
-                    ..*tile
-                });
+        for doubling in 1..=most {
+            let is_doubled = |pixel: &u32| doubled[*pixel as usize] >= doubling;
+            let pixels: Vec<u32> = (0..tile.pixels).filter(is_doubled).collect();
+            let samples = self.view.spp << doubling;
+            let had = samples / 2;
+            let step = had.min(EXTRA_SAMPLES);
+            let at_once = (self.room as u32 / (self.view.branches * step)).max(1);
+            for first in (had..samples).step_by(step as usize) {
+                for some in pixels.chunks(at_once as usize) {
+                    tiles.push(Tile {
+                        pixels: some.len() as u32,
+                        first_sample: self.first_extra + first - self.view.spp,
+                        samples: step.min(samples - first),
+                        listed: Some(Listed { pixels: some.into(), samples }),
+                        ..*tile
+                    });
+                }
             }
         }
         tiles
     }
 
+    /// The part of the picture that the tiles of [`Self::tiles`] have: the data window, and what
+    /// else they trace.
+    #[must_use]
+    pub fn tiled(&self) -> Crop {
+        let (width, height) = tile_sides(&self.view, self.room);
+        let along = |first: u32, count: u32, side: u32, whole: u32| {
+            let origin = first / side * side;
+            (origin, (first + count).next_multiple_of(side).min(whole) - origin)
+        };
+        let Crop { column, row, .. } = self.window;
+        let (column, width) = along(column, self.window.width, width, self.view.width);
+        let (row, height) = along(row, self.window.height, height, self.view.height);
+        Crop { column, row, width, height }
+    }
+
+    /// Column and row of the `i`-th pixel of a tile, among those that the picture has.
+    pub(super) fn place(tile: &Tile, i: u32) -> (u32, u32) {
+        let (column, row) = morton_place(tile.listed.as_ref().map_or(i, |listed| listed.pixels[i as usize]));
+        (tile.first_column + column, tile.first_row + row)
+    }
+
     /// Column and row of the `i`-th pixel of a tile within the data window; `None` outside of it.
     #[must_use]
     pub fn pixel(&self, tile: &Tile, i: u32) -> Option<(u32, u32)> {
-        let i = tile.listed.as_ref().map_or(i, |listed| listed.pixels[i as usize]);
-        let (column, row) = morton_place(i);
-        let (x, y) = (tile.first_column + column, tile.first_row + row);
+        let (x, y) = Self::place(tile, i);
         let window = &self.window;
         let (x, y) = (x.checked_sub(window.column)?, y.checked_sub(window.row)?);
         (x < window.width && y < window.height).then_some((x, y))

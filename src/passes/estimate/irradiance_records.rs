@@ -104,10 +104,11 @@ impl Records {
     /// clamping).
     fn distance(&self, slot: usize) -> f32 {
         let here = Vec3::from(self.records[slot].position);
-        let row = self.columns * self.branches;
-        let around = [-1, 0, 1]
-            .map(|rows: isize| [-1, 0, 1].map(|columns: isize| rows * row as isize + columns * self.branches as isize));
-        let neighbors = around.as_flattened().iter().filter_map(|step| slot.checked_add_signed(*step));
+        let (pixel, branch) = (slot / self.branches, slot % self.branches);
+        let (row, column) = (pixel / self.columns, pixel % self.columns);
+        let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
+        let around = (row.saturating_sub(1)..row + 2).flat_map(|row| columns.clone().map(move |column| (row, column)));
+        let neighbors = around.map(|(row, column)| (row * self.columns + column) * self.branches + branch);
         let there = neighbors.filter_map(|n| Some((self.records.get(n)?, self.distances[n])));
         there
             .filter(|(record, _)| record.irradiance[0] >= 0.0)
@@ -167,6 +168,22 @@ impl IrradianceRecords {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn neighbours_are_in_the_next_column() {
+        let reach = |near: (u32, u32)| {
+            let mut records = Records::new((4, 2), 1);
+            let light = |nearness: f32| ArrivingLight { light: 1.0, nearness, ..Default::default() };
+            for (place, nearness) in [((0, 1), 1.0), (near, 100.0)] {
+                let point = VisiblePoint { ng: [0.0, 1.0, 0.0], ..Default::default() };
+                records.put(place, 0, &point, [1.0; 4], &light(nearness), 1);
+            }
+            // What is near at one limits the other: the distance is 1.5 units, or a hundredth.
+            records.finish(|_| 3.0)[4].direction_and_reach >> 24
+        };
+        assert_eq!(reach((1, 0)), snorm8(0.01), "above and beside it");
+        assert_eq!(reach((3, 0)), snorm8(0.5), "control: the end of the row before");
+    }
 
     #[test]
     fn records_of_any_picture_fit_a_binding() {

@@ -120,7 +120,7 @@ impl BatchBuffers {
     pub fn new(gpu: &Gpu, scene: &SceneBuffers, paths: u64, named: usize) -> Result<Self> {
         let staging_capacity = (paths * STAGED_PER_PATH).max(2 * u64::from(MAX_BOUNCES));
         Ok(Self {
-            wavefront: Wavefront::new(gpu, scene, "photon", (paths, 0))?,
+            wavefront: Wavefront::new(gpu, scene, "photon", (paths, 0), 0)?,
             staged: gpu.storage::<Photon>("staged photons", staging_capacity)?,
             staged_keys: gpu.storage::<u32>("keys of staged photons", staging_capacity)?,
             counts: gpu.storage::<u32>("photon counts", paths * u64::from(MAP_KINDS))?,

@@ -11,6 +11,7 @@ use super::fault::Read;
 use super::material_table::{Axes, Slot};
 use super::primitives::attribute;
 use super::tangents;
+use super::textures::AXES;
 use crate::scene::{Attributes, UV_SETS};
 
 /// Attributes of the vertices of a primitive; lists are empty where the material needs none.
@@ -45,13 +46,19 @@ pub(super) struct Triangles<'a> {
     pub(super) is_morphed: bool,
 }
 
-/// TEXCOORD_n of a primitive.
+/// TEXCOORD_n of a primitive, and [`AXES`] if it has them.
 pub(super) fn sets(primitive: &Primitive) -> Vec<u32> {
     let set = |semantic: &Checked<Semantic>| match semantic {
         Checked::Valid(Semantic::TexCoords(set)) => Some(*set),
         _ => None,
     };
-    primitive.attributes.keys().filter_map(set).collect()
+    let mut sets: Vec<u32> = primitive.attributes.keys().filter_map(set).collect();
+    let has_tangents =
+        [Semantic::Normals, Semantic::Tangents].into_iter().all(|semantic| attribute(primitive, semantic).is_some());
+    if has_tangents || sets.contains(&0) {
+        sets.push(AXES);
+    }
+    sets
 }
 
 /// Whether triangles of the primitive need attributes.
@@ -85,10 +92,13 @@ pub(super) fn read(
         }
     }
     if let Some(axes) = &slot.axes {
-        let given = column(Semantic::Tangents)?.filter(|_| triangles.normals.is_some() && !triangles.is_morphed);
-        attributes.tangents = match given {
+        let can_generate = !attributes.uvs[axes.uv_set as usize].is_empty();
+        // Those of the file lie on the surface as it was before morph targets moved it.
+        let are_right = triangles.normals.is_some() && !(triangles.is_morphed && can_generate);
+        attributes.tangents = match column(Semantic::Tangents)?.filter(|_| are_right) {
             Some(column) => Tangents::OfVertices(vertices.iter().map(|v| tangent(&column, *v as usize)).collect()),
-            None => attributes.generated(axes, triangles),
+            None if can_generate => attributes.generated(axes, triangles),
+            None => Tangents::Unneeded,
         };
     }
     let is_needed = !slot.sets.is_empty() || !attributes.colors.is_empty();

@@ -50,7 +50,7 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
         );
     }
     if intensity == Vec3::ZERO {
-        notes.add(format!("light {name:?} has no intensity"));
+        notes.add(format!("light {name:?} has no intensity: it gives no light"));
         let dark = Light {
             name,
             group: None,

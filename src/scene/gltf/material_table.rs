@@ -9,6 +9,7 @@ use gltf::json;
 use super::fault::{Notes, Read};
 use super::images::ImageList;
 use super::materials;
+use super::textures;
 use crate::scene::{Material, Texture};
 
 /// Owners of materials.
@@ -26,7 +27,7 @@ pub(super) struct Use {
     pub(super) owner: Owner,
     /// Valid index into the file's materials; `None` for the default material.
     pub(super) material: Option<usize>,
-    /// TEXCOORD_n that the owner has.
+    /// TEXCOORD_n that the owner has, and [`textures::AXES`] if it has them.
     pub(super) sets: Vec<u32>,
 }
 
@@ -98,11 +99,10 @@ impl MaterialTable {
     ) -> Read<()> {
         let read = materials::read(root, material, &lacks, &mut self.images, notes)?;
         if !lacks.is_empty() {
-            let sets: Vec<String> = lacks.iter().map(|set| format!("TEXCOORD_{set}")).collect();
             let (owner, name) = (owner.said(root), &read.material.name);
             notes.add(format!(
                 "{owner} has no {}: material {name:?} is there without what needs it",
-                sets.join(" and no ")
+                textures::said(&lacks)
             ));
         }
         let emits = material.is_some_and(|i| root.materials[i].emissive_factor.0 != [0.0; 3]);
@@ -125,7 +125,7 @@ fn axes(material: &Material, sets: &[u32]) -> Option<Axes> {
     let textures = &material.textures;
     let texture = textures.normal.or(textures.clearcoat_normal).or(textures.anisotropy);
     let own = texture.map(|texture| Axes { uv_set: texture.uv_set, transform: texture.transform });
-    let first = sets.iter().position(|set| *set == 0).filter(|_| material.anisotropy > 0.0);
+    let first = sets.iter().position(|set| *set == 0).or(Some(0)).filter(|_| material.anisotropy > 0.0);
     own.or(first.map(|set| Axes { uv_set: set as u32, transform: Texture::IDENTITY }))
 }
 

@@ -13,6 +13,20 @@ use super::extensions::{BASISU, TEXTURE_TRANSFORM, WEBP};
 use super::fault::{Notes, Read, fault};
 use crate::scene::{Texture, Wrap};
 
+/// In place of TEXCOORD_n: along what a material without such textures is anisotropic. Tangents of
+/// the file, or those of TEXCOORD_0.
+pub(super) const AXES: u32 = u32::MAX;
+
+/// How messages name what a primitive lacks of what a material asks for.
+pub(super) fn said(lacks: &[u32]) -> String {
+    let mut lacks = lacks.to_vec();
+    if lacks.contains(&AXES) && !lacks.contains(&0) {
+        lacks.insert(0, 0);
+    }
+    let said = |set: &u32| if *set == AXES { "TANGENT".to_owned() } else { format!("TEXCOORD_{set}") };
+    lacks.iter().map(said).collect::<Vec<_>>().join(" and no ")
+}
+
 /// A material's reference to a texture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reference<'a> {

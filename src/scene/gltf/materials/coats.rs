@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::super::fault::{Read, fault};
 use super::extensions::{Anisotropy, Clearcoat, DiffuseTransmission, Dispersion, Iridescence, Sheen};
 use super::reader::Reader;
-use crate::scene::{Material, SHARP_ROUGHNESS, Surface};
+use crate::scene::{Material, Surface};
 
 /// Reads them.
 pub(super) fn read(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
@@ -24,17 +24,13 @@ fn note_glass(reader: &mut Reader<'_>, material: &Material) {
     if !material.surface.transmits() {
         return;
     }
-    let is_rough = material.roughness >= SHARP_ROUGHNESS;
     for (name, has) in [
-        ("clearcoat", material.clearcoat > 0.0),
         ("sheen", material.sheen_color != Vec3::ZERO),
         ("anisotropy", material.anisotropy > 0.0),
-        ("iridescence", material.iridescence > 0.0 && is_rough),
         ("diffuse_transmission", material.diffuse_transmission > 0.0),
     ] {
         if has {
-            let rough = if name == "iridescence" { "rough " } else { "" };
-            reader.note(&format!("KHR_materials_{name} has no effect on what of it is {rough}glass"));
+            reader.note(&format!("KHR_materials_{name} has no effect on what of it is glass"));
         }
     }
 }
@@ -106,8 +102,11 @@ fn anisotropy(reader: &mut Reader<'_>, material: &mut Material) -> Read<()> {
     let texture = anisotropy.anisotropy_texture.as_ref();
     material.textures.anisotropy = reader.data_texture(texture, &at("anisotropyTexture"))?;
     if material.textures.anisotropy.is_none() {
-        // Its tangents lie along the first set.
-        reader.uv_set(0);
+        // Its direction is that of the tangents, which lie along the first set where the file has
+        // none. Without both the lobe is as wide in all directions.
+        if !reader.axes() {
+            material.anisotropy = 0.0;
+        }
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use serde::de::DeserializeOwned;
 
 use super::super::fault::{Notes, Read, fault};
 use super::super::images::{Content, ImageList};
-use super::super::textures::{self, Reference};
+use super::super::textures::{self, AXES, Reference};
 use crate::scene::{Texture, UV_SETS};
 use glam::Vec3;
 
@@ -120,15 +120,31 @@ impl Reader<'_> {
         Ok(Some(Texture { image: self.images.index(content, is_color), uv_set, ..texture }))
     }
 
+    /// Asks for tangents, which may be made along the first set of texture coordinates; whether the
+    /// mesh has either.
+    pub(super) fn axes(&mut self) -> bool {
+        let has = self.asks(AXES);
+        if has {
+            self.known_set(0);
+        }
+        has
+    }
+
     /// Index of TEXCOORD_n among the triangles' sets of texture coordinates; `None` where the mesh
     /// lacks it or there are too many.
     pub(super) fn uv_set(&mut self, set: u32) -> Option<u32> {
+        if self.asks(set) { self.known_set(set) } else { None }
+    }
+
+    /// Whether the mesh has what is asked for.
+    fn asks(&mut self, set: u32) -> bool {
         if !self.asked.contains(&set) {
             self.asked.push(set);
         }
-        if self.lacks.contains(&set) {
-            return None;
-        }
+        !self.lacks.contains(&set)
+    }
+
+    fn known_set(&mut self, set: u32) -> Option<u32> {
         let known = self.sets.iter().position(|known| *known == set);
         if known.is_none() && self.sets.len() == UV_SETS {
             return None;
