@@ -169,11 +169,12 @@ impl<'a, A: Fn(&Primitive) -> Option<u32> + Sync> Search<'a, A> {
                     Visit::Leaf(leaf) => {
                         for other in leaf.iter().map(|i| &self.bvh.primitives[*i as usize]) {
                             let patch = self.patch(other);
-                            if !is_known(patch, &found) && asked.may_touch(other) {
-                                found.steps += 1;
-                                if coincide(primitive, other) {
-                                    found.patches.extend(patch);
-                                }
+                            if is_known(patch, &found) || !asked.is_near(other) {
+                                continue;
+                            }
+                            found.steps += 1;
+                            if asked.may_touch(other) && coincide(primitive, other) {
+                                found.patches.extend(patch);
                             }
                         }
                         found.patches.len() < MAX_TOUCHED && found.steps < most

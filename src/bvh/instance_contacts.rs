@@ -59,7 +59,7 @@ impl<A: Fn(&Primitive) -> Option<u32> + Sync> Search<'_, A> {
                     }
                     let other = instance.primitive(stored);
                     found.steps += 1;
-                    if shape.is_parallel(&other) && coincide(primitive, &other) {
+                    if shape.is_parallel(&other) && !shape.is_beside(&other) && coincide(primitive, &other) {
                         found.of_instances.insert(stored.id);
                     }
                 }

@@ -15,12 +15,18 @@ pub(super) const TOLERANCE: f64 = 1.0 / (1 << 21) as f64;
 pub(super) const MAX_SINE: f64 = 1e-3;
 /// Fraction of the size of the smaller triangle by which two must overlap.
 const MIN_OVERLAP: f64 = 1e-4;
+/// Square of the area of a parallelogram over the fourth power of its longest side below which
+/// rounding is not small against that fraction of it.
+const THIN: f64 = 1e-16;
 
 /// A primitive as boxes are tested against it.
 pub(super) struct Shape {
     bounds: Bounds,
     /// Corners and directions of a triangle: normal and edges; `None` for a sphere.
     triangle: Option<([DVec3; 3], [DVec3; 4])>,
+    /// Square of the area of a triangle that its normal spans, and of its longest edge.
+    normal_squared: f64,
+    edge_squared: f64,
     /// Largest coordinate that the tolerance follows, beside those of the primitive.
     reach: f64,
 }
@@ -31,7 +37,11 @@ impl Shape {
             let [a, b, c] = corners(primitive);
             ([a, b, c], [(b - a).cross(c - a), b - a, c - b, a - c])
         });
-        Self { bounds: bounds(primitive), triangle, reach: 0.0 }
+        let (normal_squared, edge_squared) = triangle.map_or((0.0, 0.0), |(_, [normal, u, v, w])| {
+            let longest = u.length_squared().max(v.length_squared()).max(w.length_squared());
+            (normal.length_squared(), longest)
+        });
+        Self { bounds: bounds(primitive), triangle, normal_squared, edge_squared, reach: 0.0 }
     }
 
     /// The same with the tolerance of coordinates up to `reach`.
@@ -45,6 +55,28 @@ impl Shape {
         let [e1, e2] = [other.e1, other.e2].map(|edge| Vec3::from_array(edge).as_dvec3());
         let its = e1.cross(e2);
         normal.cross(its).length_squared() <= MAX_SINE * MAX_SINE * normal.length_squared() * its.length_squared()
+    }
+
+    /// Whether an edge of one of two triangles, which are parallel, has the other one on its outer
+    /// side, at least up to a part of both that is too small to count: [`coincide`] is then false.
+    ///
+    /// What lies inside of an edge by `x` times the height above it is less than `2 x` of a
+    /// triangle.
+    pub fn is_beside(&self, other: &Primitive) -> bool {
+        let Some((corners, [normal, edges @ ..])) = &self.triangle else { return false };
+        let b0 = Vec3::from_array(other.v0).as_dvec3();
+        let [e1, e2] = [Vec3::from_array(other.e1).as_dvec3(), Vec3::from_array(other.e2).as_dvec3()];
+        let its_corners = [b0, b0 + e1, b0 + e2];
+        let its_normal = e1.cross(e2);
+        let smaller = self.normal_squared.min(its_normal.length_squared());
+        let longest = self.edge_squared.max(4.0 * e1.length_squared().max(e2.length_squared()));
+        if smaller < THIN * longest * longest {
+            return false;
+        }
+        let least = 0.25 * MIN_OVERLAP * smaller;
+        let turn = normal.dot(its_normal).signum();
+        are_outside(&its_corners, corners, edges, *normal, least)
+            || are_outside(corners, &its_corners, &[e1, e2 - e1, -e2], turn * *normal, least)
     }
 
     /// Whether it reaches into a box, up to the tolerance (Akenine-Möller 2001, "Fast 3D
@@ -77,6 +109,23 @@ impl Shape {
     }
 }
 
+/// Whether an edge of a triangle, which turns left about `up`, has all points on its right, or less
+/// than `least` to its left: a distance times the lengths of the edge and of `up`.
+fn are_outside(
+    points: &[DVec3; 3],
+    corners: &[DVec3; 3],
+    edges: &[DVec3; 3],
+    up: DVec3,
+    least: f64,
+) -> bool {
+    let is_outer = |from: DVec3, edge: DVec3| {
+        let inward = up.cross(edge);
+        let [p, q, r] = points;
+        (*p - from).dot(inward).max((*q - from).dot(inward)).max((*r - from).dot(inward)) <= least
+    };
+    is_outer(corners[0], edges[0]) || is_outer(corners[1], edges[1]) || is_outer(corners[2], edges[2])
+}
+
 /// Whether an axis separates neither side of a box, by its middle and half size, from a triangle.
 fn reaches(corners: &[DVec3; 3], axis: DVec3, [center, half]: [DVec3; 2]) -> bool {
     let radius = half.dot(axis.abs());
@@ -86,9 +135,8 @@ fn reaches(corners: &[DVec3; 3], axis: DVec3, [center, half]: [DVec3; 2]) -> boo
 
 /// Largest coordinate that a primitive is computed from, metres.
 pub(super) fn reach(primitive: &Primitive) -> f64 {
-    let [v0, e1, e2] =
-        [primitive.v0, primitive.e1, primitive.e2].map(|v| f64::from(Vec3::from_array(v).abs().max_element()));
-    v0.max(e1).max(e2)
+    let [v0, e1, e2] = [Vec3::from(primitive.v0), Vec3::from(primitive.e1), Vec3::from(primitive.e2)];
+    f64::from(v0.abs().max(e1.abs()).max(e2.abs()).max_element())
 }
 
 /// Whether two primitives, which are parallel, lie in each other over more than an edge.

@@ -188,6 +188,17 @@ impl<'a> Asked<'a> {
         Some(Self { primitive, shape, bounds, item, normal, height, reach: reach(primitive) })
     }
 
+    /// Whether the boxes of both meet, up to the tolerance.
+    pub fn is_near(&self, other: &Primitive) -> bool {
+        if self.item.is_sphere {
+            return true;
+        }
+        let [v0, e1, e2] = [Vec3::from(other.v0), Vec3::from(other.e1), Vec3::from(other.e2)];
+        let [low, high] = [v0 + e1.min(e2).min(Vec3::ZERO), v0 + e1.max(e2).max(Vec3::ZERO)];
+        let slack = (2.0 * TOLERANCE * self.reach.max(reach(other))) as f32;
+        (low - slack).cmple(self.bounds.max).all() && (high + slack).cmpge(self.bounds.min).all()
+    }
+
     /// Whether another primitive of its kind may lie in it.
     pub fn may_touch(&self, other: &Primitive) -> bool {
         if self.item.is_sphere {
@@ -198,7 +209,8 @@ impl<'a> Asked<'a> {
         let above = v0.as_dvec3().dot(self.normal) - self.height;
         let (along_1, along_2) = (e1.as_dvec3().dot(self.normal), e2.as_dvec3().dot(self.normal));
         let (low, high) = (along_1.min(along_2).min(0.0), along_1.max(along_2).max(0.0));
-        above + low <= slack && above + high >= -slack && self.shape.is_parallel(other)
+        let is_level = above + low <= slack && above + high >= -slack;
+        is_level && self.shape.is_parallel(other) && !self.shape.is_beside(other)
     }
 }
 
