@@ -169,7 +169,7 @@ impl<'a, A: Fn(&Primitive) -> Option<u32> + Sync> Search<'a, A> {
                     Visit::Leaf(leaf) => {
                         for other in leaf.iter().map(|i| &self.bvh.primitives[*i as usize]) {
                             let patch = self.patch(other);
-                            if is_known(patch, &found) || !asked.is_near(other) {
+                            if is_known(patch, &found) || !asked.meets(other) {
                                 continue;
                             }
                             found.steps += 1;

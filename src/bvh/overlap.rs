@@ -15,18 +15,46 @@ pub(super) const TOLERANCE: f64 = 1.0 / (1 << 21) as f64;
 pub(super) const MAX_SINE: f64 = 1e-3;
 /// Fraction of the size of the smaller triangle by which two must overlap.
 const MIN_OVERLAP: f64 = 1e-4;
-/// Square of the area of a parallelogram over the fourth power of its longest side below which
-/// rounding is not small against that fraction of it.
-const THIN: f64 = 1e-16;
+/// Area of a parallelogram over the square of the longest edge below which rounding is not small
+/// against that fraction of it.
+const THIN: f64 = 1e-8;
+
+/// How large triangles are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sizes {
+    /// Of the parallelogram on the edges of the smallest, m².
+    area: f64,
+    /// Square of the longest edge, m².
+    edge_squared: f64,
+}
+
+impl Sizes {
+    /// Identity of [`Self::union`].
+    pub const NONE: Self = Self { area: f64::INFINITY, edge_squared: 0.0 };
+
+    pub fn of(triangle: &Primitive) -> Self {
+        let [e1, e2] = [Vec3::from(triangle.e1).as_dvec3(), Vec3::from(triangle.e2).as_dvec3()];
+        let edge_squared = e1.length_squared().max(e2.length_squared()).max((e2 - e1).length_squared());
+        Self { area: e1.cross(e2).length(), edge_squared }
+    }
+
+    pub fn union(self, other: Self) -> Self {
+        Self { area: self.area.min(other.area), edge_squared: self.edge_squared.max(other.edge_squared) }
+    }
+
+    /// Area of an overlap that is too small for two of these to lie in each other, and twice that;
+    /// none where rounding may be as large.
+    pub fn negligible(self) -> Option<f64> {
+        (self.area > THIN * self.edge_squared).then_some(0.25 * MIN_OVERLAP * self.area)
+    }
+}
 
 /// A primitive as boxes are tested against it.
 pub(super) struct Shape {
     bounds: Bounds,
     /// Corners and directions of a triangle: normal and edges; `None` for a sphere.
     triangle: Option<([DVec3; 3], [DVec3; 4])>,
-    /// Square of the area of a triangle that its normal spans, and of its longest edge.
-    normal_squared: f64,
-    edge_squared: f64,
+    pub sizes: Sizes,
     /// Largest coordinate that the tolerance follows, beside those of the primitive.
     reach: f64,
 }
@@ -37,11 +65,7 @@ impl Shape {
             let [a, b, c] = corners(primitive);
             ([a, b, c], [(b - a).cross(c - a), b - a, c - b, a - c])
         });
-        let (normal_squared, edge_squared) = triangle.map_or((0.0, 0.0), |(_, [normal, u, v, w])| {
-            let longest = u.length_squared().max(v.length_squared()).max(w.length_squared());
-            (normal.length_squared(), longest)
-        });
-        Self { bounds: bounds(primitive), triangle, normal_squared, edge_squared, reach: 0.0 }
+        Self { bounds: bounds(primitive), triangle, sizes: Sizes::of(primitive), reach: 0.0 }
     }
 
     /// The same with the tolerance of coordinates up to `reach`.
@@ -68,12 +92,8 @@ impl Shape {
         let [e1, e2] = [Vec3::from_array(other.e1).as_dvec3(), Vec3::from_array(other.e2).as_dvec3()];
         let its_corners = [b0, b0 + e1, b0 + e2];
         let its_normal = e1.cross(e2);
-        let smaller = self.normal_squared.min(its_normal.length_squared());
-        let longest = self.edge_squared.max(4.0 * e1.length_squared().max(e2.length_squared()));
-        if smaller < THIN * longest * longest {
-            return false;
-        }
-        let least = 0.25 * MIN_OVERLAP * smaller;
+        let Some(negligible) = self.sizes.union(Sizes::of(other)).negligible() else { return false };
+        let least = negligible * self.sizes.area;
         let turn = normal.dot(its_normal).signum();
         are_outside(&its_corners, corners, edges, *normal, least)
             || are_outside(corners, &its_corners, &[e1, e2 - e1, -e2], turn * *normal, least)
@@ -168,7 +188,8 @@ pub(super) fn coincide(a: &Primitive, b: &Primitive) -> bool {
 }
 
 pub(super) fn corners(primitive: &Primitive) -> [DVec3; 3] {
-    let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(|v| Vec3::from_array(v).as_dvec3());
+    let [v0, e1, e2] = [Vec3::from(primitive.v0), Vec3::from(primitive.e1), Vec3::from(primitive.e2)];
+    let [v0, e1, e2] = [v0.as_dvec3(), e1.as_dvec3(), e2.as_dvec3()];
     [v0, v0 + e1, v0 + e2]
 }
 

@@ -8,7 +8,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::overlap::{MAX_SINE, Shape, TOLERANCE, corners, reach};
+use super::overlap::{MAX_SINE, Shape, Sizes, TOLERANCE, corners, reach};
 use crate::{
     layout::{Primitive, SPHERE_BIT},
     scene::{Bounds, CompleteTree},
@@ -18,6 +18,9 @@ use crate::{
 const SIZE_STEP: f64 = 3.0;
 /// Coordinates by which primitives are divided: place and height, normal, size.
 const COORDINATES: usize = 7;
+
+/// Rounding of a corner's place in a plane, over the tolerance.
+const ROUNDING: f64 = 1e-6;
 
 /// A primitive to be divided.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +34,11 @@ pub(super) struct Item {
     /// Corners of a triangle; for a sphere its middle and the radius.
     points: [Vec3; 3],
     is_sphere: bool,
+    /// Box in which another one has to begin or end to lie in it.
+    bounds: Bounds,
+    sizes: Sizes,
+    /// Longest side of the box as a power of two.
+    exponent: f64,
     /// Coordinate by which it is divided from others.
     key: f64,
 }
@@ -50,6 +58,7 @@ pub(super) struct Planes {
     /// Mean size, and mean extent along the axis, of an item, metres.
     width: f64,
     thickness: f64,
+    sizes: Sizes,
     /// The patch of all; `None` where there are several.
     pub patch: Option<u32>,
 }
@@ -70,13 +79,19 @@ impl Item {
         let [v0, e1, e2] = [Vec3::from(primitive.v0), Vec3::from(primitive.e1), Vec3::from(primitive.e2)];
         let is_sphere = primitive.material & SPHERE_BIT != 0;
         let points = if is_sphere { [v0, Vec3::splat(e1.x), Vec3::ZERO] } else { [v0, v0 + e1, v0 + e2] };
-        Some(Self { index, patch, normal: normal(primitive)?.as_vec3(), points, is_sphere, key: 0.0 })
-    }
-
-    /// Box in which another one has to begin or end to lie in it.
-    fn bounds(&self) -> Bounds {
-        let [a, b, c] = self.points;
-        if self.is_sphere { Bounds { min: a, max: a } } else { Bounds { min: a.min(b).min(c), max: a.max(b).max(c) } }
+        let bounds = if is_sphere { Bounds { min: v0, max: v0 } } else { exact_bounds(primitive) };
+        let size = f64::from((bounds.max - bounds.min).max_element());
+        Some(Self {
+            index,
+            patch,
+            normal: normal(primitive)?.as_vec3(),
+            points,
+            is_sphere,
+            bounds,
+            sizes: Sizes::of(primitive),
+            exponent: size.max(f64::MIN_POSITIVE).log2(),
+            key: 0.0,
+        })
     }
 
     /// Where it begins and ends along an axis; the radius of a sphere.
@@ -96,17 +111,14 @@ impl Item {
     }
 
     fn size(&self) -> f64 {
-        let bounds = self.bounds();
-        f64::from((bounds.max - bounds.min).max_element())
+        f64::from((self.bounds.max - self.bounds.min).max_element())
     }
 
     fn coordinates(&self, axes: [DVec3; 3]) -> [f64; COORDINATES] {
-        let bounds = self.bounds();
-        let middle = (0.5 * (bounds.min + bounds.max)).as_dvec3();
+        let middle = (0.5 * (self.bounds.min + self.bounds.max)).as_dvec3();
         let (low, high) = self.heights(axes[2]);
         let normal = self.normal.as_dvec3();
-        let size = self.size().max(f64::MIN_POSITIVE).log2();
-        [middle.dot(axes[0]), middle.dot(axes[1]), 0.5 * (low + high), normal.x, normal.y, normal.z, size]
+        [middle.dot(axes[0]), middle.dot(axes[1]), 0.5 * (low + high), normal.x, normal.y, normal.z, self.exponent]
     }
 }
 
@@ -124,13 +136,15 @@ impl Planes {
             reach: 0.0,
             width: 0.0,
             thickness: 0.0,
+            sizes: Sizes::NONE,
             patch: Some(items[0].patch),
         };
         for item in items {
             let (low, high) = item.heights(axis);
             let tolerance = item.tolerance();
             all.reach = all.reach.max(tolerance / TOLERANCE);
-            all.bounds = all.bounds.union(item.bounds());
+            all.bounds = all.bounds.union(item.bounds);
+            all.sizes = all.sizes.union(item.sizes);
             (all.low, all.high) = (all.low.min(low), all.high.max(high));
             all.sine = all.sine.max(item.normal.as_dvec3().cross(axis).length());
             all.width += item.size() + tolerance;
@@ -148,10 +162,7 @@ impl Planes {
     /// Whether something below may lie in a primitive.
     pub fn may_touch(&self, asked: &Asked) -> bool {
         let slack = 2.0 * TOLERANCE * asked.reach.max(self.reach);
-        let near = slack as f32;
-        if (self.bounds.min - near).cmpgt(asked.bounds.max).any()
-            || (self.bounds.max + near).cmplt(asked.bounds.min).any()
-        {
+        if !asked.is_near(&self.bounds, self.sizes, slack) {
             return false;
         }
         // The sine of a sum of angles is at most the sum of their sines.
@@ -171,9 +182,11 @@ impl Planes {
 pub(super) struct Asked<'a> {
     pub primitive: &'a Primitive,
     pub shape: Shape,
-    bounds: Bounds,
     item: Item,
+    bounds: [DVec3; 2],
     normal: DVec3,
+    /// Directions in which another one may be apart from it: along the normal, for a sphere all.
+    ways: DVec3,
     /// Of its plane, along the normal.
     height: f64,
     reach: f64,
@@ -184,19 +197,29 @@ impl<'a> Asked<'a> {
     pub fn new(primitive: &'a Primitive) -> Option<Self> {
         let (item, normal) = (Item::new(primitive, 0, 0)?, normal(primitive)?);
         let height = Vec3::from(primitive.v0).as_dvec3().dot(normal);
-        let (bounds, shape) = (item.bounds(), Shape::new(primitive));
-        Some(Self { primitive, shape, bounds, item, normal, height, reach: reach(primitive) })
+        let (bounds, shape) = ([item.bounds.min, item.bounds.max].map(Vec3::as_dvec3), Shape::new(primitive));
+        let ways = if item.is_sphere { DVec3::ONE } else { normal.abs() + ROUNDING };
+        Some(Self { primitive, shape, item, bounds, normal, ways, height, reach: reach(primitive) })
     }
 
-    /// Whether the boxes of both meet, up to the tolerance.
-    pub fn is_near(&self, other: &Primitive) -> bool {
-        if self.item.is_sphere {
-            return true;
+    /// Whether a box may hold what lies in it, of these sizes: whether more than a line lies in the
+    /// boxes of both.
+    fn is_near(&self, other: &Bounds, sizes: Sizes, slack: f64) -> bool {
+        let [min, max] = self.bounds;
+        let grown = slack * self.ways;
+        let common = max.min(other.max.as_dvec3() + grown) - min.max(other.min.as_dvec3() - grown);
+        if common.min_element() < 0.0 {
+            return false;
         }
-        let [v0, e1, e2] = [Vec3::from(other.v0), Vec3::from(other.e1), Vec3::from(other.e2)];
-        let [low, high] = [v0 + e1.min(e2).min(Vec3::ZERO), v0 + e1.max(e2).max(Vec3::ZERO)];
-        let slack = (2.0 * TOLERANCE * self.reach.max(reach(other))) as f32;
-        (low - slack).cmple(self.bounds.max).all() && (high + slack).cmpge(self.bounds.min).all()
+        // No polygon in a box is larger than three of its sides.
+        let most = common.x * common.y + common.y * common.z + common.z * common.x;
+        self.item.is_sphere || self.shape.sizes.union(sizes).negligible().is_none_or(|least| most > least)
+    }
+
+    /// Whether the boxes of both meet in more than a line, up to the tolerance.
+    pub fn meets(&self, other: &Primitive) -> bool {
+        let slack = 2.0 * TOLERANCE * self.reach.max(reach(other));
+        self.item.is_sphere || self.is_near(&exact_bounds(other), Sizes::of(other), slack)
     }
 
     /// Whether another primitive of its kind may lie in it.
@@ -211,6 +234,18 @@ impl<'a> Asked<'a> {
         let (low, high) = (along_1.min(along_2).min(0.0), along_1.max(along_2).max(0.0));
         let is_level = above + low <= slack && above + high >= -slack;
         is_level && self.shape.is_parallel(other) && !self.shape.is_beside(other)
+    }
+}
+
+/// Box around a triangle, rounded outwards.
+fn exact_bounds(triangle: &Primitive) -> Bounds {
+    let [a, b, c] = corners(triangle);
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    let below = |x: f64| if f64::from(x as f32) > x { (x as f32).next_down() } else { x as f32 };
+    let above = |x: f64| if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 };
+    Bounds {
+        min: Vec3::new(below(low.x), below(low.y), below(low.z)),
+        max: Vec3::new(above(high.x), above(high.y), above(high.z)),
     }
 }
 
