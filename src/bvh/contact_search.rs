@@ -292,4 +292,32 @@ mod tests {
         let in_one_place = steps(crowd(500, Vec3::ZERO));
         assert!(in_one_place >= MAX_TOUCHED, "{in_one_place}");
     }
+
+    #[test]
+    fn neighbours_in_a_plane_take_few_steps() {
+        // Squares side by side, of a patch each, in a plane along axes and in an oblique one; then
+        // all over again in the same place.
+        let grid = |u: Vec3, v: Vec3, lift: Vec3| -> Vec<[Vec3; 3]> {
+            let at = |x: u32, y: u32| x as f32 * u + y as f32 * v + lift;
+            let square = |i: u32| {
+                let (x, y) = (i % 30, i / 30);
+                [[at(x, y), at(x + 1, y), at(x + 1, y + 1)], [at(x, y), at(x + 1, y + 1), at(x, y + 1)]]
+            };
+            (0..900).flat_map(square).collect()
+        };
+        for (u, v) in [(0.5 * Vec3::X, 0.5 * Vec3::Z), (vec3(0.3, 0.4, 0.1), vec3(-0.2, 0.1, 0.35))] {
+            let once = grid(u, v, Vec3::ONE);
+            let twice = [once.clone(), once.clone()].concat();
+            let found = |triangles| {
+                let (bvh, of_ids, found) = searched(triangles, Vec::new(), u32::MAX);
+                let patches: Vec<Vec<u32>> = found.iter().map(|touched| touched.patches.clone()).collect();
+                assert_eq!(patches, compared(&bvh, &of_ids));
+                let steps = found.iter().map(|touched| touched.steps).sum::<usize>() / found.len();
+                (patches.iter().map(Vec::len).sum::<usize>(), steps)
+            };
+            let ((pairs, steps), (all_pairs, _)) = (found(once), found(twice));
+            assert_eq!((pairs, all_pairs), (0, 3600));
+            assert!(steps < 100, "{steps}");
+        }
+    }
 }

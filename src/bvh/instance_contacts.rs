@@ -13,8 +13,8 @@ use super::{
 };
 use crate::layout::{INSTANCE, Instance, Primitive};
 
-/// Primitives of instances that are asked at most whether they lie in those of other ones, and steps
-/// of the search for them.
+/// Primitives of instances that are asked at most whether they lie in those of other ones, and
+/// steps of the search for them.
 const MAX_ASKED: usize = 1 << 25;
 const MAX_STEPS: usize = 1 << 27;
 

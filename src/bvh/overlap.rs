@@ -131,13 +131,7 @@ impl Shape {
 
 /// Whether an edge of a triangle, which turns left about `up`, has all points on its right, or less
 /// than `least` to its left: a distance times the lengths of the edge and of `up`.
-fn are_outside(
-    points: &[DVec3; 3],
-    corners: &[DVec3; 3],
-    edges: &[DVec3; 3],
-    up: DVec3,
-    least: f64,
-) -> bool {
+fn are_outside(points: &[DVec3; 3], corners: &[DVec3; 3], edges: &[DVec3; 3], up: DVec3, least: f64) -> bool {
     let is_outer = |from: DVec3, edge: DVec3| {
         let inward = up.cross(edge);
         let [p, q, r] = points;
