@@ -7,10 +7,9 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::{
-    Bvh, FILLER,
+    Bvh,
     contact_search::{Search, Touched},
 };
 use crate::{
@@ -21,6 +20,10 @@ use crate::{
 /// Warning where instances are not compared.
 const TOO_MANY: &str = "there are too many instances in each other's boxes to compare: where surfaces of two of them \
                         lie in each other, either is seen";
+
+/// Warning where primitives are not compared with all others, after their number.
+const CROWDED: &str = "surfaces have too many others around them to compare with each: where one of these lies in them, \
+                       either is seen";
 
 /// Surfaces that lie in each other.
 #[derive(Clone, Debug)]
@@ -79,22 +82,6 @@ impl Patches {
         self.of_ids.get(primitive.id as usize).copied()
     }
 
-    /// The patch of all that is below each node; `None` where there are several.
-    fn of_nodes(&self, bvh: &Bvh) -> Vec<Option<u32>> {
-        let mut below = vec![None; bvh.nodes.len()];
-        // Children come after their parents.
-        for (i, node) in bvh.nodes.iter().enumerate().rev() {
-            let mut patches = node.children().flat_map(|child| {
-                let leaf = &bvh.primitives[child.first as usize..(child.first + child.count) as usize];
-                let interior = (child.count == 0).then(|| below[child.first as usize]);
-                interior.into_iter().chain(leaf.iter().map(|p| self.of(p)))
-            });
-            let first = patches.next().flatten();
-            below[i] = if patches.all(|patch| patch == first) { first } else { None };
-        }
-        below
-    }
-
     /// Warning for the first pair of lamps that lie in each other: one is seen there, but both send
     /// out light.
     fn warning(&self, scene: &Scene, pairs: &BTreeSet<(u32, u32)>) -> Option<String> {
@@ -140,42 +127,37 @@ impl Patches {
 #[must_use]
 pub fn contacts(scene: &Scene, bvh: &Bvh) -> Contacts {
     let patches = Patches::new(scene);
-    let search = Search { bvh, patches: &patches.of_ids, of_nodes: patches.of_nodes(bvh) };
     // A patch that neither shines nor lets light through may be met in any of its parts.
     let is_plain = |patch: u32| {
         let material = &scene.materials[patches.all[patch as usize].material as usize];
         material.emission == Vec3::ZERO && !material.surface.transmits()
     };
-    // Primitives in several leaves are asked once.
-    let mut listed = vec![false; patches.of_ids.len()];
-    let is_first = |p: &&Primitive| p.id != FILLER && !std::mem::replace(&mut listed[p.id as usize], true);
-    let listed_in_scene = &bvh.primitives[..bvh.scene_part().1];
-    let firsts: Vec<&Primitive> = listed_in_scene.iter().filter(is_first).collect();
-    let mut found: Vec<(u32, Vec<Touched>)> = firsts
-        .into_par_iter()
-        .filter_map(|primitive| {
-            let own = patches.of(primitive).filter(|patch| is_plain(*patch));
-            let touched = search.touching(primitive, own);
-            (!touched.is_empty()).then_some((primitive.id, touched))
-        })
-        .collect();
+    if bvh.instances.is_empty() && patches.all.len() < 2 && patches.all.iter().zip(0..).all(|(_, i)| is_plain(i)) {
+        return Contacts { ranks: vec![None; bvh.primitives.len()], warning: None };
+    }
+    let apart = |primitive: &Primitive| patches.of(primitive).filter(|patch| is_plain(*patch));
+    let search = Search::new(bvh, &patches.of_ids, apart);
+    let (mut found, unfinished) = search.among_primitives();
     let among_instances = search.among_instances();
     let unasked = among_instances.is_none().then(|| TOO_MANY.to_owned());
+    let crowded = (unfinished > 0).then(|| format!("{unfinished} {CROWDED}"));
     found.extend(among_instances.unwrap_or_default());
     let patch_of = |id: u32| patches.of_ids[id as usize];
     // The primitives of instances are not asked themselves: both orders.
-    let pair = |(id, touched): &(u32, Vec<Touched>)| {
+    let pair = |(id, touched): &(u32, Touched)| {
         let own = patch_of(*id);
-        touched.iter().flat_map(|t| [(own, t.patch), (t.patch, own)]).collect::<Vec<_>>()
+        let of_instances = touched.of_instances.iter().map(|id| patch_of(*id));
+        let others = touched.patches.iter().copied().chain(of_instances);
+        others.flat_map(|other| [(own, other), (other, own)]).collect::<Vec<_>>()
     };
     let pairs: BTreeSet<(u32, u32)> = found.iter().flat_map(pair).collect();
     let ranks = patches.ranks(scene, &pairs);
     let mut of_ids = vec![None; patches.of_ids.len()];
-    let touched = found.iter().flat_map(|(_, touched)| touched.iter().filter_map(|t| t.of_instance));
+    let touched = found.iter().flat_map(|(_, touched)| touched.of_instances.iter().copied());
     let in_contact = found.iter().map(|(id, _)| *id).chain(touched);
     in_contact.for_each(|id| of_ids[id as usize] = ranks.get(&patch_of(id)).copied());
     let ranks = bvh.primitives.iter().map(|p| of_ids.get(p.id as usize).copied().flatten()).collect();
-    Contacts { ranks, warning: patches.warning(scene, &pairs).or(unasked) }
+    Contacts { ranks, warning: patches.warning(scene, &pairs).or(unasked).or(crowded) }
 }
 
 #[cfg(test)]
@@ -183,7 +165,10 @@ mod tests {
     use glam::vec3;
 
     use super::*;
-    use crate::scene::{Material, Sphere, Surface, Triangle};
+    use crate::{
+        bvh::FILLER,
+        scene::{Material, Sphere, Surface, Triangle},
+    };
 
     /// Contacts of triangles and spheres, in the order of the scene; material 0 is glass, 1
     /// diffuse.

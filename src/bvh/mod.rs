@@ -12,10 +12,12 @@ mod contact_search;
 mod contacts;
 mod convert;
 mod instance;
+mod instance_contacts;
 mod media;
 mod node;
 mod overlap;
 mod parallel;
+mod plane_tree;
 mod ray;
 mod split;
 #[cfg(test)]

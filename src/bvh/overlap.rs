@@ -10,17 +10,51 @@ use crate::{
 
 /// Distance below which two surfaces are one, over their largest coordinate: 2^-21, four steps of
 /// 32-bit numbers.
-const TOLERANCE: f64 = 1.0 / (1 << 21) as f64;
+pub(super) const TOLERANCE: f64 = 1.0 / (1 << 21) as f64;
 /// Largest sine of the angle between the planes of two surfaces that are one.
-const MAX_SINE: f64 = 1e-3;
+pub(super) const MAX_SINE: f64 = 1e-3;
 /// Fraction of the size of the smaller triangle by which two must overlap.
 const MIN_OVERLAP: f64 = 1e-4;
+/// Area of a parallelogram over the square of the longest edge below which rounding is not small
+/// against that fraction of it.
+const THIN: f64 = 1e-8;
+
+/// How large triangles are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sizes {
+    /// Of the parallelogram on the edges of the smallest, m².
+    area: f64,
+    /// Square of the longest edge, m².
+    edge_squared: f64,
+}
+
+impl Sizes {
+    /// Identity of [`Self::union`].
+    pub const NONE: Self = Self { area: f64::INFINITY, edge_squared: 0.0 };
+
+    pub fn of(triangle: &Primitive) -> Self {
+        let [e1, e2] = [Vec3::from(triangle.e1).as_dvec3(), Vec3::from(triangle.e2).as_dvec3()];
+        let edge_squared = e1.length_squared().max(e2.length_squared()).max((e2 - e1).length_squared());
+        Self { area: e1.cross(e2).length(), edge_squared }
+    }
+
+    pub fn union(self, other: Self) -> Self {
+        Self { area: self.area.min(other.area), edge_squared: self.edge_squared.max(other.edge_squared) }
+    }
+
+    /// Area of an overlap that is too small for two of these to lie in each other, and twice that;
+    /// none where rounding may be as large.
+    pub fn negligible(self) -> Option<f64> {
+        (self.area > THIN * self.edge_squared).then_some(0.25 * MIN_OVERLAP * self.area)
+    }
+}
 
 /// A primitive as boxes are tested against it.
 pub(super) struct Shape {
     bounds: Bounds,
     /// Corners and directions of a triangle: normal and edges; `None` for a sphere.
     triangle: Option<([DVec3; 3], [DVec3; 4])>,
+    pub sizes: Sizes,
     /// Largest coordinate that the tolerance follows, beside those of the primitive.
     reach: f64,
 }
@@ -31,7 +65,7 @@ impl Shape {
             let [a, b, c] = corners(primitive);
             ([a, b, c], [(b - a).cross(c - a), b - a, c - b, a - c])
         });
-        Self { bounds: bounds(primitive), triangle, reach: 0.0 }
+        Self { bounds: bounds(primitive), triangle, sizes: Sizes::of(primitive), reach: 0.0 }
     }
 
     /// The same with the tolerance of coordinates up to `reach`.
@@ -45,6 +79,24 @@ impl Shape {
         let [e1, e2] = [other.e1, other.e2].map(|edge| Vec3::from_array(edge).as_dvec3());
         let its = e1.cross(e2);
         normal.cross(its).length_squared() <= MAX_SINE * MAX_SINE * normal.length_squared() * its.length_squared()
+    }
+
+    /// Whether an edge of one of two triangles, which are parallel, has the other one on its outer
+    /// side, at least up to a part of both that is too small to count: [`coincide`] is then false.
+    ///
+    /// What lies inside of an edge by `x` times the height above it is less than `2 x` of a
+    /// triangle.
+    pub fn is_beside(&self, other: &Primitive) -> bool {
+        let Some((corners, [normal, edges @ ..])) = &self.triangle else { return false };
+        let b0 = Vec3::from_array(other.v0).as_dvec3();
+        let [e1, e2] = [Vec3::from_array(other.e1).as_dvec3(), Vec3::from_array(other.e2).as_dvec3()];
+        let its_corners = [b0, b0 + e1, b0 + e2];
+        let its_normal = e1.cross(e2);
+        let Some(negligible) = self.sizes.union(Sizes::of(other)).negligible() else { return false };
+        let least = negligible * self.sizes.area;
+        let turn = normal.dot(its_normal).signum();
+        are_outside(&its_corners, corners, edges, *normal, least)
+            || are_outside(corners, &its_corners, &[e1, e2 - e1, -e2], turn * *normal, least)
     }
 
     /// Whether it reaches into a box, up to the tolerance (Akenine-Möller 2001, "Fast 3D
@@ -77,6 +129,17 @@ impl Shape {
     }
 }
 
+/// Whether an edge of a triangle, which turns left about `up`, has all points on its right, or less
+/// than `least` to its left: a distance times the lengths of the edge and of `up`.
+fn are_outside(points: &[DVec3; 3], corners: &[DVec3; 3], edges: &[DVec3; 3], up: DVec3, least: f64) -> bool {
+    let is_outer = |from: DVec3, edge: DVec3| {
+        let inward = up.cross(edge);
+        let [p, q, r] = points;
+        (*p - from).dot(inward).max((*q - from).dot(inward)).max((*r - from).dot(inward)) <= least
+    };
+    is_outer(corners[0], edges[0]) || is_outer(corners[1], edges[1]) || is_outer(corners[2], edges[2])
+}
+
 /// Whether an axis separates neither side of a box, by its middle and half size, from a triangle.
 fn reaches(corners: &[DVec3; 3], axis: DVec3, [center, half]: [DVec3; 2]) -> bool {
     let radius = half.dot(axis.abs());
@@ -86,9 +149,8 @@ fn reaches(corners: &[DVec3; 3], axis: DVec3, [center, half]: [DVec3; 2]) -> boo
 
 /// Largest coordinate that a primitive is computed from, metres.
 pub(super) fn reach(primitive: &Primitive) -> f64 {
-    let [v0, e1, e2] =
-        [primitive.v0, primitive.e1, primitive.e2].map(|v| f64::from(Vec3::from_array(v).abs().max_element()));
-    v0.max(e1).max(e2)
+    let [v0, e1, e2] = [Vec3::from(primitive.v0), Vec3::from(primitive.e1), Vec3::from(primitive.e2)];
+    f64::from(v0.abs().max(e1.abs()).max(e2.abs()).max_element())
 }
 
 /// Whether two primitives, which are parallel, lie in each other over more than an edge.
@@ -116,25 +178,48 @@ pub(super) fn coincide(a: &Primitive, b: &Primitive) -> bool {
         let on_a = a0 + p.x * tangent + p.y * na.cross(tangent);
         ((on_a - b0).dot(nb) / na.dot(nb)).abs()
     };
-    area(&overlap).abs() > MIN_OVERLAP * size && overlap.iter().all(|p| height(*p) <= tolerance)
+    area(overlap.corners()).abs() > MIN_OVERLAP * size && overlap.corners().iter().all(|p| height(*p) <= tolerance)
 }
 
-fn corners(primitive: &Primitive) -> [DVec3; 3] {
-    let [v0, e1, e2] = [primitive.v0, primitive.e1, primitive.e2].map(|v| Vec3::from_array(v).as_dvec3());
+pub(super) fn corners(primitive: &Primitive) -> [DVec3; 3] {
+    let [v0, e1, e2] = [Vec3::from(primitive.v0), Vec3::from(primitive.e1), Vec3::from(primitive.e2)];
+    let [v0, e1, e2] = [v0.as_dvec3(), e1.as_dvec3(), e2.as_dvec3()];
     [v0, v0 + e1, v0 + e2]
+}
+
+/// A convex polygon of few corners; each of three cuts adds one at most.
+#[derive(Clone, Copy, Default)]
+struct Polygon {
+    corners: [DVec2; 6],
+    count: usize,
+}
+
+impl Polygon {
+    fn corners(&self) -> &[DVec2] {
+        &self.corners[..self.count]
+    }
+
+    fn push(&mut self, corner: DVec2) {
+        // Rounding may let an edge cross a line more than twice.
+        if self.count < self.corners.len() {
+            self.corners[self.count] = corner;
+            self.count += 1;
+        }
+    }
 }
 
 /// The part of one triangle that lies in another one, corner by corner (Sutherland and Hodgman
 /// 1974).
-fn clipped(subject: &[DVec2; 3], clip: &[DVec2; 3]) -> Vec<DVec2> {
+fn clipped(subject: &[DVec2; 3], clip: &[DVec2; 3]) -> Polygon {
     let turn = area(clip).signum();
-    let mut polygon = subject.to_vec();
+    let mut polygon = Polygon::default();
+    subject.iter().for_each(|corner| polygon.push(*corner));
     for edge in 0..3 {
         let (from, to) = (clip[edge], clip[(edge + 1) % 3]);
         let side = |p: DVec2| turn * (to - from).perp_dot(p - from);
-        let mut kept = Vec::with_capacity(polygon.len() + 1);
-        for (i, &p) in polygon.iter().enumerate() {
-            let q = polygon[(i + 1) % polygon.len()];
+        let mut kept = Polygon::default();
+        for (i, &p) in polygon.corners().iter().enumerate() {
+            let q = polygon.corners()[(i + 1) % polygon.count];
             let (here, next) = (side(p), side(q));
             if here >= 0.0 {
                 kept.push(p);

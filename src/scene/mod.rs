@@ -2,6 +2,7 @@
 //! Coordinates are metres, right-handed, +Y up, relative to [`Scene::center`].
 
 mod camera;
+mod complete_tree;
 mod contents;
 mod describe;
 mod describe_materials;
@@ -21,6 +22,7 @@ mod words;
 
 pub use crate::settings::LoadOptions;
 pub use camera::{Camera, Projection};
+pub(crate) use complete_tree::{CompleteTree, Visit};
 pub use contents::Scene;
 pub use describe::{CameraInfo, EmitterInfo, LightInfo, SceneInfo};
 pub use describe_materials::{ImageInfo, MaterialInfo, TextureInfo};

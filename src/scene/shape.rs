@@ -96,6 +96,12 @@ impl Bounds {
         Bounds { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// Whether both have a point in common.
+    #[must_use]
+    pub fn touches(&self, other: &Bounds) -> bool {
+        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
+
     /// Half of the surface, m²; 0 for the empty box.
     #[must_use]
     pub fn half_area(self) -> f32 {

@@ -3,7 +3,10 @@
 use glam::{Quat, Vec3};
 
 use super::solid::{NO_SLOT, NONE, Solid};
-use crate::scene::Bounds;
+use crate::{
+    layout::MEDIA_WORDS,
+    scene::{Bounds, CompleteTree, Visit},
+};
 
 /// Orientations in which boxes are measured, the axes' own first.
 const ORIENTATIONS: usize = 32;
@@ -61,18 +64,17 @@ pub(super) fn slots(solids: &[Solid]) -> (Vec<u8>, Vec<u32>, usize) {
         let (x, y) = (&solids[*a], &solids[*b]);
         y.priority.cmp(&x.priority).then(x.volume.total_cmp(&y.volume)).then(a.cmp(b))
     });
-    let neighbours = overlaps(solids);
+    let mut placed = Placed::new(solids);
     let mut slot_of = vec![NO_SLOT as u8; solids.len()];
     let (mut materials, mut without): (Vec<u32>, usize) = (Vec::new(), 0);
     for solid in by_rank {
         let material = solids[solid].material;
-        let ranked = |i: &&usize| slot_of[**i] != NO_SLOT as u8;
-        let around: Vec<(u8, u32)> =
-            neighbours[solid].iter().filter(ranked).map(|i| (slot_of[*i], solids[*i].material)).collect();
+        let around = placed.slots_around(solid, &slot_of);
+        let is_around = |slot: &usize| around[slot / 32] >> (slot % 32) & 1 == 1;
         // Among equal media either may fill the space; of others those before it rank higher.
-        let first =
-            around.iter().filter(|(_, m)| *m != material).map(|(slot, _)| *slot as usize + 1).max().unwrap_or(0);
-        let free = |slot: &usize| materials[*slot] == material && around.iter().all(|(s, _)| *s as usize != *slot);
+        let others = (0..materials.len()).rev().find(|slot| is_around(slot) && materials[*slot] != material);
+        let first = others.map_or(0, |slot| slot + 1);
+        let free = |slot: &usize| materials[*slot] == material && !is_around(slot);
         let slot = match (first..materials.len()).find(free) {
             Some(slot) => slot,
             None if materials.len() < NO_SLOT as usize => {
@@ -85,30 +87,55 @@ pub(super) fn slots(solids: &[Solid]) -> (Vec<u8>, Vec<u32>, usize) {
             }
         };
         slot_of[solid] = slot as u8;
+        placed.add(solid, slot);
     }
     (slot_of, materials, without)
 }
 
-/// The solids whose bounding boxes overlap or touch each solid's.
-fn overlaps(solids: &[Solid]) -> Vec<Vec<usize>> {
-    let mut order: Vec<usize> = (0..solids.len()).collect();
-    order.sort_by(|a, b| solids[*a].bounds.min.x.total_cmp(&solids[*b].bounds.min.x));
-    let mut found = vec![Vec::new(); solids.len()];
-    let mut active: Vec<usize> = Vec::new();
-    for i in order {
-        let bounds = solids[i].bounds;
-        active.retain(|j| solids[*j].bounds.max.x >= bounds.min.x);
-        for j in active.iter().copied().filter(|j| touch(&solids[*j].bounds, &bounds)) {
-            found[i].push(j);
-            found[j].push(i);
-        }
-        active.push(i);
-    }
-    found
+/// Solids in a tree over their boxes, with the slots that those below each node have so far.
+struct Placed<'a> {
+    solids: &'a [Solid],
+    tree: CompleteTree<Bounds>,
+    leaves: Vec<usize>,
+    slots: Vec<[u32; MEDIA_WORDS]>,
 }
 
-fn touch(a: &Bounds, b: &Bounds) -> bool {
-    a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
+impl<'a> Placed<'a> {
+    fn new(solids: &'a [Solid]) -> Self {
+        let tree = CompleteTree::of_boxes(&solids.iter().map(|solid| solid.bounds).collect::<Vec<_>>());
+        Self { solids, leaves: tree.leaves(solids.len()), slots: vec![[0; MEDIA_WORDS]; tree.nodes.len()], tree }
+    }
+
+    /// The slots of the solids so far whose boxes overlap or touch that of one.
+    fn slots_around(&self, solid: usize, slot_of: &[u8]) -> [u32; MEDIA_WORDS] {
+        let bounds = &self.solids[solid].bounds;
+        let mut found = [0; MEDIA_WORDS];
+        self.tree.visit(|visit| match visit {
+            // Where thousands overlap, most have slots that are known.
+            Visit::Node(i, node) => {
+                let is_new = self.slots[i].iter().zip(&found).any(|(below, known)| below & !known != 0);
+                is_new && node.touches(bounds)
+            }
+            Visit::Leaf(others) => {
+                for other in others.iter().map(|i| *i as usize) {
+                    let slot = u32::from(slot_of[other]);
+                    if slot != NO_SLOT && self.solids[other].bounds.touches(bounds) {
+                        found[slot as usize / 32] |= 1 << (slot % 32);
+                    }
+                }
+                true
+            }
+        });
+        found
+    }
+
+    fn add(&mut self, solid: usize, slot: usize) {
+        let mut node = Some(self.leaves[solid]);
+        while let Some(i) = node {
+            self.slots[i][slot / 32] |= 1 << (slot % 32);
+            node = (i > 0).then(|| (i - 1) / 2);
+        }
+    }
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use super::{
 };
 use glam::Vec3;
 
-use crate::scene::{Bounds, Material, Surface, Triangle, vertex_bits};
+use crate::scene::{Bounds, CompleteTree, Material, Surface, Triangle, vertex_bits};
 
 /// Fraction of the surface below which a hole of few edges counts as a missing triangle.
 const SMALL_HOLE: f64 = 0.05;
@@ -73,8 +73,9 @@ pub(crate) fn repair(
     found.join(triangles, |_, _| true);
     let mesh = |shell: &Shell| mesh_of[shell.triangles[0] as usize];
     let (sheets, solids): (Vec<Shell>, Vec<Shell>) = found.shells.into_iter().partition(is_sheet);
+    let opaque = opaque(triangles, materials, sheets.is_empty());
     let (covers, sheets): (Vec<Shell>, Vec<Shell>) =
-        sheets.into_iter().partition(|shell| ends_at_opaque(shell, triangles, materials));
+        sheets.into_iter().partition(|shell| ends_at_opaque(shell, &opaque));
     covers.iter().for_each(|shell| faults[mesh(shell)].covers += 1);
     let covers = covers.into_iter().map(|shell| Shell { is_cover: true, ..shell });
     found.shells = solids.into_iter().chain(covers).collect();
@@ -84,6 +85,7 @@ pub(crate) fn repair(
         let pane = pane_of(materials, solid);
         shell.triangles.iter().for_each(|i| triangles[*i as usize].material = pane);
     }
+    let boxes = found.boxes();
     for (i, crosses_itself) in found.crossing(triangles).into_iter().enumerate() {
         let shell = &found.shells[i];
         if shell.is_cover {
@@ -94,7 +96,7 @@ pub(crate) fn repair(
         fault.t_junctions += usize::from(shell.has_t_junctions);
         fault.crossings += usize::from(crosses_itself);
         if shell.volume < 0.0 {
-            match found.around(triangles, shell) {
+            match found.around(triangles, shell, &boxes) {
                 // A bubble is of the glass around it, whatever its own material.
                 Some(outer) => {
                     let glass = triangles[found.shells[outer].triangles[0] as usize].material;
@@ -117,21 +119,28 @@ fn is_sheet(shell: &Shell) -> bool {
     !(shell.is_closed() || shell.openness < SMALL_HOLE && shell.hole_edges <= HOLE_EDGES)
 }
 
+/// The opaque triangles, with a tree over their boxes; none if nobody asks.
+fn opaque(triangles: &[Triangle], materials: &[Material], is_unasked: bool) -> (Vec<Triangle>, CompleteTree<Bounds>) {
+    let is_asked = |t: &&Triangle| !is_unasked && !materials[t.material as usize].surface.transmits();
+    let opaque: Vec<Triangle> = triangles.iter().filter(is_asked).copied().collect();
+    let boxes = CompleteTree::of_boxes(&opaque.iter().map(Bounds::from).collect::<Vec<_>>());
+    (opaque, boxes)
+}
+
 /// Whether a sheet ends at opaque surfaces all around, as the water of a pool does: no path comes
 /// past its rim.
-fn ends_at_opaque(shell: &Shell, triangles: &[Triangle], materials: &[Material]) -> bool {
+fn ends_at_opaque(shell: &Shell, (opaque, boxes): &(Vec<Triangle>, CompleteTree<Bounds>)) -> bool {
     let reach = RIM_GAP * shell.bounds.diagonal();
-    let near = |point: Vec3, triangle: &Triangle| {
-        let bounds = Bounds::from(triangle);
-        let is_opaque = !materials[triangle.material as usize].surface.transmits();
-        is_opaque
-            && point.cmpge(bounds.min - reach).all()
-            && point.cmple(bounds.max + reach).all()
-            && distance(point, triangle) <= reach
+    let is_near = |point: &Vec3| {
+        let mut found = false;
+        boxes.near(&Bounds { min: *point - reach, max: *point + reach }, |i| {
+            found = distance(*point, &opaque[i]) <= reach;
+            !found
+        });
+        found
     };
     let step = (shell.rim.len() / RIM_PROBES).max(1);
-    !shell.rim.is_empty()
-        && shell.rim.iter().step_by(step).all(|point| triangles.iter().any(|triangle| near(*point, triangle)))
+    !shell.rim.is_empty() && shell.rim.iter().step_by(step).all(is_near)
 }
 
 /// Distance of a point from a triangle (Ericson 2005, "Real-Time Collision Detection", 5.1.5).

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::solid::{COVER_BIT, NONE};
-use crate::scene::{Bounds, Triangle, vertex_bits};
+use crate::scene::{Bounds, CompleteTree, Triangle, vertex_bits};
 
 /// A connected part of a mesh: its triangles share vertices.
 #[derive(Clone, Debug)]
@@ -60,6 +60,7 @@ impl Shells {
         let (closed, open): (Vec<Shell>, Vec<Shell>) =
             mem::take(&mut self.shells).into_iter().partition(Shell::is_closed);
         self.shells = closed;
+        let of_first: HashMap<u32, usize> = open.iter().enumerate().map(|(i, shell)| (shell.triangles[0], i)).collect();
         let mut left: Vec<Vec<u32>> = open.iter().map(|shell| shell.triangles.clone()).collect();
         while let Some(first) = left.first().map(|part| triangles[part[0] as usize].material) {
             let (group, rest): (Vec<_>, Vec<_>) =
@@ -70,8 +71,10 @@ impl Shells {
                 if whole.is_closed() {
                     self.shells.push(whole);
                 } else {
-                    let is_part = |shell: &&Shell| whole.triangles.contains(&shell.triangles[0]);
-                    self.shells.extend(open.iter().filter(is_part).cloned());
+                    let mut parts: Vec<usize> =
+                        whole.triangles.iter().filter_map(|i| of_first.get(i).copied()).collect();
+                    parts.sort_unstable();
+                    self.shells.extend(parts.into_iter().map(|i| open[i].clone()));
                 }
             }
         }
@@ -98,11 +101,11 @@ impl Shells {
 
     /// The solid of each triangle: a shell with faces outwards and the cavities in it.
     pub(super) fn solids(&self, triangles: &[Triangle]) -> Vec<u32> {
-        let mut of = vec![NONE; self.triangles];
+        let (mut of, boxes) = (vec![NONE; self.triangles], self.boxes());
         for (i, shell) in self.shells.iter().enumerate() {
             let solid = match shell.is_cover {
                 true => i as u32 | COVER_BIT,
-                false if shell.volume < 0.0 => self.around(triangles, shell).unwrap_or(i) as u32,
+                false if shell.volume < 0.0 => self.around(triangles, shell, &boxes).unwrap_or(i) as u32,
                 false => i as u32,
             };
             shell.triangles.iter().for_each(|triangle| of[*triangle as usize] = solid);
@@ -110,17 +113,33 @@ impl Shells {
         of
     }
 
-    /// The smallest shell with faces outwards that a shell lies in.
-    pub(super) fn around(&self, triangles: &[Triangle], inner: &Shell) -> Option<usize> {
+    /// A tree over the boxes of all shells, if any of them has faces inwards.
+    pub(super) fn boxes(&self) -> CompleteTree<Bounds> {
+        let any_inwards = self.shells.iter().any(|shell| !shell.is_cover && shell.volume < 0.0);
+        let boxes = self.shells.iter().filter(|_| any_inwards).map(|shell| shell.bounds);
+        CompleteTree::of_boxes(&boxes.collect::<Vec<_>>())
+    }
+
+    /// The smallest shell with faces outwards that a shell lies in; `boxes` are those of all.
+    pub(super) fn around(&self, triangles: &[Triangle], inner: &Shell, boxes: &CompleteTree<Bounds>) -> Option<usize> {
         let corner = triangles[inner.triangles[0] as usize].positions[0];
-        let outer = self.shells.iter().enumerate().filter(|(_, shell)| {
-            !shell.is_cover
+        let mut found: Option<usize> = None;
+        boxes.near(&Bounds { min: corner, max: corner }, |i| {
+            let shell = &self.shells[i];
+            let is_smaller = found
+                .is_none_or(|other| shell.volume.total_cmp(&self.shells[other].volume).then(i.cmp(&other)).is_lt());
+            if !shell.is_cover
+                && is_smaller
                 && shell.volume > inner.volume.abs()
                 && shell.bounds.min.cmple(corner).all()
                 && shell.bounds.max.cmpge(corner).all()
                 && winding(triangles, shell, corner.as_dvec3()) > 0.5
+            {
+                found = Some(i);
+            }
+            true
         });
-        outer.min_by(|(_, a), (_, b)| a.volume.total_cmp(&b.volume)).map(|(i, _)| i)
+        found
     }
 }
 
