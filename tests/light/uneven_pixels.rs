@@ -98,7 +98,7 @@ fn small_lights_keep_their_mean() {
 #[test]
 fn a_crop_has_the_bits_of_the_whole() {
     let scene = room();
-    let settings = sampled(150, 20).with(|s| {
+    let settings = sampled(110, 20).with(|s| {
         s.photons.mode = Mode::Hybrid;
         (s.photons.global, s.photons.caustic, s.photons.final_gather) = (5000, 5000, 8);
         s.estimate.gather_spacing = 2;
@@ -107,7 +107,7 @@ fn a_crop_has_the_bits_of_the_whole() {
     assert!(whole.stats.extra_samples > 0);
     let crop = Crop { column: 60, row: 70, width: 41, height: 37 };
     let part = render_scene(&scene, &settings.clone().with(|s| s.picture.crop = Some(crop)));
-    let rows = whole.frame.radiance().chunks(150).skip(70).take(37);
+    let rows = whole.frame.radiance().chunks(110).skip(70).take(37);
     let expected: Vec<_> = rows.flat_map(|row| row[60..101].to_vec()).collect();
     let differ = part.frame.radiance().iter().zip(&expected).filter(|(a, b)| a != b).count();
     assert_eq!(differ, 0, "pixels of {}", expected.len());
