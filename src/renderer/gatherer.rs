@@ -1,24 +1,25 @@
-//! Gathering of photons for a picture: by the grid on the device, or by a kd-tree on the CPU.
+//! Light of photons at the visible points of a picture, tile by tile: from the maps themselves,
+//! records of irradiance, and rays of final gathering.
 
 use super::{
     maps::PhotonMaps,
     preview::{bare, bright_places, ends_of_rays},
+    searches::Searches,
     tally,
     tiles::{CameraPass, Gatherer},
 };
 use crate::{
     error::Result,
-    gpu::{Buffer, Gpu},
+    gpu::Gpu,
     image::{Film, layers::LightComponent},
     layout::{Gathered, RecordGrid, VisiblePoint},
     map_kind::MapKind,
     passes::{
-        BrightPlaces, EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache,
-        IrradianceRecords, PhotonMap, Records, StepCount, Tile, filter_footprint, record_spacing,
+        BrightPlaces, EstimateRequest, EstimateSharing, GatherSettings, IrradianceCache, IrradianceRecords, Records,
+        StepCount, Tile, filter_footprint, record_spacing,
     },
     progress::{Progress, Stage},
-    reference::{Estimate, KdMap},
-    settings::{EstimateSettings, Search},
+    settings::EstimateSettings,
     stats::{Stats, timed},
     upload::SceneBuffers,
 };
@@ -45,20 +46,6 @@ pub(crate) struct MapGatherer<'a> {
     rays_per_pixel: Option<f64>,
 }
 
-enum Searches<'a> {
-    Grid(Box<Gather<'a>>),
-    /// One tree per map.
-    KdTree(Vec<KdMap>),
-}
-
-/// Creates the gather of the estimate that the settings ask for.
-pub(super) fn gather_for<'a>(gpu: &Gpu, scene: &'a SceneBuffers, estimate: &EstimateSettings) -> Gather<'a> {
-    if estimate.raw {
-        return Gather::new(gpu, GatherOptions::default());
-    }
-    Gather::over(gpu, scene, GatherOptions::flat())
-}
-
 impl<'a> MapGatherer<'a> {
     pub fn new(
         gpu: &Gpu,
@@ -67,13 +54,7 @@ impl<'a> MapGatherer<'a> {
         estimate: &'a EstimateSettings,
         observer: Option<&'a mut dyn Observer>,
     ) -> Result<Self> {
-        let search = match estimate.search {
-            Search::Grid | Search::Radius => Searches::Grid(Box::new(gather_for(gpu, scene, estimate))),
-            Search::KdTree => {
-                let trees = maps.maps().iter().map(|map| kd_map(gpu, map)).collect::<Result<_>>()?;
-                Searches::KdTree(trees)
-            }
-        };
+        let search = Searches::new(gpu, scene, maps, estimate)?;
         // Kernels of few photons are stretched over more: that does not widen the area for which
         // they stand.
         let stretched = GatherSettings::from(estimate).neighbors as f32 / estimate.neighbors as f32;
@@ -296,114 +277,4 @@ impl Gatherer for MapGatherer<'_> {
         }
         Ok(())
     }
-}
-
-impl Searches<'_> {
-    /// Same as [`Self::estimates_at`].
-    fn estimates(
-        &mut self,
-        pass: &CameraPass,
-        maps: &PhotonMaps,
-        settings: &EstimateSettings,
-        points: &[VisiblePoint],
-        progress: &dyn Progress,
-    ) -> Result<Vec<([f32; 3], f32)>> {
-        let count = points.len() as u32;
-        let points = pass.gpu.storage_with("single points", points)?;
-        self.estimates_at(pass, maps, settings, (&points, count), progress)
-    }
-
-    /// Radiance by all maps, and the radius of the narrowest estimate, at each of the first points
-    /// of a buffer.
-    fn estimates_at(
-        &mut self,
-        pass: &CameraPass,
-        maps: &PhotonMaps,
-        settings: &EstimateSettings,
-        (points, count): (&Buffer, u32),
-        progress: &dyn Progress,
-    ) -> Result<Vec<([f32; 3], f32)>> {
-        let gpu = pass.gpu;
-        let mut found = vec![([0.0; 3], f32::INFINITY); count as usize];
-        let radiance = gpu.storage_with("radiance of single points", &vec![[0.0_f32; 4]; found.len()])?;
-        let gathered = gpu.storage::<Gathered>("gathered at single points", count.into())?;
-        for index in 0..maps.maps().len() {
-            let request = EstimateRequest { points, count, map_number: 1, radiance: &radiance, gathered: &gathered };
-            self.answer(pass, maps, index, settings, &request, progress)?;
-            let all: Vec<Gathered> = gpu.read(&gathered, 0, count.into())?;
-            found.iter_mut().zip(all).for_each(|((_, radius), one)| *radius = radius.min(one.radius_squared.sqrt()));
-        }
-        let sums: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into())?;
-        found.iter_mut().zip(sums).for_each(|((light, _), [r, g, b, _])| *light = [r, g, b]);
-        Ok(found)
-    }
-
-    /// Adds the light at ends of rays to the visible points that the rays come from: the indices of
-    /// the points, and the ends in a buffer.
-    fn light_ends(
-        &mut self,
-        pass: &CameraPass,
-        (maps, settings): (&PhotonMaps, &EstimateSettings),
-        tile: &Tile,
-        (indices, ends): (&[usize], &Buffer),
-        progress: &dyn Progress,
-    ) -> Result<()> {
-        let found = self.estimates_at(pass, maps, settings, (ends, indices.len() as u32), progress)?;
-        let mut radiance = pass.radiance(tile)?;
-        for (&index, (light, _)) in indices.iter().zip(found) {
-            (0..3).for_each(|c| radiance[index][c] += light[c]);
-        }
-        pass.set_radiance(&radiance);
-        Ok(())
-    }
-
-    /// Answers a request for estimates of one map.
-    fn answer(
-        &mut self,
-        pass: &CameraPass,
-        maps: &PhotonMaps,
-        index: usize,
-        estimate: &EstimateSettings,
-        request: &EstimateRequest,
-        progress: &dyn Progress,
-    ) -> Result<()> {
-        match self {
-            Self::Grid(gather) => {
-                let (points, results) = ((request.count, request.map_number), (request.radiance, request.gathered));
-                let map = &maps.maps()[index];
-                gather.run_waiting(pass.gpu, map, request.points, points, &pass.estimate, results, progress).map(drop)
-            }
-            Self::KdTree(trees) => kd_estimates(pass.gpu, &trees[index], estimate, request, progress),
-        }
-    }
-}
-
-/// Counterpart of [`Gather::run_waiting`] for a kd-tree.
-fn kd_estimates(
-    gpu: &Gpu,
-    tree: &KdMap,
-    settings: &EstimateSettings,
-    request: &EstimateRequest,
-    progress: &dyn Progress,
-) -> Result<()> {
-    let mut points: Vec<VisiblePoint> = gpu.read(request.points, 0, request.count.into())?;
-    points.iter_mut().filter(|p| p.next_map > request.map_number).for_each(|p| p.next_map = 0);
-    let mut radiance: Vec<[f32; 4]> = gpu.read(request.radiance, 0, request.count.into())?;
-    let mut gathered: Vec<Gathered> = gpu.read(request.gathered, 0, request.count.into())?;
-    for (i, estimate) in tree.gather(&points, settings, progress)?.into_iter().enumerate() {
-        if points[i].next_map != 0 {
-            (0..3).for_each(|c| radiance[i][c] += estimate.radiance[c] as f32);
-            let Estimate { radius_squared, count, fingerprint, .. } = estimate;
-            gathered[i] = Gathered { radius_squared, count, fingerprint };
-        }
-    }
-    gpu.write(request.radiance, 0, &radiance);
-    gpu.write(request.gathered, 0, &gathered);
-    Ok(())
-}
-
-/// Reads a map's photons back and builds a kd-tree of them.
-fn kd_map(gpu: &Gpu, map: &PhotonMap) -> Result<KdMap> {
-    let (photons, fluxes) = map.read(gpu)?;
-    Ok(KdMap::new(photons, fluxes, map.emitted()))
 }

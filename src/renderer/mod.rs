@@ -11,6 +11,7 @@ mod preview;
 mod progressive;
 mod ray_start;
 mod render;
+mod searches;
 mod seen;
 mod session;
 mod size;

@@ -6,8 +6,9 @@ use std::sync::{
 };
 
 use super::{
-    gatherer::{MapGatherer, Observer, gather_for},
+    gatherer::{MapGatherer, Observer},
     maps::{PhotonMaps, trace_maps},
+    searches::gather_for,
     seen::Viewer,
     size::picture_size,
     tally,

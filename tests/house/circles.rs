@@ -215,6 +215,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "tiles",
             "film_layers",
             "preview",
+            "searches",
             "gatherer",
             "session",
             "light_groups",

@@ -1,7 +1,10 @@
 //! Keys of the random numbers of rays of final gathering: by the point that they start from, so
 //! that a pixel does not depend on which others are rendered beside it.
 
-use super::{camera_tracer::CameraTracer, tile::Tile};
+use super::{
+    camera_tracer::CameraTracer,
+    tile::{Tile, morton_number},
+};
 use crate::layout::CameraTile;
 
 /// How the points of a picture share sets of numbers. The rays of a point always follow each other
@@ -46,20 +49,15 @@ impl CameraTracer {
 }
 
 fn key(view: &CameraTile, start: Start, rays: u32, sets: RaySets) -> [u32; 2] {
-    let (column, row) = (u64::from(start.pixel.0), u64::from(start.pixel.1));
+    let (column, row) = start.pixel;
     let (point, set) = match sets {
-        RaySets::OfPixels => (u64::from(start.sample), row * u64::from(view.width) + column),
-        RaySets::OfPicture => (morton_code(column) | morton_code(row) << 1, u64::from(start.sample)),
+        RaySets::OfPixels => (u64::from(start.sample), u64::from(row) * u64::from(view.width) + u64::from(column)),
+        RaySets::OfPicture => (u64::from(morton_number(column, row)), u64::from(start.sample)),
     };
     let number = point * u64::from(rays);
     let set = set * u64::from(view.branches) + u64::from(start.branch);
     // Of large pictures, a set has the numbers of 32 bits several times, each for a set of its own.
     [number as u32, (set as u32) ^ ((number >> 32) as u32 ^ (set >> 32) as u32).reverse_bits()]
-}
-
-/// The lower 32 bits, each followed by a zero.
-fn morton_code(x: u64) -> u64 {
-    (0..32).fold(0, |code, bit| code | ((x >> bit) & 1) << (2 * bit))
 }
 
 #[cfg(test)]

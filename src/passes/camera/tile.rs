@@ -112,7 +112,8 @@ fn sides_of(pixels: u32) -> (u32, u32) {
     (1 << bits.div_ceil(2), 1 << (bits / 2))
 }
 
-/// Number of a pixel of a tile in Morton order, by its column and row there.
+/// Number of a pixel in Morton order, by its column and row in a tile or in the picture, below
+/// 65,536.
 #[must_use]
 pub fn morton_number(column: u32, row: u32) -> u32 {
     let spread = |x: u32| (0..16).fold(0, |sum, bit| sum | ((x >> bit) & 1) << (2 * bit));
