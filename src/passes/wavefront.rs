@@ -10,9 +10,9 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Surfaces of the first submission, and of further ones. After each, the host checks whether any
-/// path is left: mostly there is none after a few surfaces, and a dispatch costs something even if
-/// it finds nothing to do.
+/// Surfaces of the first submission, and of a further one at most, which has as many as those
+/// before it. After each, the host checks whether any path is left: mostly there is none after a few
+/// surfaces, and a dispatch costs something even if it finds nothing to do.
 const FIRST_SURFACES: u32 = 8;
 const SURFACES_PER_SUBMISSION: u32 = 32;
 
@@ -80,7 +80,7 @@ impl Wavefront {
         let (mut surfaces, mut given_up) = (0, 0);
         loop {
             let until = if surfaces < expected_surfaces { expected_surfaces } else { most_surfaces };
-            let most = if surfaces == 0 { FIRST_SURFACES } else { SURFACES_PER_SUBMISSION };
+            let most = surfaces.clamp(FIRST_SURFACES, SURFACES_PER_SUBMISSION);
             for _ in 0..most.min(until - surfaces) {
                 self.advance.dispatch(&mut encoder, &advance, 1);
                 for (kernel, bindings) in &bound {

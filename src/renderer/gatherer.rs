@@ -239,7 +239,8 @@ impl Gatherer for MapGatherer<'_> {
             reach,
             footprint: filter_footprint(self.estimate.gather_radius, spacing),
         };
-        let records = taken.finish(|position| reach * coarse.tracer.scale_at(position));
+        let radius = |position| reach * coarse.tracer.scale_at(position);
+        let records = taken.finish(self.estimate.gather_reach, radius);
         self.records = Some(IrradianceRecords::new(coarse.gpu, &records, grid)?);
         Ok(())
     }

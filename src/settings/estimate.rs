@@ -58,6 +58,9 @@ pub struct EstimateSettings {
     /// Radius around a visible point from which it takes irradiance then, pixels, in
     /// [`Self::GATHER_RADIUS`].
     pub gather_radius: f32,
+    /// Distance from a visible point within which others take its irradiance, as a fraction of the
+    /// harmonic mean distance to what its rays meet, in [`Self::GATHER_REACH`].
+    pub gather_reach: f32,
 }
 
 impl Default for EstimateSettings {
@@ -74,6 +77,7 @@ impl Default for EstimateSettings {
             irradiance_cells: 1.0,
             gather_spacing: 0,
             gather_radius: 8.0,
+            gather_reach: 1.5,
         }
     }
 }
@@ -96,6 +100,8 @@ impl EstimateSettings {
     pub const GATHER_SPACING: Range<u32> = Range::closed(0, 16);
     /// Range of [`Self::gather_radius`], pixels.
     pub const GATHER_RADIUS: Range<f32> = Range::closed(0.5, 64.0);
+    /// Range of [`Self::gather_reach`].
+    pub const GATHER_REACH: Range<f32> = Range::above(0.0, 16.0);
 
     /// Whether irradiance is kept in cells. Estimates to compare with are made at each point.
     pub(crate) fn keeps_irradiance(&self) -> bool {
@@ -120,6 +126,7 @@ impl EstimateSettings {
         Self::IRRADIANCE_CELLS.check("estimate.irradiance_cells", self.irradiance_cells)?;
         Self::GATHER_SPACING.check("estimate.gather_spacing", self.gather_spacing)?;
         Self::GATHER_RADIUS.check("estimate.gather_radius", self.gather_radius)?;
+        Self::GATHER_REACH.check("estimate.gather_reach", self.gather_reach)?;
         match (self.search, self.radius) {
             (Search::Radius, None) => fail("estimate.search", "radius".to_string(), "needs a radius"),
             (Search::Radius, Some(radius)) => Self::RADIUS.check("estimate.radius", radius),

@@ -39,6 +39,9 @@ impl PassSettings {
     pub const MIN_NEIGHBORS: u32 = 5;
     /// Radius from which irradiance is taken at least, pixels.
     const MIN_GATHER_RADIUS: f32 = 0.5;
+    /// Reach of records of later passes, relative to that of the first. What is smoothed away in
+    /// contact shadows and corners stays over all passes, noise does not.
+    const LATER_REACH: f32 = 1.0 / 6.0;
 
     /// Squared radius of pass `index`, relative to that of pass 0: Π (j + α)/(j + 1) over j = 1 to
     /// `index` (Knaus and Zwicker 2011, "Progressive Photon Mapping: A Probabilistic Approach").
@@ -58,6 +61,11 @@ impl PassSettings {
             radius: first.radius.map(shrunken),
             max_radius: first.max_radius.map(shrunken),
             gather_radius: shrunken(first.gather_radius).max(Self::MIN_GATHER_RADIUS),
+            gather_reach: if index == 0 {
+                first.gather_reach
+            } else {
+                shrunken(Self::LATER_REACH * first.gather_reach)
+            },
             ..first.clone()
         }
     }
@@ -172,6 +180,7 @@ mod tests {
         assert!((f64::from(tenth.radius.expect("one")).powi(2) / 4.0 - area).abs() < 1e-6);
         assert!((f64::from(tenth.max_radius.expect("one")).powi(2) / 16.0 - area).abs() < 1e-6);
         assert!((f64::from(tenth.gather_radius).powi(2) / 64.0 - area).abs() < 1e-6);
+        assert!((f64::from(tenth.gather_reach).powi(2) - 0.0625 * area).abs() < 1e-6, "{}", tenth.gather_reach);
         assert_eq!(passes.bandwidth(&first, 10), f64::from(tenth.neighbors) / 100.0);
         assert_eq!(passes.bandwidth(&EstimateSettings { search: Search::Radius, ..first.clone() }, 10), area);
         assert_eq!(passes.estimate(&first, 1_000_000).neighbors, PassSettings::MIN_NEIGHBORS);

@@ -27,9 +27,6 @@ const NO_RECORD: IrradianceRecord =
 /// Slots of records of a picture at most: 128 MiB, which all adapters bind.
 const MAX_RECORDS: u64 = 1 << 22;
 
-/// Fraction of the distance to what is near over which a record is taken.
-const NEAR_FRACTION: f32 = 1.5;
-
 /// Pixels between the points of final gathering: more than asked for where the whole picture would
 /// have too many of them.
 ///
@@ -85,13 +82,14 @@ impl Records {
         self.distances[slot] = rays as f32 / arriving.nearness;
     }
 
-    /// All records, with their reach. `radius`: that of the filter at a position, metres.
+    /// All records, with their reach: that fraction of the distance to what is around each.
+    /// `radius`: that of the filter at a position, metres.
     #[must_use]
-    pub fn finish(mut self, radius: impl Fn(Vec3) -> f32) -> Vec<IrradianceRecord> {
+    pub fn finish(mut self, fraction: f32, radius: impl Fn(Vec3) -> f32) -> Vec<IrradianceRecord> {
         for slot in 0..self.records.len() {
             let distance = self.distance(slot);
             let record = &mut self.records[slot];
-            let reach = NEAR_FRACTION * distance / radius(record.position.into());
+            let reach = fraction * distance / radius(record.position.into());
             record.direction_and_reach |= snorm8(reach.clamp(1.0 / 127.0, 1.0)) << 24;
         }
         // All that lies beyond the grid has the slot behind all others.
@@ -179,7 +177,7 @@ mod tests {
                 records.put(place, 0, &point, [1.0; 4], &light(nearness), 1);
             }
             // What is near at one limits the other: the distance is 1.5 units, or a hundredth.
-            records.finish(|_| 3.0)[4].direction_and_reach >> 24
+            records.finish(1.5, |_| 3.0)[4].direction_and_reach >> 24
         };
         assert_eq!(reach((1, 0)), snorm8(0.01), "above and beside it");
         assert_eq!(reach((3, 0)), snorm8(0.5), "control: the end of the row before");
