@@ -56,6 +56,15 @@ pub enum Command {
         /// Print JSON, for scripts
         #[arg(long)]
         json: bool,
+
+        /// Trace the photons of a picture too, as `render` does by default, and say how many end
+        /// where the camera sees them
+        #[arg(long)]
+        photons: bool,
+
+        /// Adapter that traces them, as in `render`
+        #[arg(long, value_name = "NAME|INDEX", requires = "photons", env = "CAUSTICA_DEVICE", hide_env_values = true)]
+        device: Option<String>,
     },
 }
 

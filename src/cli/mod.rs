@@ -60,6 +60,8 @@ fn work(command: Command) -> Result<()> {
         Command::Merge(args) => merge::run(&args),
         Command::Status(args) => merge::status(&args),
         Command::Devices => devices::devices(),
-        Command::Info { scene, loading, json } => info::info(&scene, &loading.options(), json),
+        Command::Info { scene, loading, json, photons, device } => {
+            info::info(&scene, &loading.options(), json, photons.then_some(device.as_deref()))
+        }
     }
 }

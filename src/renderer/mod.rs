@@ -22,7 +22,7 @@ mod unevenness;
 pub use light_groups::LightGroups;
 pub use maps::PhotonMaps;
 pub use progressive::Progressive;
-pub use render::render;
+pub use render::{render, trace_photons};
 pub use session::{Render, Session};
 pub use size::size_of;
 

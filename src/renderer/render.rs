@@ -2,8 +2,12 @@
 
 use std::time::Instant;
 
-use super::{light_groups::LightGroups, session::Render, size::picture_size};
-use crate::{error::Result, gpu::Gpu, progress::Progress, scene::Scene, settings::Settings};
+use super::{
+    light_groups::LightGroups,
+    session::{Render, Session},
+    size::picture_size,
+};
+use crate::{error::Result, gpu::Gpu, progress::Progress, scene::Scene, settings::Settings, stats::Stats};
 
 /// Renders the scene. The caller adds the seconds of `load` to the statistics.
 ///
@@ -21,6 +25,16 @@ pub fn render(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Prog
     })?;
     stats.seconds.total = start.elapsed().as_secs_f64();
     Ok(Render { frame: film.finish(), stats })
+}
+
+/// Traces the photons of a picture, and no more: statistics of the first pass.
+///
+/// # Errors
+/// As [`render`].
+pub fn trace_photons(gpu: &Gpu, scene: &Scene, settings: &Settings, progress: &dyn Progress) -> Result<Stats> {
+    check(scene, settings)?;
+    let session = Session::open_groups(gpu, scene, settings, &[], progress)?.remove(0);
+    Ok(session.photon_maps(&settings.photons, progress)?.stats().clone())
 }
 
 /// Checks the settings, the scene and the picture's size before the work begins.

@@ -311,6 +311,34 @@ fn info_says_what_the_scene_holds() {
     let ended = caustica(folder().path(), "info scene.gltf");
     assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
     assert!(ended.stdout.contains("triangle") && ended.stdout.contains("light"), "{}", ended.stdout);
+    assert!(!ended.stdout.contains("photons"), "they take a device, and time: {}", ended.stdout);
+}
+
+#[test]
+fn info_says_how_many_photons_the_camera_sees() {
+    let folder = folder();
+    let told = |scene: &str, more: &str| {
+        let ended = caustica(folder.path(), &format!("info {scene} --photons{more}"));
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        ended.stdout
+    };
+    let line = |text: &str, map: &str| {
+        let found = text.lines().find(|line| line.trim_start().starts_with(map)).map(str::to_owned);
+        found.unwrap_or_else(|| panic!("{map}: {text}"))
+    };
+    let alone = told("scene.gltf", "");
+    assert!(["global", "caustic"].iter().all(|map| line(&alone, map).ends_with("none")), "one triangle: {alone}");
+    let room = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/references/S1.glb");
+    let text = told(room, "");
+    let info: serde_json::Value = serde_json::from_str(&told(room, " --json")).expect("JSON");
+    for map in ["global", "caustic"] {
+        let count = |name: &str| info["photons"][map].pointer(name).and_then(serde_json::Value::as_u64).expect(name);
+        let (seen, sampled) = (count("/seen/seen"), count("/seen/sampled"));
+        assert!(0 < seen && seen < sampled && sampled <= count("/stored"), "{info}");
+        let said = format!(", {:.1} % where the camera sees them", 100.0 * seen as f64 / sampled as f64);
+        assert!(line(&text, map).ends_with(&said), "{said}: {text}");
+    }
+    assert_eq!(info["triangles"], 10);
 }
 
 #[test]
