@@ -5,6 +5,7 @@
 //! | a ball on the floor, a small one with its contact shadow, a torus, leaves, a slit, mirrors that face each other, a glass ball before all | final gathering with many rays at every sample | the estimate from the photons around the point |
 //! | a lamp 3 cm from a wall that faces away | the same | the same |
 //! | a lamp 3 cm from a wall that it faces, a strip below a shelf, a small caustic as the source of indirect light | the same, by blocks of pixels | the same |
+//! | passes from the second on: a contact shadow | the same | the reach of the first pass |
 //! | a part of a picture of 4096 x 4096 | the same | the same |
 //! | a floor whose interpolated normals lean | the same | the floor without them |
 //! | a wall of rough metal | estimates at all that it shows, in place of cells | smooth metal has the same bits without cells |
@@ -13,9 +14,11 @@
 use std::f32::consts::TAU;
 
 use caustica::{
-    renderer::Render,
+    image::{PassBlock, PassSum},
+    progress::Silent,
+    renderer::{Progressive, Render, Session},
     scene::{Material, Scene, Surface, Triangle},
-    settings::{Crop, ExtraLayers, Mode, Settings},
+    settings::{Crop, ExtraLayers, Mode, PassSettings, Settings},
 };
 use glam::{Vec3, vec3};
 use support::{photons::Random, *};
@@ -213,6 +216,33 @@ fn small_bright_places_leave_no_spots() {
         assert!(found < 0.5 * control, "{name}: {found}, and {control} by the photons around each point");
         assert!(within(mean(&spaced), mean(&right), 0.02), "{name}: {} instead of {}", mean(&spaced), mean(&right));
     }
+}
+
+#[test]
+fn later_passes_look_closer_into_contact_shadows() {
+    let scene = with(|s| s.spheres.push(sphere(vec3(0.1, -0.88, -0.2), 0.12, MIRROR)));
+    let passes = |settings: &Settings| {
+        let session = Session::open(gpu(), &scene, &settings.lights, &Silent).expect("the scene fits");
+        let passes = Progressive::new(&session, settings, PassSettings::default()).expect("passes");
+        let mut sum = PassSum::default();
+        for index in 1..4 {
+            let (film, stats) = passes.render(index, &Silent).expect("a pass");
+            sum.push(PassBlock::of_pass(index, film, &stats)).expect("of one picture");
+        }
+        sum.total().expect("of one picture").expect("passes").film().finish()
+    };
+    let sized = |settings: Settings| settings.with(|s| s.picture.spp = 4);
+    let right = render_scene(&scene, &sized(converged(64)));
+    let closer = sized(gathering(64, 2));
+    // The reach that the first pass has.
+    let as_first = closer.clone().with(|s| s.estimate.gather_reach *= 6.0);
+    // Below the ball.
+    let shadow = |radiance: &[[f32; 3]]| -> f32 {
+        (49..53).flat_map(|row| (31..39).map(move |column| row * 64 + column)).map(|i| radiance[i][1]).sum()
+    };
+    let [found, control, right] =
+        [shadow(passes(&closer).radiance()), shadow(passes(&as_first).radiance()), shadow(right.frame.radiance())];
+    assert!((found - right).abs() < 0.5 * (control - right).abs(), "{found}, and {control}, instead of {right}");
 }
 
 #[test]
