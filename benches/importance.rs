@@ -7,9 +7,9 @@
 //! a picture by final gathering of another seed with twenty times the photons, eight times the rays
 //! and four times the samples. That of photons is against one of the same seed and twenty times the
 //! photons: its camera rays and rays of final gathering are the same, whose noise no photon
-//! changes. The last columns are the squared error at equal time, the product of error and seconds,
-//! over that of the same estimate with unaimed emission, from either error, and over that of photons
-//! with unaimed emission. The aim is a tenth.
+//! changes. The last columns are the squared error at equal time, the product of error and
+//! seconds, over that of the same estimate with unaimed emission, from either error, and over that
+//! of photons with unaimed emission. The aim is a tenth.
 
 use caustica::{
     image::difference::rel_mse,

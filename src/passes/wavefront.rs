@@ -11,8 +11,8 @@ use crate::{
 };
 
 /// Surfaces of the first submission, and of a further one at most, which has as many as those
-/// before it. After each, the host checks whether any path is left: mostly there is none after a few
-/// surfaces, and a dispatch costs something even if it finds nothing to do.
+/// before it. After each, the host checks whether any path is left: mostly there is none after a
+/// few surfaces, and a dispatch costs something even if it finds nothing to do.
 const FIRST_SURFACES: u32 = 8;
 const SURFACES_PER_SUBMISSION: u32 = 32;
 
