@@ -13,8 +13,9 @@ use super::{
     probe::{Probe, Row, rows},
 };
 
-/// Lobes besides the metal: bit 0 sheen, bit 1 a clear coat, bit 2 rougher metal.
-const MIXTURES: [u8; 5] = [0, 1, 2, 3, 7];
+/// Lobes besides the metal: bit 0 sheen, bit 1 a clear coat, bit 2 rougher metal, bit 3 a normal
+/// that leans so far that much of the light is mirrored.
+const MIXTURES: [u8; 7] = [0, 1, 2, 3, 7, 8, 15];
 
 fn directions(a: impl IntoIterator<Item = [f32; 4]>, given: bool, view: DVec3, mixture: u8) -> Vec<[f32; 4]> {
     let b = [view.x as f32, view.z as f32, f32::from(u8::from(given)), f32::from(mixture)];

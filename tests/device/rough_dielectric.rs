@@ -30,7 +30,7 @@ struct Glass {
     thin: bool,
     /// Whether values are those of flux.
     flux: bool,
-    /// Sum of [`FILM`], [`COAT`] and one of [`LEANING`].
+    /// Sum of [`FILM`], [`COAT`], one of [`LEANING`] and [`MORE`].
     has: u8,
 }
 
@@ -38,6 +38,8 @@ const FILM: u8 = 2;
 const COAT: u8 = 4;
 /// Shading normals that lean to +x and to -x.
 const LEANING: [u8; 2] = [8, 16];
+/// They lean by 50° in place of 17°.
+const MORE: u8 = 32;
 
 impl Glass {
     fn solid(roughness: f32, eta: f32) -> Self {
@@ -307,14 +309,16 @@ fn asymmetry(there: Glass, back: Glass, v: DVec3) -> f64 {
 
 #[test]
 fn coats_films_and_mapped_normals_keep_both_ways_equal() {
-    for has in [FILM, COAT, LEANING[0], FILM | COAT | LEANING[0]] {
+    for has in [FILM, COAT, LEANING[0], LEANING[1] | MORE, FILM | COAT | LEANING[0] | MORE] {
         for eta in [1.5, 1.0 / 1.5] {
             let there = Glass { flux: true, has, ..Glass::solid(0.4, eta) };
-            let leans = if has & LEANING[0] == 0 { 0 } else { LEANING[1] };
-            let back = Glass { has: (has & !LEANING[0]) | leans, ..Glass::solid(0.4, 1.0 / eta) };
+            let leans = has & (LEANING[0] | LEANING[1]);
+            let turned = if leans == 0 { has } else { has ^ (LEANING[0] | LEANING[1]) };
+            let back = Glass { has: turned, ..Glass::solid(0.4, 1.0 / eta) };
             let found = asymmetry(there, back, view(0.8));
             assert!(found < 3e-2, "{there:?}: {found}");
-            let other = Glass { has: back.has ^ LEANING[1], ..back };
+            let other = if leans == 0 { turned | LEANING[1] } else { has };
+            let other = Glass { has: other, ..back };
             assert!(asymmetry(there, other, view(0.8)) > 0.1, "control: another normal than that of {there:?}");
         }
     }

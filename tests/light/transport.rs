@@ -6,6 +6,7 @@
 //! | furnace | a ball of each material under a uniform sky is as bright as its albedo says | half of the sky |
 //! | lobes | modes 0 and 1 agree on a room with a ball of each material | a ball of another material |
 //! | rays | light seen in sharp and rough metal is there in all modes that show direct light | the mode that does not |
+//! | parallel lamp | a flat lamp lights metal that is parallel to it as it does when it is turned a little | lamp turned away |
 //! | blur | the picture of a lamp in metal keeps its energy as it blurs | a smaller lamp |
 //! | final gathering | light off rough lobes counts once in it | a black ball |
 //! | caustic | a rough ball's caustic is in the modes with photons | lamp turned away |
@@ -292,4 +293,29 @@ fn a_leaf_lights_what_is_behind_it() {
     assert!((photons / rays - 1.0).abs() < 0.03, "{rays} by rays, {photons} by photons");
     let half = of(0.5, Mode::Hybrid);
     assert!((half / rays - 0.5).abs() < 0.03, "control: {half} through a leaf of half");
+}
+
+/// Brightness of a plate of rough metal above, lit from the side by a flat lamp that faces up,
+/// turned by that angle from its plane.
+fn plate_beside_a_lamp(turn: f32) -> f64 {
+    let mut scene = Scene { materials: vec![metal(1.0), emissive("lamp", 0.0, 20.0, false)], ..Scene::default() };
+    add_quad(&mut scene, vec3(-1.5, 1.2, -1.5), Vec3::X * 1.3, Vec3::Z * 3.0, 0);
+    let along = vec3(turn.cos(), turn.sin(), 0.0);
+    add_quad(&mut scene, vec3(1.3, 1.0, 1.0) - 0.5 * along, along, Vec3::Z * -2.0, 1);
+    scene.cameras = vec![camera(vec3(-0.8, 0.0, 0.0), vec3(-0.8, 1.2, 0.0), 40.0)];
+    mean(&render_scene(
+        &scene,
+        &settings(Mode::DirectRays, 1000, 16).with(|s| {
+            s.picture.spp = 64;
+        }),
+    ))
+}
+
+#[test]
+fn a_lamp_parallel_to_metal_lights_it() {
+    let parallel = plate_beside_a_lamp(0.0);
+    let turned = 0.5 * (plate_beside_a_lamp(0.01) + plate_beside_a_lamp(-0.01));
+    assert!(within(parallel, turned, 0.03), "{parallel} parallel, {turned} turned a little");
+    let away = plate_beside_a_lamp(std::f32::consts::PI);
+    assert!(away < 0.01 * parallel, "control: a lamp turned away gives {away}");
 }
