@@ -39,7 +39,9 @@ fn buffers_lie_in_the_folder_of_the_scene_unless_all_is_allowed() {
         let options = LoadOptions { allow_outside, ..LoadOptions::default() };
         Scene::read(gltf.to_string().as_bytes(), &scene_folder.join("test.gltf"), &options)
     };
-    for inside in ["sub/a%20b.bin", "./sub/a b.bin", "sub/a%20%62.bin"] {
+    let ways =
+        ["sub/a%20b.bin", "./sub/a b.bin", "sub/a%20%62.bin", "sub/../sub/a b.bin", "sub\\a b.bin", "sub%5ca b.bin"];
+    for inside in ways {
         assert!(read(inside, false).is_ok(), "{inside}");
     }
     let absolute = root.join("secret.bin").display().to_string();
@@ -56,7 +58,7 @@ fn buffers_lie_in_the_folder_of_the_scene_unless_all_is_allowed() {
         assert_eq!(said, format!("buffers[0].uri: {outside:?} {expected}"));
         assert!(read(outside, true).is_ok(), "{outside}: {said}");
     }
-    for windows in ["C:/secret.bin", "..\\secret.bin", "sub%5ca.bin"] {
+    for windows in ["C:/secret.bin", "..\\secret.bin", "sub\\..\\..\\secret.bin", "sub%5c..%5c..%5csecret.bin"] {
         assert!(message(read(windows, false)).contains("leads out of the scene's folder"), "{windows}");
     }
     let web = message(read("https://a.example/b.bin", true));

@@ -72,16 +72,34 @@ impl Resources<'_> {
             Some(_) => return fault(place, format!("{uri:?}: only data URIs and files are read")),
         };
         let decoded = urlencoding::decode(encoded).or_else(|error| fault(place, format!("{uri:?}: {error}")))?;
-        let path = Path::new(decoded.as_ref());
         if decoded.is_empty() {
             return fault(place, "is empty");
         }
-        let below = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-        if !self.allow_outside && (scheme.is_some() || !below || decoded.contains('\\')) {
-            return outside(uri, place);
+        // As exporters on Windows write them, and as web browsers read them.
+        let decoded = decoded.replace('\\', "/");
+        let path = Path::new(&decoded);
+        if self.allow_outside {
+            return Ok(self.folder.join(path));
         }
-        Ok(self.folder.join(path))
+        match below(path) {
+            Some(path) if scheme.is_none() => Ok(self.folder.join(path)),
+            _ => outside(uri, place),
+        }
     }
+}
+
+/// A relative path without steps upwards; none if it leads out of the folder that it starts in.
+fn below(path: &Path) -> Option<PathBuf> {
+    let mut below = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::Normal(name) => below.push(name),
+            Component::CurDir => {}
+            Component::ParentDir if below.pop() => {}
+            _ => return None,
+        }
+    }
+    Some(below)
 }
 
 /// Whether the text before a colon names a scheme (RFC 3986, 3.1).
