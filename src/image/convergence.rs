@@ -7,7 +7,7 @@ use crate::settings::Crop;
 /// pixels do not decide. Where the mean is 1, the square of the error estimates relMSE.
 const FLOOR: f64 = 0.1;
 /// Fraction of the squared standard error that is noise at least, whatever closer estimates say.
-const LEAST_NOISE: f64 = 0.5;
+const LEAST_NOISE: f64 = 0.75;
 
 /// Relative errors of a picture, root mean squares over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
