@@ -159,7 +159,8 @@ fn assemble(
     scene.names_dark_light = materials.names_dark_light;
     scene.materials = materials.materials;
     let ranges: Vec<MeshRange> = meshes.into_iter().map(|placed| mesh_range(root, placed)).collect();
-    let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges);
+    let eyes: Vec<Vec3> = contents.cameras.iter().map(|(_, at, _)| (*at - center).as_vec3()).collect();
+    let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges, &eyes);
     warnings.into_iter().for_each(|warning| notes.add(warning));
     (scene.triangles, scene.attributes, scene.shells) = (triangles, attributes, shells);
     (scene.meshes, scene.instances) = (shared.meshes, shared.instances);
