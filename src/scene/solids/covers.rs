@@ -19,6 +19,8 @@ const LEVEL: f32 = 0.95;
 const WALKS: u32 = 64;
 const STEPS: u32 = 6;
 const MOST_OUT: u32 = WALKS / 8;
+/// Points that are tried for the start of a walk where the sheet runs on in a wall or below a shore.
+const TRIES: u32 = 16;
 /// Height off a surface at which walks go on, over the size of the sheet.
 const LIFT: f32 = 1e-5;
 /// Index from which on a level sheet is glass and no liquid if a camera looks at it from below.
@@ -68,6 +70,11 @@ impl Surfaces {
         found
     }
 
+    /// Whether a point lies below the ground or in a wall: the next surface above it faces up.
+    fn is_below(&self, point: Vec3, lift: f32) -> bool {
+        self.hit(point + lift * Vec3::Y, Vec3::Y, f32::INFINITY).is_some_and(|(_, normal)| normal.y > 0.0)
+    }
+
     /// Whether a triangle comes as near to a point as that.
     fn is_near(&self, point: Vec3, reach: f32) -> bool {
         let mut found = false;
@@ -79,7 +86,7 @@ impl Surfaces {
     }
 }
 
-/// Whether a sheet is a cover, and then whether its faces look the wrong way. It ends at opaque
+/// Whether a sheet is a cover, and then whether its faces look the wrong way. It ends at or in opaque
 /// surfaces all around, as the water of a pool does, and these part what lies behind it from what
 /// lies before it. A flat one is level: a window is a pane.
 pub(super) fn cover(
@@ -89,17 +96,19 @@ pub(super) fn cover(
     around: &Surroundings,
 ) -> Option<bool> {
     let size = shell.bounds.diagonal();
-    let step = (shell.rim.len() / RIM_PROBES).max(1);
-    let mut rim = shell.rim.iter().step_by(step);
-    if shell.rim.is_empty() || !rim.all(|point| around.opaque.is_near(*point, RIM_GAP * size)) {
-        return None;
-    }
     let sheet: Vec<Triangle> = shell.triangles.iter().map(|i| triangles[*i as usize]).collect();
     let area: f32 = sheet.iter().map(|t| t.area() as f32).sum();
     let facing: Vec3 = sheet.iter().map(|t| t.area() as f32 * t.geometric_normal()).sum();
     let is_flat = facing.length() > FLAT * area;
     let is_turned = is_flat && facing.y < 0.0;
     if is_flat && facing.y.abs() < LEVEL * facing.length() {
+        return None;
+    }
+    let ends_there = |point: &Vec3| {
+        around.opaque.is_near(*point, RIM_GAP * size) || is_flat && around.opaque.is_below(*point, LIFT * size)
+    };
+    let step = (shell.rim.len() / RIM_PROBES).max(1);
+    if shell.rim.is_empty() || !shell.rim.iter().step_by(step).all(ends_there) {
         return None;
     }
     let sheet = Surfaces::new(sheet);
@@ -122,9 +131,17 @@ fn gets_out(sheet: &Surfaces, behind: f32, opaque: &Surfaces, size: f32, walk: u
         ((word >> 22) ^ word) as f32 / 4_294_967_296.0
     };
     let count = sheet.triangles.len();
-    let start = &sheet.triangles[(walk as usize * count / WALKS as usize).min(count - 1)];
-    let mut normal = behind * start.geometric_normal();
-    let mut from = point_on(start, next(), next()) + LIFT * size * normal;
+    let mut number = walk as usize * count / WALKS as usize;
+    let mut start = point_on(&sheet.triangles[number], next(), next());
+    for _ in 0..TRIES {
+        if !opaque.is_below(start, LIFT * size) {
+            break;
+        }
+        number = ((next() * count as f32) as usize).min(count - 1);
+        start = point_on(&sheet.triangles[number], next(), next());
+    }
+    let mut normal = behind * sheet.triangles[number].geometric_normal();
+    let mut from = start + LIFT * size * normal;
     for step in 0..STEPS {
         if step > 0 {
             let goal = &sheet.triangles[((next() * count as f32) as usize).min(count - 1)];
