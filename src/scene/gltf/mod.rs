@@ -138,7 +138,8 @@ fn assemble(
     let mut bounds = WorldBounds::EMPTY;
     placing::measure(&instances, &mut bounds)?;
     contents.spheres.iter().for_each(|sphere| bounds.add(sphere.center, sphere.radius));
-    let center = bounds.center();
+    let eyes: Vec<DVec3> = contents.cameras.iter().map(|(_, at, _)| *at).collect();
+    let center = placing::center(&bounds, &instances, &eyes)?;
     let mut reach = bounds;
     contents
         .lights
@@ -159,7 +160,7 @@ fn assemble(
     scene.names_dark_light = materials.names_dark_light;
     scene.materials = materials.materials;
     let ranges: Vec<MeshRange> = meshes.into_iter().map(|placed| mesh_range(root, placed)).collect();
-    let eyes: Vec<Vec3> = contents.cameras.iter().map(|(_, at, _)| (*at - center).as_vec3()).collect();
+    let eyes: Vec<Vec3> = eyes.into_iter().map(|at| (at - center).as_vec3()).collect();
     let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges, &eyes);
     warnings.into_iter().for_each(|warning| notes.add(warning));
     (scene.triangles, scene.attributes, scene.shells) = (triangles, attributes, shells);
