@@ -186,9 +186,7 @@ mod tests {
     use glam::vec3;
 
     use super::*;
-    use crate::{
-        scene::{Material, Sphere, Surface, Triangle},
-    };
+    use crate::scene::{Material, Sphere, Surface, Triangle};
 
     /// Contacts of triangles and spheres, in the order of the scene; material 0 is glass, 1
     /// diffuse.

@@ -24,8 +24,8 @@ use crate::{
 /// Relative widening of boxes, which covers the rounding of their corners.
 const BOX_SLACK: f64 = 1e-6;
 
-/// Triangles of a cover that a point is tried to see, and surfaces that let light through in between
-/// at most.
+/// Triangles of a cover that a point is tried to see, and surfaces that let light through in
+/// between at most.
 const VIEWS: usize = 32;
 const MOST_BETWEEN: usize = 32;
 

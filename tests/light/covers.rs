@@ -97,16 +97,15 @@ fn in_room(glass: &Mesh, ior: f32, height: f32) -> Scene {
 
 #[test]
 fn panes_in_frames_are_thin() {
-    let upright = |mesh: Mesh| Mesh {
-        positions: mesh.positions.iter().map(|p| vec3(p.x, 0.73 + p.z, 0.0)).collect(),
-        ..mesh
-    };
+    let upright =
+        |mesh: Mesh| Mesh { positions: mesh.positions.iter().map(|p| vec3(p.x, 0.73 + p.z, 0.0)).collect(), ..mesh };
     let is_pane = |scene: &Scene| scene.warnings.iter().any(|line| line.contains("taken for a thin pane"));
     let (table, skylight) = (sheet(0.5, 0.73, 0.5), sheet(0.5, 2.45, 0.5));
     assert!(is_pane(&in_room(&table, 1.5, 1.2)), "a table");
     assert!(is_pane(&in_room(&skylight, 1.5, 1.2)), "a skylight");
     assert!(is_pane(&in_room(&upright(sheet(0.5, 0.0, 0.5)), 1.5, 1.2)), "a window");
-    // Controls: what closes the room from above is the face of what fills it, unless a camera looks at glass from below.
+    // Controls: what closes the room from above is the face of what fills it, unless a camera looks
+    // at glass from below.
     assert!(!is_pane(&in_room(&skylight, 1.5, 4.0)), "control: seen from above");
     assert!(!is_pane(&in_room(&skylight, 1.33, 1.2)), "control: water seen from below");
 }

@@ -66,7 +66,8 @@ fn apart(triangles: &[Triangle], lamps: &[usize], materials: &[Material]) -> Vec
         tree.near(&widened, |other| {
             if other < number && kept[other] && boxes[other].touches(&widened) {
                 let pair = [number, other].map(|i| &triangles[lamps[i]]);
-                is_apart = !is_same(pair, slack, pair.map(|t| materials[t.material as usize].double_sided) == [true; 2]);
+                is_apart =
+                    !is_same(pair, slack, pair.map(|t| materials[t.material as usize].double_sided) == [true; 2]);
                 compared += 1;
             }
             is_apart && compared < MOST_COMPARED

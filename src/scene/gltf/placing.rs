@@ -82,8 +82,8 @@ const MOST_EYES: usize = 8;
 /// which the centre is where the camera is: numbers of 32 bits would round what it sees.
 const FAR_FROM_CENTER: f64 = 4096.0;
 
-/// The centre of the box around a scene, or a camera that looks at small things far away from it, as
-/// at a product before mountains.
+/// The centre of the box around a scene, or a camera that looks at small things far away from it,
+/// as at a product before mountains.
 pub(super) fn center(bounds: &WorldBounds, instances: &[MeshInstance<'_>], eyes: &[DVec3]) -> Read<DVec3> {
     let middle = bounds.center();
     let mut center = (FAR_FROM_CENTER, middle);

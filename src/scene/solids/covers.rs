@@ -19,7 +19,8 @@ const LEVEL: f32 = 0.95;
 const WALKS: u32 = 64;
 const STEPS: u32 = 6;
 const MOST_OUT: u32 = WALKS / 8;
-/// Points that are tried for the start of a walk where the sheet runs on in a wall or below a shore.
+/// Points that are tried for the start of a walk where the sheet runs on in a wall or below a
+/// shore.
 const TRIES: u32 = 16;
 /// Height off a surface at which walks go on, over the size of the sheet.
 const LIFT: f32 = 1e-5;
@@ -86,9 +87,9 @@ impl Surfaces {
     }
 }
 
-/// Whether a sheet is a cover, and then whether its faces look the wrong way. It ends at or in opaque
-/// surfaces all around, as the water of a pool does, and these part what lies behind it from what
-/// lies before it. A flat one is level: a window is a pane.
+/// Whether a sheet is a cover, and then whether its faces look the wrong way. It ends at or in
+/// opaque surfaces all around, as the water of a pool does, and these part what lies behind it from
+/// what lies before it. A flat one is level: a window is a pane.
 pub(super) fn cover(
     shell: &Shell,
     triangles: &[Triangle],

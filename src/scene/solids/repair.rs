@@ -42,8 +42,9 @@ struct Faults {
 }
 
 /// Repairs the glass of a scene: doubled faces count once, open sheets become thin panes, and
-/// outermost shells with faces inwards are turned. `eyes` are the places of cameras. Returns the solid of each triangle, as
-/// [`Scene::shells`](crate::scene::Scene::shells), and one warning for each mesh that is not clean.
+/// outermost shells with faces inwards are turned. `eyes` are the places of cameras. Returns the
+/// solid of each triangle, as [`Scene::shells`](crate::scene::Scene::shells), and one warning for
+/// each mesh that is not clean.
 pub(crate) fn repair(
     triangles: &mut Vec<Triangle>,
     materials: &mut Vec<Material>,
