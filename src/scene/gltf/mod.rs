@@ -20,6 +20,7 @@ mod accessor;
 mod attributes;
 mod buffers;
 mod cameras;
+mod center;
 mod container;
 mod doubled_lamps;
 mod draco;
@@ -139,7 +140,7 @@ fn assemble(
     placing::measure(&instances, &mut bounds)?;
     contents.spheres.iter().for_each(|sphere| bounds.add(sphere.center, sphere.radius));
     let eyes: Vec<DVec3> = contents.cameras.iter().map(|(_, at, _)| *at).collect();
-    let center = placing::center(&bounds, &instances, &eyes)?;
+    let center = center::center(&bounds, &instances, &eyes)?;
     let mut reach = bounds;
     contents
         .lights
