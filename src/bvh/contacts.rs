@@ -9,11 +9,12 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use glam::Vec3;
 
 use super::{
-    Bvh,
+    Bvh, FILLER,
     contact_search::{Search, Touched},
+    overlap::{Shape, coincide},
 };
 use crate::{
-    layout::{MAX_RANK, Primitive},
+    layout::{MAX_RANK, Primitive, SPHERE_BIT},
     scene::{Alpha, Scene, SharedMesh},
 };
 
@@ -24,6 +25,9 @@ const TOO_MANY: &str = "there are too many instances in each other's boxes to co
 /// Warning where primitives are not compared with all others, after their number.
 const CROWDED: &str = "surfaces have too many others around them to compare with each: where one of these lies in them, \
                        either is seen";
+
+/// Pairs of emissive primitives that are compared to tell whether they face the same way.
+const MOST_COMPARED: usize = 1 << 22;
 
 /// Surfaces that lie in each other.
 #[derive(Clone, Debug)]
@@ -82,12 +86,14 @@ impl Patches {
         self.of_ids.get(primitive.id as usize).copied()
     }
 
-    /// Warning for the first pair of lamps that lie in each other: one is seen there, but both send
-    /// out light.
-    fn warning(&self, scene: &Scene, pairs: &BTreeSet<(u32, u32)>) -> Option<String> {
+    /// Warning for the first pair of lamps that lie in each other and shine the same way: one is
+    /// seen there, but both send out light.
+    fn warning(&self, scene: &Scene, bvh: &Bvh, pairs: &BTreeSet<(u32, u32)>) -> Option<String> {
         let material = |patch: u32| &scene.materials[self.all[patch as usize].material as usize];
         let shines = |patch: u32| material(patch).emission != Vec3::ZERO;
-        let mut lamps = pairs.iter().filter(|(a, b)| a <= b && shines(*a) && shines(*b));
+        let both_ways = |(a, b): &(u32, u32)| material(*a).double_sided || material(*b).double_sided;
+        let is_double = |pair: &&(u32, u32)| both_ways(pair) || self.face_alike(bvh, **pair);
+        let mut lamps = pairs.iter().filter(|(a, b)| a <= b && shines(*a) && shines(*b)).filter(is_double);
         let (a, b) = lamps.next()?;
         let name = |patch: &u32| {
             let object = scene.objects.get(self.all[*patch as usize].object as usize);
@@ -100,6 +106,21 @@ impl Patches {
             name(a),
             name(b)
         ))
+    }
+
+    /// Whether any of the primitives of two patches that lie in each other face the same way, and
+    /// not all are back to back; true where there are too many to tell.
+    fn face_alike(&self, bvh: &Bvh, (a, b): (u32, u32)) -> bool {
+        let [a, b] = [a, b].map(|patch| {
+            let all = bvh.primitives.iter().filter(|p| p.id != FILLER);
+            all.filter(|p| self.of(p) == Some(patch)).collect::<Vec<_>>()
+        });
+        let normal = |p: &Primitive| Vec3::from(p.e1).as_dvec3().cross(Vec3::from(p.e2).as_dvec3());
+        let alike = |p: &Primitive, q: &Primitive| {
+            let is_sphere = p.material & SPHERE_BIT != 0;
+            (is_sphere || normal(p).dot(normal(q)) > 0.0) && Shape::new(p).is_parallel(q) && coincide(p, q)
+        };
+        a.len() * b.len() > MOST_COMPARED || a.iter().any(|p| b.iter().any(|q| alike(p, q)))
     }
 
     /// Ranks of patches that lie in each other, given in both orders: one more than the highest
@@ -157,7 +178,7 @@ pub fn contacts(scene: &Scene, bvh: &Bvh) -> Contacts {
     let in_contact = found.iter().map(|(id, _)| *id).chain(touched);
     in_contact.for_each(|id| of_ids[id as usize] = ranks.get(&patch_of(id)).copied());
     let ranks = bvh.primitives.iter().map(|p| of_ids.get(p.id as usize).copied().flatten()).collect();
-    Contacts { ranks, warning: patches.warning(scene, &pairs).or(unasked).or(crowded) }
+    Contacts { ranks, warning: patches.warning(scene, bvh, &pairs).or(unasked).or(crowded) }
 }
 
 #[cfg(test)]
@@ -165,10 +186,7 @@ mod tests {
     use glam::vec3;
 
     use super::*;
-    use crate::{
-        bvh::FILLER,
-        scene::{Material, Sphere, Surface, Triangle},
-    };
+    use crate::scene::{Material, Sphere, Surface, Triangle};
 
     /// Contacts of triangles and spheres, in the order of the scene; material 0 is glass, 1
     /// diffuse.

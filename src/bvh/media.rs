@@ -7,19 +7,27 @@
 //! half-open rule (Sunday 2021, "Practical Geometry Algorithms", winding number), which is the same
 //! for both triangles of an edge. A path through edges or corners of a closed mesh therefore enters
 //! it as often as it leaves it.
+//!
+//! A cover, as the water of a pool, is a sheet and encloses nothing. What sees it from behind is in
+//! the water.
 
 use std::collections::HashSet;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use super::{Bvh, BvhChild, FILLER};
 use crate::{
     layout::{MEDIA_WORDS, Primitive},
-    scene::{Bounds, NO_SLOT, Scene, Solids},
+    scene::{Bounds, NO_SLOT, Scene, Solids, Triangle},
 };
 
 /// Relative widening of boxes, which covers the rounding of their corners.
 const BOX_SLACK: f64 = 1e-6;
+
+/// Triangles of a cover that a point is tried to see, and surfaces that let light through in
+/// between at most.
+const VIEWS: usize = 32;
+const MOST_BETWEEN: usize = 32;
 
 /// Set of the slots of [`Solids`] that contain a point: bit `i % 32` of word `i / 32` for slot `i`.
 pub type Media = [u32; MEDIA_WORDS];
@@ -30,8 +38,10 @@ pub struct MediaProbe<'a> {
     scene: &'a Scene,
     bvh: &'a Bvh,
     solids: &'a Solids,
-    /// Box around all solids, metres.
+    /// Box around all solids but covers, metres.
     bounds: Bounds,
+    /// Slots of covers, and some of their triangles by their indices in the scene.
+    covers: Vec<(u32, Vec<usize>)>,
 }
 
 /// Intersection of a line along an axis with the surface of a solid.
@@ -53,16 +63,49 @@ impl<'a> MediaProbe<'a> {
             false => {
                 let triangles = scene.triangles.iter().map(Bounds::from);
                 let all = triangles.chain(scene.spheres.iter().map(Bounds::from)).zip(0..);
-                let of_solids = all.filter(|(_, i)| solids.slot(*i) != NO_SLOT).map(|(bounds, _)| bounds);
+                let is_solid = |slot: u32| slot != NO_SLOT && !solids.is_cover(slot);
+                let of_solids = all.filter(|(_, i)| is_solid(solids.slot(*i))).map(|(bounds, _)| bounds);
                 of_solids.fold(Bounds::EMPTY, Bounds::union)
             }
         };
-        Self { scene, bvh, solids, bounds }
+        Self { scene, bvh, solids, bounds, covers: covers(scene, solids) }
     }
 
     /// The media that contain a point (coordinates in metres).
     #[must_use]
     pub fn at(&self, point: DVec3) -> Media {
+        let mut media = self.around(point);
+        for (slot, triangles) in &self.covers {
+            let sees_it = triangles.iter().any(|triangle| self.sees_back(point, &self.scene.triangles[*triangle]));
+            media[*slot as usize / 32] |= u32::from(sees_it) << (slot % 32);
+        }
+        media
+    }
+
+    /// Whether a point sees the middle of a triangle from behind, through whatever lets light
+    /// through.
+    fn sees_back(&self, point: DVec3, triangle: &Triangle) -> bool {
+        let [a, b, c] = triangle.positions.map(Vec3::as_dvec3);
+        let to = (a + b + c) / 3.0 - point;
+        if to.dot((b - a).cross(c - a)) <= 0.0 {
+            return false;
+        }
+        let (mut from, along, length) = (point.as_vec3(), to.normalize().as_vec3(), to.length() as f32);
+        for _ in 0..MOST_BETWEEN {
+            let Some(hit) = self.bvh.nearest_hit(from, along) else { return true };
+            if hit.position.as_dvec3().distance(point) as f32 >= length * (1.0 - 1e-4) {
+                return true;
+            }
+            if !self.scene.materials[hit.material as usize].surface.transmits() {
+                return false;
+            }
+            from = hit.position;
+        }
+        false
+    }
+
+    /// The closed solids that contain a point.
+    fn around(&self, point: DVec3) -> Media {
         let (min, max) = (self.bounds.min.as_dvec3(), self.bounds.max.as_dvec3());
         if !(point.cmpge(min).all() && point.cmple(max).all()) {
             return Media::default();
@@ -108,7 +151,7 @@ impl<'a> MediaProbe<'a> {
             return;
         }
         let slot = self.solids.slot(primitive.id);
-        if slot == NO_SLOT {
+        if slot == NO_SLOT || self.solids.is_cover(slot) {
             return;
         }
         let id = primitive.id as usize;
@@ -127,6 +170,23 @@ impl<'a> MediaProbe<'a> {
             }
         }
     }
+}
+
+/// The slots of covers, and triangles spread over each.
+fn covers(scene: &Scene, solids: &Solids) -> Vec<(u32, Vec<usize>)> {
+    let mut found: Vec<(u32, Vec<usize>)> = Vec::new();
+    let slots = (0..scene.triangles.len()).map(|i| (i, solids.slot(i as u32)));
+    for (i, slot) in slots.filter(|(_, slot)| solids.is_cover(*slot)) {
+        match found.iter_mut().find(|(known, _)| *known == slot) {
+            Some((_, triangles)) => triangles.push(i),
+            None => found.push((slot, vec![i])),
+        }
+    }
+    let some = |triangles: Vec<usize>| {
+        let step = triangles.len().div_ceil(VIEWS).max(1);
+        triangles.into_iter().step_by(step).collect()
+    };
+    found.into_iter().map(|(slot, triangles)| (slot, some(triangles))).collect()
 }
 
 /// Media that a path along the axis, from infinity ahead or behind, has entered more often than
@@ -184,10 +244,10 @@ fn edge_winding(from: DVec2, to: DVec2) -> i32 {
 
 #[cfg(test)]
 mod tests {
-    use glam::{Vec3, dvec3, vec3};
+    use glam::{dvec3, vec3};
 
     use super::*;
-    use crate::scene::{Material, Sphere, Surface, Triangle};
+    use crate::scene::{Material, Sphere, Surface};
 
     fn scene(surfaces: usize) -> Scene {
         let material = |i: usize| Material::new("", Surface::Glass { ior: 1.0 + i as f32, tint: Vec3::ONE });

@@ -31,7 +31,8 @@ pub struct Scene {
     pub variants: Vec<String>,
     /// SHA-256 of the bytes of the file, its buffers and the images in use, in hexadecimal.
     pub hash: String,
-    /// Offset subtracted from all world coordinates of the file: the centre of its geometry.
+    /// Offset subtracted from all world coordinates of the file: the centre of its geometry, or a
+    /// camera near small things far from there.
     pub center: DVec3,
     /// Triangles of all meshes that are not shared.
     pub triangles: Vec<Triangle>,

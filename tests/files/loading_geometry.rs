@@ -326,6 +326,34 @@ fn far_from_the_origin_is_as_near_it() {
 }
 
 #[test]
+fn things_before_a_far_mountain_keep_their_digits() {
+    // A tetrahedron 0.6 mm wide before a camera, and one 300 km away.
+    let scene = |eye: f64| {
+        let mut gltf = tetrahedron(json!({ "scale": [3e-4, 3e-4, 3e-4] }));
+        let nodes = gltf["nodes"].as_array_mut().expect("a list");
+        let mesh = nodes.iter().find_map(|node| node.get("mesh").cloned()).expect("a mesh");
+        nodes.iter_mut().filter_map(Value::as_object_mut).for_each(|node| drop(node.remove("camera")));
+        nodes.push(json!({ "mesh": mesh, "translation": [3e5, 0.0, 0.0] }));
+        nodes.push(json!({ "camera": 0, "translation": [eye, 0.001, 0.002] }));
+        let (mountain, camera) = (nodes.len() - 2, nodes.len() - 1);
+        gltf["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 0.5, "znear": 0.001 } }]);
+        let shown = gltf["scenes"][0]["nodes"].as_array_mut().expect("a list");
+        shown.extend([json!(mountain), json!(camera)]);
+        loaded(&gltf)
+    };
+    let width = |scene: &Scene| {
+        let xs = scene.triangles[..4].iter().flat_map(|t| t.positions).map(|p| p.x);
+        xs.clone().fold(f32::MIN, f32::max) - xs.fold(f32::MAX, f32::min)
+    };
+    let near = scene(0.01);
+    assert!(near.center.x < 1.0, "{}", near.center);
+    assert_eq!(near.triangles.len(), 8);
+    assert!((width(&near) / 6e-4 - 1.0).abs() < 1e-3, "{}", width(&near));
+    let far = scene(-100.0);
+    assert!(far.center.x > 1e5, "control: seen from afar, the middle is the centre");
+}
+
+#[test]
 fn deep_chains_of_nodes_do_not_overflow_the_stack() {
     let mut gltf = triangle();
     let nodes: Vec<Value> = (0..50_000).map(|i| json!({ "children": [i + 4], "translation": [0, 0, 1] })).collect();

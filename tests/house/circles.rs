@@ -286,6 +286,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "mesh_cache",
             "shared_meshes",
             "placing",
+            "center",
             "doubled_lamps",
         ],
     ),

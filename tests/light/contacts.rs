@@ -3,6 +3,7 @@
 //! | test | closed form | negative control |
 //! |---|---|---|
 //! | lamp in a ceiling | irradiance below the middle of a square lamp; its own radiance is seen | a lamp behind the ceiling |
+//! | back to back | each lamp is seen from its side | both face up |
 //! | copies | the scene with one copy | a copy aside |
 
 use std::f64::consts::PI;
@@ -104,7 +105,7 @@ fn a_lamp_twice_in_one_place_shines_once() {
         meshes.extend(second.map(|(order, height)| (quad(order, height), 2)));
         let lamp = |emission: f32| json!({ "emissiveFactor": vec![emission; 3], "pbrMetallicRoughness": { "metallicFactor": 0 } });
         let mut scene = scene_of(&meshes, &[lambert([0.5; 3]), lamp(0.5), lamp(1.0)]);
-        scene.cameras = vec![camera(vec3(0.0, 0.5, 0.001), Vec3::ZERO, 30.0)];
+        scene.cameras = vec![camera(vec3(0.0, 0.2, 0.001), Vec3::ZERO, 30.0)];
         scene
     };
     let once = lamps(None);
@@ -120,6 +121,11 @@ fn a_lamp_twice_in_one_place_shines_once() {
         "{:?}",
         twice.warnings
     );
+    // A matrix that is rounded leaves a part of a micrometre between them.
+    for height in [1.000_000_6, 0.999_999_3] {
+        let near = power(&lamps(Some(([1, 2, 0], height))));
+        assert!(near.iter().zip(right).all(|(a, b)| within(*a, b, 1e-4)), "at {height}: {near:?}, {right:?}");
+    }
     // Overlapping in part, each shines, and it is said.
     let warned = |scene: &Scene| {
         let stats = render_scene(scene, &settings(Mode::DirectRays, 1000, 6)).stats;
@@ -137,6 +143,37 @@ fn a_lamp_twice_in_one_place_shines_once() {
     assert!(warnings.iter().any(|line| line.contains("emissive surfaces lie in each other in part")), "{warnings:?}");
     let apart = power(&lamps(Some(([1, 2, 0], 0.9))));
     assert!(apart[0] > 1.5 * right[0], "control: a lamp below it adds light: {apart:?}");
+}
+
+#[test]
+fn lamps_back_to_back_are_seen_from_both_sides() {
+    // One faces up, the other down or up as well; in one order or the other.
+    let seen = |down: bool, swapped: bool, eye: f32| {
+        let mut scene = scene(&[]);
+        scene.materials = vec![emissive("up", 0.0, 4.0, false), emissive("other", 0.0, 7.0, false)];
+        let (corner, x, z) = (vec3(-0.6, 0.3, -0.6), 1.2 * Vec3::X, 1.2 * Vec3::Z);
+        let other = |scene: &mut Scene| {
+            let (a, b) = if down { (x, z) } else { (z, x) };
+            add_quad(scene, corner, a, b, 1);
+        };
+        if swapped {
+            other(&mut scene);
+        }
+        add_quad(&mut scene, corner, z, x, 0);
+        if !swapped {
+            other(&mut scene);
+        }
+        scene.triangles.iter_mut().zip(0..).for_each(|(triangle, i)| triangle.object = i / 2);
+        scene.objects = vec!["a".into(), "b".into()];
+        scene.cameras = vec![camera(vec3(0.0, eye, 0.001), vec3(0.0, 0.3, 0.0), 20.0)];
+        let render = render_scene(&scene, &settings(Mode::DirectRays, 1000, 6));
+        (mean(&render), render.stats.warnings.iter().any(|line| line.contains("lie in each other")))
+    };
+    for swapped in [false, true] {
+        assert_eq!(seen(true, swapped, 2.0), (4.0, false), "from above");
+        assert_eq!(seen(true, swapped, -2.0), (7.0, false), "from below");
+        assert_eq!(seen(false, swapped, -2.0), (0.0, true), "control: both face up");
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod analytic;
 mod contacts;
+mod covers;
 mod crops;
 mod extremes;
 mod few_photons;
@@ -21,3 +22,4 @@ mod solids;
 mod spaced_gathering;
 mod transport;
 mod uneven_pixels;
+mod wide_grounds;

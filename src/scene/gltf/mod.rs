@@ -20,6 +20,7 @@ mod accessor;
 mod attributes;
 mod buffers;
 mod cameras;
+mod center;
 mod container;
 mod doubled_lamps;
 mod draco;
@@ -138,7 +139,8 @@ fn assemble(
     let mut bounds = WorldBounds::EMPTY;
     placing::measure(&instances, &mut bounds)?;
     contents.spheres.iter().for_each(|sphere| bounds.add(sphere.center, sphere.radius));
-    let center = bounds.center();
+    let eyes: Vec<DVec3> = contents.cameras.iter().map(|(_, at, _)| *at).collect();
+    let center = center::center(&bounds, &instances, &eyes)?;
     let mut reach = bounds;
     contents
         .lights
@@ -159,7 +161,8 @@ fn assemble(
     scene.names_dark_light = materials.names_dark_light;
     scene.materials = materials.materials;
     let ranges: Vec<MeshRange> = meshes.into_iter().map(|placed| mesh_range(root, placed)).collect();
-    let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges);
+    let eyes: Vec<Vec3> = eyes.into_iter().map(|at| (at - center).as_vec3()).collect();
+    let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges, &eyes);
     warnings.into_iter().for_each(|warning| notes.add(warning));
     (scene.triangles, scene.attributes, scene.shells) = (triangles, attributes, shells);
     (scene.meshes, scene.instances) = (shared.meshes, shared.instances);

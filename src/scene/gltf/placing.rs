@@ -20,8 +20,8 @@ pub(super) const TOO_FAR: &str = "lies too far away to compute with: more than 1
 /// Bounding box of points, world space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WorldBounds {
-    min: DVec3,
-    max: DVec3,
+    pub(super) min: DVec3,
+    pub(super) max: DVec3,
 }
 
 impl WorldBounds {
@@ -33,7 +33,7 @@ impl WorldBounds {
         self.max = self.max.max(point + radius);
     }
 
-    fn hold(&self, point: DVec3) -> bool {
+    pub(super) fn hold(&self, point: DVec3) -> bool {
         point.cmpge(self.min).all() && point.cmple(self.max).all()
     }
 
@@ -77,7 +77,7 @@ pub(super) fn measure(instances: &[MeshInstance<'_>], bounds: &mut WorldBounds) 
 }
 
 /// Corners of the box around a primitive.
-fn corners_of_box(primitive: &MeshPrimitive) -> [DVec3; 8] {
+pub(super) fn corners_of_box(primitive: &MeshPrimitive) -> [DVec3; 8] {
     let Bounds { min, max } = Bounds::around(primitive.positions.iter().copied());
     std::array::from_fn(|i| {
         let side = |axis: usize| if i >> axis & 1 == 0 { min[axis] } else { max[axis] };

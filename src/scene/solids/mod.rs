@@ -7,6 +7,7 @@
 //! bit, a slot.
 
 mod closed_lamps;
+mod covers;
 mod rank;
 mod repair;
 mod shells;

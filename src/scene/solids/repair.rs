@@ -6,22 +6,19 @@ use std::{
 };
 
 use super::{
+    covers::{Surfaces, Surroundings, cover},
     shells::{Shell, Shells},
     solid::{NONE, glass},
 };
 use glam::Vec3;
+use rayon::prelude::*;
 
-use crate::scene::{Bounds, CompleteTree, Material, Surface, Triangle, vertex_bits};
+use crate::scene::{Material, Surface, Triangle, vertex_bits};
 
 /// Fraction of the surface below which a hole of few edges counts as a missing triangle.
 const SMALL_HOLE: f64 = 0.05;
 /// Edges of the largest hole that counts as missing triangles.
 const HOLE_EDGES: usize = 6;
-
-/// Largest gap between the rim of a sheet and what it ends at, over the size of the sheet; and
-/// points of the rim that are looked at.
-const RIM_GAP: f32 = 0.01;
-const RIM_PROBES: usize = 64;
 
 /// The triangles of one copy of a mesh, as a node shows it.
 #[derive(Clone, Debug)]
@@ -38,18 +35,21 @@ struct Faults {
     open: usize,
     covers: usize,
     turned: usize,
+    turned_covers: usize,
     holes: usize,
     t_junctions: usize,
     crossings: usize,
 }
 
 /// Repairs the glass of a scene: doubled faces count once, open sheets become thin panes, and
-/// outermost shells with faces inwards are turned. Returns the solid of each triangle, as
-/// [`Scene::shells`](crate::scene::Scene::shells), and one warning for each mesh that is not clean.
+/// outermost shells with faces inwards are turned. `eyes` are the places of cameras. Returns the
+/// solid of each triangle, as [`Scene::shells`](crate::scene::Scene::shells), and one warning for
+/// each mesh that is not clean.
 pub(crate) fn repair(
     triangles: &mut Vec<Triangle>,
     materials: &mut Vec<Material>,
     meshes: &[MeshRange],
+    eyes: &[Vec3],
 ) -> (Vec<u32>, Vec<String>) {
     let is_glass = glass(materials);
     if !triangles.iter().any(|triangle| is_glass[triangle.material as usize]) {
@@ -73,11 +73,20 @@ pub(crate) fn repair(
     found.join(triangles, |_, _| true);
     let mesh = |shell: &Shell| mesh_of[shell.triangles[0] as usize];
     let (sheets, solids): (Vec<Shell>, Vec<Shell>) = found.shells.into_iter().partition(is_sheet);
-    let opaque = opaque(triangles, materials, sheets.is_empty());
-    let (covers, sheets): (Vec<Shell>, Vec<Shell>) =
-        sheets.into_iter().partition(|shell| ends_at_opaque(shell, &opaque));
+    let opaque = Surfaces::opaque(if sheets.is_empty() { &[] } else { triangles }, materials);
+    let around = Surroundings { opaque, eyes };
+    let of_sheets: Vec<Option<bool>> =
+        sheets.par_iter().map(|shell| cover(shell, triangles, materials, &around)).collect();
+    let (mut covers, mut panes) = (Vec::new(), Vec::new());
+    for (shell, cover) in sheets.into_iter().zip(of_sheets) {
+        if cover == Some(true) {
+            faults[mesh(&shell)].turned_covers += 1;
+            shell.triangles.iter().for_each(|i| turn(&mut triangles[*i as usize]));
+        }
+        if cover.is_some() { covers.push(Shell { is_cover: true, ..shell }) } else { panes.push(shell) }
+    }
     covers.iter().for_each(|shell| faults[mesh(shell)].covers += 1);
-    let covers = covers.into_iter().map(|shell| Shell { is_cover: true, ..shell });
+    let sheets = panes;
     found.shells = solids.into_iter().chain(covers).collect();
     for shell in &sheets {
         faults[mesh(shell)].open += 1;
@@ -117,44 +126,6 @@ pub(crate) fn repair(
 /// A sheet encloses nothing: light goes through it as through a thin pane.
 fn is_sheet(shell: &Shell) -> bool {
     !(shell.is_closed() || shell.openness < SMALL_HOLE && shell.hole_edges <= HOLE_EDGES)
-}
-
-/// The opaque triangles, with a tree over their boxes; none if nobody asks.
-fn opaque(triangles: &[Triangle], materials: &[Material], is_unasked: bool) -> (Vec<Triangle>, CompleteTree<Bounds>) {
-    let is_asked = |t: &&Triangle| !is_unasked && !materials[t.material as usize].surface.transmits();
-    let opaque: Vec<Triangle> = triangles.iter().filter(is_asked).copied().collect();
-    let boxes = CompleteTree::of_boxes(&opaque.iter().map(Bounds::from).collect::<Vec<_>>());
-    (opaque, boxes)
-}
-
-/// Whether a sheet ends at opaque surfaces all around, as the water of a pool does: no path comes
-/// past its rim.
-fn ends_at_opaque(shell: &Shell, (opaque, boxes): &(Vec<Triangle>, CompleteTree<Bounds>)) -> bool {
-    let reach = RIM_GAP * shell.bounds.diagonal();
-    let is_near = |point: &Vec3| {
-        let mut found = false;
-        boxes.near(&Bounds { min: *point - reach, max: *point + reach }, |i| {
-            found = distance(*point, &opaque[i]) <= reach;
-            !found
-        });
-        found
-    };
-    let step = (shell.rim.len() / RIM_PROBES).max(1);
-    !shell.rim.is_empty() && shell.rim.iter().step_by(step).all(is_near)
-}
-
-/// Distance of a point from a triangle (Ericson 2005, "Real-Time Collision Detection", 5.1.5).
-fn distance(point: Vec3, triangle: &Triangle) -> f32 {
-    let [a, b, c] = triangle.positions;
-    let along = |from: Vec3, to: Vec3| {
-        let edge = to - from;
-        let t = ((point - from).dot(edge) / edge.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (from + t * edge).distance(point)
-    };
-    let normal = (b - a).cross(c - a);
-    let inside = [(a, b), (b, c), (c, a)].iter().all(|(p, q)| (*q - *p).cross(point - *p).dot(normal) >= 0.0);
-    let plane = (point - a).dot(normal.normalize_or_zero()).abs();
-    if inside { plane } else { along(a, b).min(along(b, c)).min(along(c, a)) }
 }
 
 /// Triangles to keep: of glass that lies in one place several times the first, whichever way
@@ -236,6 +207,7 @@ fn warning(name: &str, faults: &Faults) -> Option<String> {
             faults.covers > 0,
             "is an open sheet that ends at opaque surfaces, taken for the face of a solid that fills what lies behind",
         ),
+        (faults.turned_covers > 0, "faces what lies before it and was turned"),
         (faults.turned > 0, "is wound inside out and was turned"),
         (faults.holes > 0, "has holes, but is taken for a solid"),
         (faults.crossings > 0, "crosses itself: where it lies in itself, light may be bent too little"),

@@ -16,6 +16,8 @@ pub struct Solids {
     slots: Vec<u8>,
     /// Medium that fills the solids of each slot, the highest rank first.
     pub media: Vec<Medium>,
+    /// The slots of covers, see `covers.rs`: a bit for each.
+    covers: u128,
     /// Solids that found no slot: there are more kinds that overlap than slots.
     pub without_slot: usize,
 }
@@ -76,14 +78,22 @@ impl Solids {
             NONE => NO_SLOT as u8,
             _ => slot_of[(solid & !COVER_BIT) as usize],
         };
+        let of_covers = found.iter().zip(&slot_of).filter(|(solid, _)| solid.is_cover);
+        let covers = of_covers.fold(0, |covers, (_, slot)| covers | 1 << slot);
         let media = materials.iter().filter_map(|material| scene.materials[*material as usize].medium());
-        Self { slots: of_surface.into_iter().map(slot).collect(), media: media.collect(), without_slot }
+        Self { slots: of_surface.into_iter().map(slot).collect(), media: media.collect(), covers, without_slot }
     }
 
     /// Slot of the triangle with that index in the scene, or of a sphere, which follow them.
     #[must_use]
     pub fn slot(&self, primitive: u32) -> u32 {
         self.slots.get(primitive as usize).map_or(NO_SLOT, |slot| u32::from(*slot))
+    }
+
+    /// Whether a slot is that of a sheet which stands for all that lies behind it.
+    #[must_use]
+    pub fn is_cover(&self, slot: u32) -> bool {
+        slot < NO_SLOT && self.covers >> slot & 1 == 1
     }
 
     /// Whether the scene has no solid.
