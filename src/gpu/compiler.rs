@@ -27,10 +27,12 @@ pub(super) struct Compiler {
     requests: Option<Sender<Arc<Program>>>,
     queue: Arc<Mutex<Receiver<Arc<Program>>>>,
     threads: Vec<JoinHandle<()>>,
+    /// Whether uniforms are hidden from the driver, see [`super::hide_uniforms`].
+    hides_uniforms: bool,
 }
 
 impl Compiler {
-    pub fn new() -> Self {
+    pub fn new(hides_uniforms: bool) -> Self {
         let (requests, queue) = mpsc::channel();
         let queue = Arc::new(Mutex::new(queue));
         let count = thread::available_parallelism().map_or(1, usize::from).min(MAX_THREADS);
@@ -40,7 +42,7 @@ impl Compiler {
             thread::Builder::new().name("compiler".into()).spawn(move || compile_all(&queue)).ok()
         };
         let threads = (0..count).filter_map(spawn).collect();
-        Self { programs: Mutex::default(), requests: Some(requests), queue, threads }
+        Self { programs: Mutex::default(), requests: Some(requests), queue, threads, hides_uniforms }
     }
 
     /// The kernel with these constants, compiled or soon to be.
@@ -54,7 +56,7 @@ impl Compiler {
         let key = (shader.stem, constants.iter().map(|(name, value)| (*name, value.to_bits())).collect());
         let mut programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
         let program = programs.entry(key).or_insert_with(|| {
-            let program = Arc::new(Program::new(device, chunk_layout, shader, constants));
+            let program = Arc::new(Program::new(device, chunk_layout, shader, constants, self.hides_uniforms));
             if let Some(requests) = &self.requests {
                 // The receiver is a field beside this one, so sending cannot fail.
                 let _ = requests.send(Arc::clone(&program));

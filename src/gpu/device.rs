@@ -116,7 +116,7 @@ impl Gpu {
         if let Some(bytes) = available().filter(|_| chosen.kind == "software") {
             memory.set_limit(bytes);
         }
-        let compiler = Compiler::new();
+        let compiler = Compiler::new(chosen.kind == "software");
         Ok(Self {
             device,
             queue,

@@ -7,6 +7,7 @@ mod commands;
 mod compiler;
 mod device;
 mod fault;
+mod hide_uniforms;
 mod kernel;
 mod pace;
 mod program;

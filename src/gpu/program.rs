@@ -4,6 +4,7 @@ use std::{borrow::Cow, sync::OnceLock};
 
 use super::{
     chunks::CHUNK_GROUP,
+    hide_uniforms::hide_uniforms,
     shaders::{BindingKind, Shader},
     specialize::specialized,
 };
@@ -14,6 +15,7 @@ use super::{
 pub(super) struct Program {
     pub shader: &'static Shader,
     pub constants: Vec<(&'static str, f64)>,
+    hides_uniforms: bool,
     device: wgpu::Device,
     chunk_layout: wgpu::BindGroupLayout,
     compiled: OnceLock<Compiled>,
@@ -32,16 +34,20 @@ impl Program {
         chunk_layout: &wgpu::BindGroupLayout,
         shader: &'static Shader,
         constants: Vec<(&'static str, f64)>,
+        hides_uniforms: bool,
     ) -> Self {
         let (device, chunk_layout) = (device.clone(), chunk_layout.clone());
-        Self { shader, constants, device, chunk_layout, compiled: OnceLock::new() }
+        Self { shader, constants, hides_uniforms, device, chunk_layout, compiled: OnceLock::new() }
     }
 
     /// Compiles the kernel, or waits for the thread that does.
     pub fn compiled(&self) -> &Compiled {
         self.compiled.get_or_init(|| {
             let (device, shader) = (&self.device, self.shader);
-            let specialized = specialized(shader.wgsl, &self.constants).expect("a text that build.rs composed");
+            let mut specialized = specialized(shader.wgsl, &self.constants).expect("a text that build.rs composed");
+            if self.hides_uniforms {
+                hide_uniforms(&mut specialized);
+            }
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(shader.stem),
                 source: wgpu::ShaderSource::Naga(Cow::Owned(specialized)),
