@@ -53,49 +53,63 @@ fn set_flag(entry: &mut Function, flag: Handle<GlobalVariable>, number: u32) {
     entry.body = body;
 }
 
+/// What all that an expression is made of is at most: a driver settles conditions on uniforms and
+/// numbers alone, and those on a counter of a loop besides.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Leaves {
+    Numbers,
+    Uniforms,
+    Any,
+}
+
 /// Hides uniforms, and arguments of types that uniforms have, in the conditions of a function.
 fn hide_in(
     function: &mut Function,
     flag: Handle<GlobalVariable>,
     (uniforms, types): (&[Handle<GlobalVariable>], &[Handle<Type>]),
 ) {
-    let mut known = vec![false; function.expressions.len()];
+    let mut made = vec![Leaves::Any; function.expressions.len()];
+    let uniform_if = |is_one| if is_one { Leaves::Uniforms } else { Leaves::Any };
     for (handle, expression) in function.expressions.iter() {
-        let of = |part: &Handle<Expression>| known[part.index()];
-        known[handle.index()] = match expression {
-            Expression::GlobalVariable(variable) => uniforms.contains(variable),
-            Expression::FunctionArgument(index) => types.contains(&function.arguments[*index as usize].ty),
-            Expression::Compose { components, .. } => components.iter().any(of),
-            Expression::Access { base: part, .. }
-            | Expression::AccessIndex { base: part, .. }
+        let of = |part: &Handle<Expression>| made[part.index()];
+        made[handle.index()] = match expression {
+            Expression::Literal(_)
+            | Expression::Constant(_)
+            | Expression::ZeroValue(_)
+            | Expression::LocalVariable(_) => Leaves::Numbers,
+            Expression::GlobalVariable(variable) => uniform_if(uniforms.contains(variable)),
+            Expression::FunctionArgument(index) => uniform_if(types.contains(&function.arguments[*index as usize].ty)),
+            Expression::Compose { components, .. } => components.iter().map(of).max().unwrap_or(Leaves::Numbers),
+            Expression::AccessIndex { base: part, .. }
             | Expression::Splat { value: part, .. }
             | Expression::Swizzle { vector: part, .. }
             | Expression::Load { pointer: part }
             | Expression::Unary { expr: part, .. }
             | Expression::Relational { argument: part, .. }
             | Expression::As { expr: part, .. } => of(part),
-            Expression::Binary { left, right, .. } => of(left) || of(right),
-            Expression::Select { condition, accept, reject } => [condition, accept, reject].into_iter().any(of),
-            Expression::Math { arg, arg1, arg2, arg3, .. } => {
-                of(arg) || [arg1, arg2, arg3].into_iter().flatten().any(of)
+            Expression::Access { base: left, index: right } | Expression::Binary { left, right, .. } => {
+                of(left).max(of(right))
             }
-            _ => false,
+            Expression::Select { condition, accept, reject } => of(condition).max(of(accept)).max(of(reject)),
+            Expression::Math { arg, arg1, arg2, arg3, .. } => {
+                [arg1, arg2, arg3].into_iter().flatten().map(of).fold(of(arg), Leaves::max)
+            }
+            _ => Leaves::Any,
         };
     }
-    if !known.contains(&true) {
+    if !made.contains(&Leaves::Uniforms) {
         return;
     }
     let pointer = function.expressions.append(Expression::GlobalVariable(flag), Span::UNDEFINED);
     let body = std::mem::take(&mut function.body);
-    function.body = Hiding { function, pointer, known }.block(body);
+    function.body = Hiding { function, pointer, made }.block(body);
 }
 
 struct Hiding<'a> {
     function: &'a mut Function,
     /// The flag.
     pointer: Handle<Expression>,
-    /// Whether an expression has a uniform in it.
-    known: Vec<bool>,
+    made: Vec<Leaves>,
 }
 
 impl Hiding<'_> {
@@ -124,9 +138,9 @@ impl Hiding<'_> {
         hidden
     }
 
-    /// The condition with the flag, computed at the end of a block, if it has a uniform in it.
+    /// The condition with the flag, computed at the end of a block, if it is made of uniforms.
     fn hidden(&mut self, condition: Handle<Expression>, before: &mut Block) -> Handle<Expression> {
-        if !self.known[condition.index()] {
+        if self.made[condition.index()] != Leaves::Uniforms {
             return condition;
         }
         let mut add = |expression| self.function.expressions.append(expression, Span::UNDEFINED);
@@ -172,16 +186,17 @@ mod tests {
             fn is_on(given: Info) -> bool { if (given.on == 1u) { return true; } return false; }
             @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {
                 if (id.x >= info.count) { return; }
+                if (info.count == 0u) { return; }
                 if (out[id.x] == 3u) { out[id.x] = 4u; }
                 for (var i = 0u; i < info.count; i++) { out[i] += 1u; }
-                loop { out[0] += 1u; continuing { break if (out[0] > info.on); } }
+                loop { out[0] += 1u; continuing { break if (info.on < 2u); } }
                 if (is_on(info)) { out[1] = 1u; }
             }";
         let mut module = parse_str(text).expect("WGSL");
         assert_eq!(hidden(&module), 0);
         hide_uniforms(&mut module);
         assert!(is_valid(&module), "{module:#?}");
-        assert_eq!(hidden(&module), 4, "but those on storage and on the result of a function");
+        assert_eq!(hidden(&module), 4, "but those on numbers of invocations, storage and results of functions");
     }
 
     #[test]
