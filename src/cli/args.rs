@@ -17,7 +17,7 @@ use super::{
     options::{LayerArg, QualityArg, RenderOptions, SearchArg},
     pass_args::PassOptions,
     study_args::StudyArgs,
-    values::{gather_radius, irradiance_cells, output, radius, share_reach, tolerance, whole},
+    values::{gather_radius, gather_reach, irradiance_cells, output, radius, share_reach, tolerance, whole},
 };
 
 /// Caustica renders glTF scenes by photon mapping on the GPU, without a screen.
@@ -162,6 +162,13 @@ pub struct RenderArgs {
     #[arg(long, value_name = "R", value_parser = gather_radius, help_heading = "Estimate")]
     pub gather_radius: Option<f32>,
 
+    #[arg(help = format!(
+        "Distance over which a point gives that light to others, as a fraction of the mean distance to what surrounds it, {}; a sixth of it from the second of several passes on",
+        EstimateSettings::GATHER_REACH
+    ))]
+    #[arg(long, value_name = "F", default_value_t = EstimateSettings::default().gather_reach, value_parser = gather_reach, help_heading = "Estimate")]
+    pub gather_reach: f32,
+
     /// Further layers of .exr files, by name, with commas between; every layer costs a little,
     /// `lights` the time of one picture for each group of lights
     #[arg(long, value_name = "LAYERS", value_enum, value_delimiter = ',', help_heading = "Picture")]
@@ -223,6 +230,7 @@ impl RenderArgs {
             s.photons.final_gather = self.final_gather.unwrap_or(s.photons.final_gather);
             s.estimate.gather_spacing = self.gather_spacing.unwrap_or(s.estimate.gather_spacing);
             s.estimate.gather_radius = self.gather_radius.unwrap_or(s.estimate.gather_radius);
+            s.estimate.gather_reach = self.gather_reach;
             s.estimate.search = self.search.into();
             s.estimate.radius = self.radius;
             s.estimate.share_reach = self.share;
@@ -351,7 +359,7 @@ mod tests {
     #[test]
     fn every_option_reaches_the_settings() {
         let s = settings(
-            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --share 0.5 --irradiance-cells 0.25 --gather-spacing 3 --gather-radius 5 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
+            "--max-paths 3M -k 50 --kernel gaussian --raw-estimate --final-gather 16 --share 0.5 --irradiance-cells 0.25 --gather-spacing 3 --gather-radius 5 --gather-reach 2 --cone-constant 1.5 --max-radius 0.25 --max-bounces 0 --spp 9 --size 640x480 \
              --camera side --seed 11 --light-sampling uniform --light-unit photometric --search kdtree \
              --light-photons lamp=2 --light-photons sky=0.5 --light-samples 9 --emission unaimed",
         );
@@ -366,6 +374,7 @@ mod tests {
             s.estimate.irradiance_cells = 0.25;
             s.estimate.gather_spacing = 3;
             s.estimate.gather_radius = 5.0;
+            s.estimate.gather_reach = 2.0;
             s.estimate.cone_constant = 1.5;
             s.estimate.max_radius = Some(0.25);
             s.photons.max_bounces = 0;

@@ -4,7 +4,7 @@
 type Row = (&'static str, &'static str);
 
 /// Inputs that a message of the library can name.
-const FLAGS: [Row; 43] = [
+const FLAGS: [Row; 44] = [
     ("device", "--device"),
     ("estimate.cone_constant", "--cone-constant"),
     ("estimate.kernel", "--kernel"),
@@ -15,6 +15,7 @@ const FLAGS: [Row; 43] = [
     ("estimate.search", "--search"),
     ("estimate.share_reach", "--share"),
     ("estimate.gather_radius", "--gather-radius"),
+    ("estimate.gather_reach", "--gather-reach"),
     ("estimate.gather_spacing", "--gather-spacing"),
     ("estimate.irradiance_cells", "--irradiance-cells"),
     ("lights.photon_weights", "--light-photons"),

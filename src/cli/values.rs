@@ -114,6 +114,11 @@ pub fn gather_radius(text: &str) -> Result<f32, String> {
     in_range(text, EstimateSettings::GATHER_RADIUS, "a number ")
 }
 
+/// A fraction of the distance to what is around a point.
+pub fn gather_reach(text: &str) -> Result<f32, String> {
+    in_range(text, EstimateSettings::GATHER_REACH, "a number ")
+}
+
 /// A relative difference.
 pub fn tolerance(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|tolerance| TOLERANCES.contains(*tolerance));
