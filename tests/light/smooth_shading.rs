@@ -100,17 +100,15 @@ fn plate(roughness: f32, slope: f32, bound: f32) -> Scene {
 
 #[test]
 fn photons_off_metal_of_leaning_normals_are_what_rays_see() {
-    let upright = brightness(&plate(0.4, 0.0, 0.0), 100_000, 0);
-    for slope in [0.8, 2.0] {
-        // Photons that graze the plate carry a bounded weight, and a little less light.
-        let photons = brightness(&plate(0.4, slope, 0.0), 100_000, 0);
-        let rays = brightness(&plate(0.4, slope, 0.0), 20_000, 32);
-        assert!(within(photons, rays, 0.04), "slope {slope}: {photons} by photons, {rays} by rays");
-        assert!(!within(upright, rays, 0.1), "control: upright normals give {upright}, {rays} by rays");
-        let of = |roughness: f32| brightness(&plate(roughness, slope, 0.45), 100_000, 0);
-        let (sharp, rough) = (of(0.0), of(0.05));
-        assert!(within(sharp, rough, 0.03), "slope {slope}: {sharp} sharp, {rough} rough");
-    }
+    let upright = brightness(&plate(0.4, 0.0, 0.0), 50_000, 0);
+    // Photons that graze the plate carry a bounded weight, and a little less light.
+    let photons = brightness(&plate(0.4, 2.0, 0.0), 100_000, 0);
+    let rays = brightness(&plate(0.4, 2.0, 0.0), 20_000, 32);
+    assert!(within(photons, rays, 0.04), "{photons} by photons, {rays} by rays");
+    assert!(!within(upright, rays, 0.1), "control: upright normals give {upright}, {rays} by rays");
+    let of = |roughness: f32| brightness(&plate(roughness, 2.0, 0.45), 100_000, 0);
+    let (sharp, rough) = (of(0.0), of(0.05));
+    assert!(within(sharp, rough, 0.03), "{sharp} sharp, {rough} rough");
 }
 
 /// Brightness of a plane that fills the picture, seen from 20° above it under a sky of radiance
@@ -136,7 +134,7 @@ fn plane(material: Material, slope: f32, above: f32, below: f32) -> f64 {
 #[test]
 fn leaning_normals_show_all_light_above_the_surface_and_none_below() {
     // Upright, leaning, and so far that the viewer sees their backs.
-    for (slope, roughness) in [0.0, 0.7, 2.0, 6.0].into_iter().flat_map(|s| [0.0, 0.1, 0.4].map(|r| (s, r))) {
+    for (slope, roughness) in [0.0, 0.7, 2.0, 6.0].into_iter().flat_map(|s| [0.0, 0.2].map(|r| (s, r))) {
         let of = |base: f32, above: f32, below: f32| plane(metal(base, roughness), slope, above, below);
         let found = of(1.0, 1.0, 0.0);
         assert!(within(found, 1.0, 0.01), "slope {slope}, roughness {roughness}: {found}");

@@ -54,15 +54,12 @@ fn focus(reach: f32, ior: f32, tilt: f32) -> f64 {
 
 #[test]
 fn a_caustic_on_a_wide_ground_is_that_on_a_small_one() {
-    for (reaches, tilt) in [([350.0, 4000.0], 0.0), ([5.0, 60.0], 0.4)] {
-        let right = focus(0.5, 1.5, tilt);
-        for reach in reaches {
-            let wide = focus(reach, 1.5, tilt);
-            assert!(within(wide, right, 0.03), "{reach} m, tilted by {tilt}: {wide} instead of {right}");
-        }
-        let other = focus(0.5, 1.6, tilt);
-        assert!(!within(other, right, 0.045), "control: another index: {other}, {right}");
+    for (reach, tilt) in [(4000.0, 0.0), (60.0, 0.4)] {
+        let (right, wide) = (focus(0.5, 1.5, tilt), focus(reach, 1.5, tilt));
+        assert!(within(wide, right, 0.03), "{reach} m, tilted by {tilt}: {wide} instead of {right}");
     }
+    let other = focus(4000.0, 1.6, 0.0);
+    assert!(!within(other, focus(0.5, 1.5, 0.0), 0.045), "control: another index: {other}");
 }
 
 #[test]
