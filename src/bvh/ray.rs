@@ -3,10 +3,7 @@
 use glam::Vec3;
 
 use super::{Bvh, FILLER};
-use crate::{
-    layout::{INSTANCE, Instance, MATERIAL_MASK, Primitive, SPHERE_BIT},
-    scene::Bounds,
-};
+use crate::layout::{INSTANCE, Instance, MATERIAL_MASK, Primitive, SPHERE_BIT};
 
 /// Nearest distance of a hit from the ray's origin, as a fraction of the largest coordinate there.
 const LEAST: f32 = 1e-5;
@@ -62,7 +59,7 @@ impl Bvh {
             }
             let first = waiting.len();
             for child in self.nodes[node as usize].children() {
-                let Some(enter) = entry(&child.bounds, origin, direction, search.reach()) else { continue };
+                let Some(enter) = child.bounds.entry(origin, direction, search.reach()) else { continue };
                 if child.count == 0 {
                     waiting.push((enter, child.first));
                 }
@@ -112,15 +109,6 @@ struct Nearest<'b> {
     distance: f32,
     primitive: &'b Primitive,
     instance: Option<&'b Instance>,
-}
-
-/// Distance at which a ray enters a box, if it meets it within reach.
-fn entry(bounds: &Bounds, origin: Vec3, direction: Vec3, reach: f32) -> Option<f32> {
-    let (a, b) = ((bounds.min - origin) / direction, (bounds.max - origin) / direction);
-    // Zero over zero is not a number: `min` and `max` then leave the other operand.
-    let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
-    let is_missed = enter.max(0.0) > leave * (1.0 + 1e-6) || enter > reach;
-    (!is_missed).then_some(enter)
 }
 
 fn distance_to(primitive: &Primitive, origin: Vec3, direction: Vec3, least: f32) -> Option<f32> {

@@ -165,7 +165,9 @@ mod tests {
     fn hidden(module: &Module) -> usize {
         let all = module.functions.iter().map(|(_, function)| function);
         let flag = module.global_variables.iter().find(|(_, v)| v.name.as_deref() == Some("never")).map(|(h, _)| h);
-        let is_flag = |function: &Function, pointer: Handle<Expression>| matches!(function.expressions[pointer], Expression::GlobalVariable(variable) if Some(variable) == flag);
+        let is_flag = |function: &Function, pointer: Handle<Expression>| {
+            flag.is_some_and(|flag| function.expressions[pointer] == Expression::GlobalVariable(flag))
+        };
         let loads = |function: &Function| {
             let all = function.expressions.iter();
             all.filter(|(_, e)| matches!(e, Expression::Load { pointer } if is_flag(function, *pointer))).count()

@@ -102,6 +102,16 @@ impl Bounds {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
+    /// Distance at which a ray enters the box, if it meets it within reach; `direction` is a unit
+    /// vector.
+    pub(crate) fn entry(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<f32> {
+        let (a, b) = ((self.min - origin) / direction, (self.max - origin) / direction);
+        // Zero over zero is not a number: `min` and `max` then leave the other operand.
+        let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
+        let is_missed = enter.max(0.0) > leave * (1.0 + 1e-6) || enter > reach;
+        (!is_missed).then_some(enter)
+    }
+
     /// Half of the surface, m²; 0 for the empty box.
     #[must_use]
     pub fn half_area(self) -> f32 {

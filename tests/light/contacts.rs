@@ -117,7 +117,7 @@ fn a_lamp_twice_in_one_place_shines_once() {
     let twice = lamps(Some(([1, 2, 0], 1.0)));
     assert_eq!(power(&twice), right);
     assert!(
-        twice.warnings.iter().any(|line| line.starts_with("1 emissive triangles lie exactly")),
+        twice.warnings.iter().any(|line| line.starts_with("1 emissive triangles lie in others")),
         "{:?}",
         twice.warnings
     );

@@ -21,7 +21,7 @@ pub(super) fn remove(scene: &mut Scene, notes: &mut Notes) {
     let materials = &scene.materials;
     let shines = |material: u32| materials[material as usize].emission != Vec3::ZERO;
     let mut known = HashSet::new();
-    let is_first = |triangle: &Triangle| {
+    let mut is_first = |triangle: &Triangle| {
         let corners = triangle.positions.map(vertex_bits);
         // The smallest corner first: the order of the others decides which way the triangle faces.
         let start = (0..3).min_by_key(|i| corners[*i]).unwrap_or(0);
@@ -29,7 +29,6 @@ pub(super) fn remove(scene: &mut Scene, notes: &mut Notes) {
     };
     let mut kept: Vec<bool> = scene.triangles.iter().map(|t| !shines(t.material)).collect();
     let all: Vec<usize> = (0..kept.len()).filter(|i| !kept[*i]).collect();
-    let mut is_first = is_first;
     let lamps: Vec<usize> = all.iter().copied().filter(|i| is_first(&scene.triangles[*i])).collect();
     for (lamp, is_kept) in lamps.iter().zip(apart(&scene.triangles, &lamps, materials)) {
         kept[*lamp] = is_kept;
@@ -43,7 +42,7 @@ pub(super) fn remove(scene: &mut Scene, notes: &mut Notes) {
     let twice = kept.iter().filter(|kept| !**kept).count();
     for (doubled, what) in [(twice, "triangles"), (count - scene.spheres.len(), "spheres")] {
         if doubled > 0 {
-            notes.add(format!("{doubled} emissive {what} lie exactly in others; the first ones shine"));
+            notes.add(format!("{doubled} emissive {what} lie in others; the first ones shine"));
         }
     }
     if twice > 0 {

@@ -57,7 +57,7 @@ impl Surfaces {
     fn hit(&self, from: Vec3, along: Vec3, most: f32) -> Option<(f32, Vec3)> {
         let (mut nearest, mut found) = (most, None);
         self.tree.visit(|visit| match visit {
-            Visit::Node(_, bounds) => enters(bounds, from, along, nearest),
+            Visit::Node(_, bounds) => bounds.entry(from, along, nearest).is_some(),
             Visit::Leaf(items) => {
                 for triangle in items.iter().map(|i| &self.triangles[*i as usize]) {
                     if let Some(t) = distance_along(triangle, from, along).filter(|t| *t < nearest) {
@@ -190,16 +190,6 @@ fn direction_about(normal: Vec3, u: f32, v: f32) -> Vec3 {
     let (tangent, bitangent) = normal.any_orthonormal_pair();
     let (sin, cos) = (std::f32::consts::TAU * v).sin_cos();
     (u.sqrt() * (cos * tangent + sin * bitangent) + (1.0 - u).max(0.0).sqrt() * normal).normalize()
-}
-
-/// Whether a ray comes into a box before that distance.
-fn enters(bounds: &Bounds, from: Vec3, along: Vec3, most: f32) -> bool {
-    let (a, b) = ((bounds.min - from) / along, (bounds.max - from) / along);
-    // Coordinates in which the ray is parallel to the box and in its plane are no numbers; they
-    // leave the others.
-    let enter = a.min(b).to_array().into_iter().fold(0.0, f32::max);
-    let exit = a.max(b).to_array().into_iter().fold(most, f32::min);
-    enter <= exit * (1.0 + 1e-5)
 }
 
 /// Distance along a ray at which it meets a triangle (Möller and Trumbore 1997).
