@@ -21,7 +21,7 @@ const MAX_SIDE: u32 = 16;
 const MAX_PARTS: u64 = 65_536;
 /// Points for each texel along an edge of a subtriangle by which its mean is taken, and their least
 /// and greatest number.
-const POINTS_PER_TEXEL: f32 = 2.0;
+const POINTS_PER_TEXEL: f32 = 1.0;
 const POINTS: [u32; 2] = [4, 32];
 
 /// Position of a subtriangle in its triangle.

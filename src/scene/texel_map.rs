@@ -75,17 +75,15 @@ impl TexelMap<'_> {
         let folded = Vec2::new(folded(uv.x, wide), folded(uv.y, high)) * self.size();
         let corner = folded - if self.texture.is_linear { 0.5 } else { 0.0 };
         let low = corner.floor();
-        let texel = |dx: i64, dy: i64| {
-            let x = wrapped(low.x as i64 + dx, i64::from(self.image.width), wide);
-            let y = wrapped(low.y as i64 + dy, i64::from(self.image.height), high);
-            decoded(self.image.texels[y * self.image.width as usize + x])
-        };
+        let column = |dx: i64| wrapped(low.x as i64 + dx, self.image.width, wide);
+        let row = |dy: i64| wrapped(low.y as i64 + dy, self.image.height, high) * self.image.width as usize;
+        let texel = |column: usize, row: usize| decoded(self.image.texels[row + column]);
         if !self.texture.is_linear {
-            return texel(0, 0);
+            return texel(column(0), row(0));
         }
-        let fraction = corner - low;
-        let row = |dy: i64| texel(0, dy).lerp(texel(1, dy), fraction.x);
-        row(0).lerp(row(1), fraction.y)
+        let (fraction, [left, right]) = (corner - low, [column(0), column(1)]);
+        let between = |row: usize| texel(left, row).lerp(texel(right, row), fraction.x);
+        between(row(0)).lerp(between(row(1)), fraction.y)
     }
 
     /// Whether the texture may be other than zero within a triangle of texture coordinates: some
@@ -142,7 +140,12 @@ fn folded(x: f32, wrap: Wrap) -> f32 {
 }
 
 /// Column or row of an image of size `n`.
-fn wrapped(i: i64, n: i64, wrap: Wrap) -> usize {
+fn wrapped(i: i64, n: u32, wrap: Wrap) -> usize {
+    let n = i64::from(n);
+    // Nearly all are, and need no division.
+    if (0..n).contains(&i) {
+        return i as usize;
+    }
     let within = match wrap {
         Wrap::Clamp => i.clamp(0, n - 1),
         Wrap::Repeat => i.rem_euclid(n),

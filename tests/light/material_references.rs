@@ -38,7 +38,7 @@ fn error(name: &str, reference: &str, options: &LoadOptions, rougher: f32) -> f6
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/references");
     let mut scene = Scene::load_with(&folder.join(format!("{name}.glb")), options).expect("the scene loads");
     scene.materials.iter_mut().for_each(|material| material.roughness = (rougher * material.roughness).min(1.0));
-    let settings = settings(Mode::Hybrid, 200_000, SIZE as u32).with(|s| s.picture.spp = 16);
+    let settings = settings(Mode::Hybrid, 120_000, SIZE as u32).with(|s| s.picture.spp = 16);
     let picture = blocks(render_scene(&scene, &settings).frame.radiance(), BLOCK);
     let reference = read_exr(&folder.join(format!("{reference}_128.exr"))).expect("the reference reads");
     let reference = blocks(reference.radiance(), BLOCK * 128 / SIZE);

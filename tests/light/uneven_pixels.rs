@@ -42,7 +42,7 @@ fn room() -> Scene {
 
 #[test]
 fn uneven_pixels_have_the_error_of_many_samples() {
-    const SIDE: u32 = 128;
+    const SIDE: u32 = 96;
     let scene = room();
     let of = |spp: u32, most: u32| render_scene(&scene, &sampled(SIDE, most).with(|s| s.picture.spp = spp));
     let (even, more, many) = (of(4, 4), of(4, 64), of(64, 64));

@@ -44,7 +44,7 @@ fn focus(reach: f32, ior: f32, tilt: f32) -> f64 {
     let sun = sun();
     scene.lights = vec![Light { direction: turn * sun.direction, ..sun }];
     scene.cameras = vec![camera(turn * vec3(0.1, 0.02, 0.06), turn * vec3(0.008, 0.0, 0.005), 8.0)];
-    let settings = settings(Mode::Hybrid, 300_000, 16).with(|s| {
+    let settings = settings(Mode::Hybrid, 120_000, 16).with(|s| {
         s.photons.global = 1000;
         s.photons.final_gather = 0;
         s.estimate.neighbors = 200;
@@ -54,12 +54,14 @@ fn focus(reach: f32, ior: f32, tilt: f32) -> f64 {
 
 #[test]
 fn a_caustic_on_a_wide_ground_is_that_on_a_small_one() {
-    for (reach, tilt) in [(4000.0, 0.0), (60.0, 0.4)] {
-        let (right, wide) = (focus(0.5, 1.5, tilt), focus(reach, 1.5, tilt));
+    let small = [0.0, 0.4].map(|tilt| focus(0.5, 1.5, tilt));
+    for (reach, tilt, right) in [(4000.0, 0.0, small[0]), (60.0, 0.4, small[1])] {
+        let wide = focus(reach, 1.5, tilt);
+        println!("{reach} m, tilted by {tilt}: {wide} instead of {right}");
         assert!(within(wide, right, 0.03), "{reach} m, tilted by {tilt}: {wide} instead of {right}");
     }
     let other = focus(4000.0, 1.6, 0.0);
-    assert!(!within(other, focus(0.5, 1.5, 0.0), 0.045), "control: another index: {other}");
+    assert!(!within(other, small[0], 0.045), "control: another index: {other}");
 }
 
 #[test]
