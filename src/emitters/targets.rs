@@ -2,7 +2,7 @@
 //! that could become a caustic is left out, and few others are traced. This is the projection map
 //! of Jensen 2001, section 5.3, as bounding spheres.
 
-use std::f64::consts::TAU;
+use std::{collections::BTreeMap, f64::consts::TAU};
 
 use glam::Vec3;
 
@@ -61,16 +61,41 @@ impl Item {
     }
 }
 
-/// A cluster of primitives. `halves`: indices of its two halves, if it was split.
+/// Greatest sum of the cross-sections of two clusters of different objects, over that of both
+/// together, at which they stay apart: a small one beside a large one.
+const APART: f64 = 1.1;
+
+/// A cluster of primitives, by their objects. `halves`: indices of its two halves, if it was split.
 struct Cluster {
     target: Target,
-    items: Vec<Item>,
+    objects: Vec<Vec<Item>>,
     halves: Option<[usize; 2]>,
+    /// Greatest sum of the cross-sections of the halves at which they are kept, over its own.
+    slack: f64,
 }
 
 impl Cluster {
-    fn new(items: Vec<Item>) -> Self {
-        Self { target: sphere_around(&items), items, halves: None }
+    fn new(objects: Vec<Vec<Item>>) -> Self {
+        let slack = if objects.len() > 1 { APART } else { 1.0 };
+        Self { target: sphere_around(objects.iter().flatten()), objects, halves: None, slack }
+    }
+
+    fn can_be_split(&self) -> bool {
+        self.objects.len() > 1 || self.objects.first().is_some_and(|items| items.len() > 1)
+    }
+
+    /// Its objects, or the primitives of its only one, on either side of the middle of the longest
+    /// extent of their centres; `None` if one side is empty, as when all centres coincide.
+    fn split(&mut self) -> Option<[Self; 2]> {
+        let mut objects = std::mem::take(&mut self.objects);
+        if objects.len() > 1 {
+            match split(objects, |object| sphere_around(object).center) {
+                Ok(halves) => return Some(halves.map(Self::new)),
+                Err(all) => objects = all,
+            }
+        }
+        let halves = split(objects.into_iter().flatten().collect(), Item::middle).ok()?;
+        Some(halves.map(|half| Self::new(vec![half])))
     }
 }
 
@@ -83,23 +108,26 @@ pub fn scene_target(scene: &Scene) -> Target {
 
 /// Spheres that together contain all specular surfaces, at most [`MAX_TARGETS`]; none if there are
 /// no such surfaces. The largest cluster is split along its longest axis until there are
-/// [`MAX_TARGETS`] clusters. Then halves are kept only where the sum of their cross-sections is
-/// smaller than that of the whole cluster.
+/// [`MAX_TARGETS`] clusters, those of several objects first. Then halves are kept only where the
+/// sum of their cross-sections is smaller than that of the whole cluster, or hardly greater where
+/// they are different objects: so a glass beside a large window has a sphere of its own.
 #[must_use]
 pub fn specular_targets(scene: &Scene) -> Vec<Target> {
     let casts = scene.caustic_materials();
-    let specular = items(scene, |material| casts[material as usize]);
+    let specular = objects(scene, |material| casts[material as usize]);
     if specular.is_empty() {
         return Vec::new();
     }
     let mut tree = vec![Cluster::new(specular)];
     for _ in 1..MAX_TARGETS {
-        let leaves = (0..tree.len()).filter(|&i| tree[i].halves.is_none() && tree[i].items.len() > 1);
-        let largest = leaves.max_by(|&a, &b| tree[a].target.radius.total_cmp(&tree[b].target.radius));
+        let leaves = (0..tree.len()).filter(|&i| tree[i].halves.is_none() && tree[i].can_be_split());
+        let several = |i: usize| tree[i].objects.len() > 1;
+        let radius = |i: usize| tree[i].target.radius;
+        let largest = leaves.max_by(|&a, &b| several(a).cmp(&several(b)).then(radius(a).total_cmp(&radius(b))));
         let Some(largest) = largest else { break };
-        let Some(halves) = split(std::mem::take(&mut tree[largest].items)) else { continue };
+        let Some(halves) = tree[largest].split() else { continue };
         tree[largest].halves = Some([tree.len(), tree.len() + 1]);
-        tree.extend(halves.map(Cluster::new));
+        tree.extend(halves);
     }
     best_cut(&tree, 0).1
 }
@@ -110,42 +138,51 @@ fn best_cut(tree: &[Cluster], cluster: usize) -> (f64, Vec<Target>) {
     let kept = (whole.cross_section(), vec![whole]);
     let Some([left, right]) = tree[cluster].halves else { return kept };
     let ((left, mut targets), (right, others)) = (best_cut(tree, left), best_cut(tree, right));
-    if left + right >= kept.0 {
+    if left + right >= tree[cluster].slack * kept.0 {
         return kept;
     }
     targets.extend(others);
     (left + right, targets)
 }
 
-/// Items on either side of the middle of the longest extent of their centres; `None` if one side is
-/// empty, as when all centres coincide.
-fn split(items: Vec<Item>) -> Option<[Vec<Item>; 2]> {
-    let box_ = Bounds::around(items.iter().map(Item::middle));
+/// Those on either side of the middle of the longest extent of their centres; all of them if one
+/// side is empty.
+fn split<T>(all: Vec<T>, middle: impl Fn(&T) -> Vec3) -> std::result::Result<[Vec<T>; 2], Vec<T>> {
+    let box_ = Bounds::around(all.iter().map(&middle));
     let axis = (box_.max - box_.min).max_position();
     let plane = 0.5 * (box_.min[axis] + box_.max[axis]);
-    let (left, right): (Vec<_>, Vec<_>) = items.into_iter().partition(|item| item.middle()[axis] < plane);
-    (!left.is_empty() && !right.is_empty()).then_some([left, right])
+    let (left, right): (Vec<_>, Vec<_>) = all.into_iter().partition(|one| middle(one)[axis] < plane);
+    match (left.is_empty(), right.is_empty()) {
+        (false, false) => Ok([left, right]),
+        (true, _) => Err(right),
+        _ => Err(left),
+    }
 }
 
-fn sphere_around(items: &[Item]) -> Target {
-    let Bounds { min, max } = items.iter().map(Item::bounds).fold(Bounds::EMPTY, Bounds::union);
+fn sphere_around<'a>(items: impl IntoIterator<Item = &'a Item> + Clone) -> Target {
+    let Bounds { min, max } = items.clone().into_iter().map(Item::bounds).fold(Bounds::EMPTY, Bounds::union);
     let center = 0.5 * (min + max);
     // Slightly enlarged, so that rounding leaves nothing outside.
-    let radius = items.iter().map(|item| item.reach(center)).fold(0.0, f32::max);
+    let radius = items.into_iter().map(|item| item.reach(center)).fold(0.0, f32::max);
     Target { center, radius: radius * 1.00001 }
 }
 
-fn items(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Item> {
-    let triangles = scene.triangles.iter().filter(|t| wanted(t.material)).map(|t| Item::Triangle(t.positions));
-    let spheres = scene.spheres.iter().filter(|s| wanted(s.material)).map(|s| Item::Sphere(s.center, s.radius));
+/// The primitives of each object that has some.
+fn objects(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Vec<Item>> {
+    let triangles = scene.triangles.iter().filter(|t| wanted(t.material));
+    let spheres = scene.spheres.iter().filter(|s| wanted(s.material));
     let has = |mesh: &SharedMesh| mesh.triangles.iter().any(|t| wanted(t.material));
     let meshes: Vec<bool> = scene.meshes.iter().map(has).collect();
     // A sphere around each instance: listing all their triangles would take the memory that they
     // spare.
     let around = |bounds: Bounds| Item::Sphere(0.5 * (bounds.min + bounds.max), 0.5 * bounds.diagonal());
     let boxes = scene.instances.iter().zip(instance_bounds(&scene.meshes, &scene.instances));
-    let instances = boxes.filter(|(instance, _)| meshes[instance.mesh as usize]).map(|(_, bounds)| around(bounds));
-    triangles.chain(spheres).chain(instances).collect()
+    let instances = boxes.filter(|(instance, _)| meshes[instance.mesh as usize]);
+    let mut objects = BTreeMap::<u32, Vec<Item>>::new();
+    triangles.for_each(|t| objects.entry(t.object).or_default().push(Item::Triangle(t.positions)));
+    spheres.for_each(|s| objects.entry(s.object).or_default().push(Item::Sphere(s.center, s.radius)));
+    let instances = instances.map(|(_, bounds)| vec![around(bounds)]);
+    objects.into_values().chain(instances).collect()
 }
 
 /// Approximate fraction of a light's power that goes towards the targets; above 0 if any light can
@@ -206,6 +243,20 @@ mod tests {
         let close = specular_targets(&scene(&[Vec3::ZERO, vec3(0.1, 0.0, 0.0)], 1.0));
         assert_eq!(close.len(), 1);
         assert!(specular_targets(&Scene::default()).is_empty());
+    }
+
+    #[test]
+    fn small_objects_beside_large_ones_have_spheres_of_their_own() {
+        let mut scene = scene(&[vec3(0.0, 0.0, 0.0), vec3(0.7, 0.6, 0.0)], 1.0);
+        scene.spheres[1].radius = 0.05;
+        let sizes = |scene: &Scene| specular_targets(scene).iter().map(|t| t.radius).collect::<Vec<_>>();
+        assert_eq!(sizes(&scene).len(), 1, "of one object");
+        scene.spheres[1].object = 1;
+        let found = sizes(&scene);
+        assert!(found.len() == 2 && found.iter().any(|radius| (0.05..0.051).contains(radius)), "{found:?}");
+        // Objects about one centre are one cluster.
+        scene.spheres[1].center = Vec3::ZERO;
+        assert_eq!(sizes(&scene).len(), 1);
     }
 
     #[test]

@@ -107,7 +107,7 @@ pub struct PhotonBatch {
     /// Diffuse surfaces that a path meets at most.
     pub max_bounces: u32,
     /// [`STORE_GLOBAL`], [`STORE_DIRECT`], [`STORE_CAUSTIC`], [`FOLLOW_DIFFUSE`], [`AIM`],
-    /// [`CAUSTICS_APART`], [`EVENLY`].
+    /// [`CAUSTICS_APART`].
     pub rules: u32,
     pub staging_capacity: u32,
     pub lost_scale: f32,
@@ -163,8 +163,6 @@ pub const AIM: u32 = 16;
 /// Caustic photons are those that come from a light through specular surfaces only. Photons that a
 /// diffuse surface scattered before belong to the global map.
 pub const CAUSTICS_APART: u32 = 32;
-/// All targets are chosen as often, whatever their size.
-pub const EVENLY: u32 = 64;
 
 /// Bit of a node of the octree over what cameras see that has children.
 pub const IMPORTANCE_CHILDREN: u32 = 0x8000_0000;

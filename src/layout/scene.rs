@@ -258,6 +258,21 @@ pub struct SceneSphere {
     pub radius: f32,
 }
 
+/// Sphere that photon paths are aimed at.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Target {
+    /// Metres.
+    pub center: [f32; 3],
+    pub radius: f32,
+    /// Fraction of the paths that are aimed at it whatever its size; 0 to 1 in all. The others are
+    /// shared out by size.
+    pub share: f32,
+    pub pad0: f32,
+    pub pad1: f32,
+    pub pad2: f32,
+}
+
 /// Size and rotation of the environment map.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -1,19 +1,20 @@
 //! First pass: traces photons from the lights and stores them in maps, with the settings of the
 //! tracing.
 
-use super::{seen::Viewer, tally};
+use super::{power_classes::power_classes, seen::Viewer, tally};
 use crate::{
     error::Result,
     gpu::Gpu,
     map_kind::MapKind,
-    passes::{MapKernels, PathRanges, PhotonMap, PhotonTracer},
+    passes::{MapKernels, PathRanges, PhotonMap, PhotonStore, PhotonTracer},
     progress::{Progress, Stage},
     settings::PhotonSettings,
     stats::{Stats, timed},
     upload::SceneBuffers,
 };
 
-/// Photon maps of a first pass, on the device: one of each kind that holds a photon.
+/// Photon maps of a first pass, on the device: one of each kind that holds a photon, or several,
+/// see [`super::power_classes`].
 #[derive(Debug)]
 pub struct PhotonMaps {
     maps: Vec<PhotonMap>,
@@ -97,6 +98,14 @@ pub(super) fn trace_maps(
     timed(&mut stats.seconds.grid, || {
         let kernels = MapKernels::new(gpu);
         for (kind, map) in traced.maps.into_pairs().into_iter().filter(|(_, map)| map.stored > 0) {
+            if kind == MapKind::Caustic && scene.lights.mixes_powers {
+                for class in power_classes(map.read(gpu)?) {
+                    let photons = PhotonStore::with(gpu, &class)?;
+                    maps.push(PhotonMap::build(gpu, &kernels, photons, class.len() as u32, map.emitted)?);
+                    kinds.push(kind);
+                }
+                continue;
+            }
             maps.push(PhotonMap::build(gpu, &kernels, map.photons, map.stored as u32, map.emitted)?);
             kinds.push(kind);
         }

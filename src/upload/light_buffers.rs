@@ -11,14 +11,21 @@ use crate::{
         light_table::{Choices, LightTable},
         set_media,
         sight::Sight,
-        targets::{scene_target, specular_targets},
+        targets::{Target, scene_target, specular_targets},
     },
     error::Result,
     gpu::{Buffer, Gpu, Table},
-    layout::{EnvironmentInfo, SceneSphere},
+    layout::{self, EnvironmentInfo, SceneSphere},
     scene::Scene,
     settings::LightSettings,
 };
+
+/// Fraction of the paths to mirrors and glass that are aimed at those that matter to the picture,
+/// whatever their size: what a glass throws has as many photons as it needs beside a mirror that
+/// fills a wall.
+const WHATEVER_SIZE: f32 = 0.5;
+/// Ratio of the powers that photons of different targets then have, up to which size alone decides.
+const LEVEL: f32 = 4.0;
 
 /// A table of [`Choices`] on the device, `array<LightChoice>`.
 #[derive(Debug)]
@@ -50,6 +57,8 @@ pub struct LightBuffers {
     /// The smallest sphere around what the cameras see, centre and radius, metres; radius 0: none.
     pub seen: [f32; 4],
     pub specular_targets: u32,
+    /// Whether photons from there have quite different powers.
+    pub mixes_powers: bool,
     /// See [`Sight::enclosure`].
     pub enclosure: f64,
     /// See [`Sight::importance`].
@@ -77,13 +86,26 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, (scene, bvh): (&Scene, &Bvh), probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = specular_targets(scene);
-        let Sight { targets: seen, enclosure, importance } = Sight::new(scene, bvh);
+        let Sight { targets: seen, enclosure, importance, shares } = Sight::new(scene, bvh, &targets);
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
         table.lights.par_iter_mut().for_each(|light| set_media(light, probe));
-        let spheres: Vec<[f32; 4]> =
-            seen.iter().chain([&around]).chain(&targets).map(|t| t.center.extend(t.radius).to_array()).collect();
+        // Paths are aimed at what is seen, and at all, as often, whatever the size.
+        let even = 1.0 / (seen.len() + 1) as f32;
+        let general = seen.iter().chain([&around]).map(|sphere| (sphere, even));
+        let mixes_powers = powers_ratio(&targets, &shares) > LEVEL;
+        let aside = if mixes_powers { WHATEVER_SIZE } else { 0.0 };
+        let specular = targets.iter().zip(shares).map(|(sphere, share)| (sphere, aside * share));
+        let spheres: Vec<layout::Target> = general
+            .chain(specular)
+            .map(|(Target { center, radius }, share)| layout::Target {
+                center: center.to_array(),
+                radius: *radius,
+                share,
+                ..Default::default()
+            })
+            .collect();
         let (sine, cosine) = map.as_ref().map_or(0.0, |map| map.rotation).sin_cos();
         let scene_sphere = SceneSphere { center: around.center.to_array(), radius: around.radius };
         let environment_info = EnvironmentInfo {
@@ -105,6 +127,7 @@ impl LightBuffers {
             seen_targets: seen.len() as u32,
             seen: seen.first().map_or([0.0; 4], |target| target.center.extend(target.radius).to_array()),
             specular_targets: targets.len() as u32,
+            mixes_powers,
             enclosure,
             importance_words: Table::new(
                 gpu,
@@ -149,6 +172,16 @@ impl LightBuffers {
             ("importance_table", &self.importance_words),
         ]
     }
+}
+
+/// Greatest power of photons of parallel light from one of the targets over the least, if they have
+/// these shares.
+fn powers_ratio(targets: &[Target], shares: &[f32]) -> f32 {
+    let size = |target: &Target| target.radius * target.radius;
+    let sum: f32 = targets.iter().map(size).sum();
+    let densities = targets.iter().zip(shares).map(|(t, share)| 1.0 / sum + share / size(t).max(f32::MIN_POSITIVE));
+    let (least, most) = densities.fold((f32::INFINITY, 0.0_f32), |(least, most), d| (least.min(d), most.max(d)));
+    if least > 0.0 && least.is_finite() { most / least } else { 1.0 }
 }
 
 /// Warning that the environment map was reduced, if it was.

@@ -210,6 +210,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "ray_start",
             "tally",
             "seen",
+            "power_classes",
             "maps",
             "unevenness",
             "tiles",

@@ -51,6 +51,7 @@ fn twins() -> Vec<Twin> {
         LightNode { center, half, shine }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
+        Target { center, radius, share, pad0, pad1, pad2 }
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
         Path { origin, history, direction, bounces, beta, left, media }
         Photon { position, wi, flux, normal }
@@ -165,7 +166,6 @@ fn constants() -> Vec<(&'static str, f64)> {
         AIM,
         BY_CELL,
         CAUSTICS_APART,
-        EVENLY,
         MAX_TARGETS,
         WHOLE_CELL,
         SPLIT_CELL,

@@ -112,13 +112,9 @@ pub(super) fn plans<'a>(
             least_kept: *least_kept,
             ..plain
         },
-        None if aimed && lights.seen_targets > 0 => EmissionPlan {
-            first_target: 0,
-            target_count: lights.seen_targets + 1,
-            rules: plain.rules | layout::EVENLY,
-            aim: lights.seen,
-            ..plain
-        },
+        None if aimed && lights.seen_targets > 0 => {
+            EmissionPlan { first_target: 0, target_count: lights.seen_targets + 1, aim: lights.seen, ..plain }
+        }
         None => plain,
     };
     let caustic = EmissionPlan {

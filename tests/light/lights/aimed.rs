@@ -6,6 +6,7 @@
 //! | picture | aimed and unaimed give the same picture | general paths keep L S+ D as well |
 //! | ground | a wall on a wide ground has the indirect light of one on a small ground | unaimed emission; a darker ground |
 //! | paths | aimed, a caustic photon takes far fewer paths | the unaimed count |
+//! | small ball | its caustic beside a wide mirror is the one that it throws alone | another index |
 //! | open figure | a figure under the sky takes few paths, for the same picture | a number of paths that is asked for; the figure in a room |
 
 use caustica::{
@@ -31,6 +32,14 @@ fn balls() -> Scene {
     scene
 }
 
+/// A point light, and a mirror of 6 m by 2.5 m behind the balls.
+fn wide_mirror(scene: &mut Scene, light: Vec3) {
+    scene.lights.push(point_light(light, 3.0));
+    add_quad(scene, vec3(-3.0, 0.0, -2.0), vec3(6.0, 0.0, 0.0), vec3(0.0, 2.5, 0.0), 2);
+    let first = scene.triangles.len() - 2;
+    scene.triangles[first..].iter_mut().for_each(|triangle| triangle.object = 1);
+}
+
 /// The balls under each kind of light.
 fn lit_balls() -> Vec<(&'static str, Scene)> {
     let lit = |change: &dyn Fn(&mut Scene)| {
@@ -46,6 +55,12 @@ fn lit_balls() -> Vec<(&'static str, Scene)> {
     };
     vec![
         ("point", lit(&|s| s.lights.push(point_light(vec3(0.0, 2.0, 0.5), 3.0)))),
+        ("point beside a wide mirror", lit(&|s| wide_mirror(s, vec3(0.0, 2.0, 0.5)))),
+        ("directional beside a wide mirror", {
+            let mut scene = lit(&|s| s.lights.push(sun.clone()));
+            add_quad(&mut scene, vec3(-3.0, 0.0, -2.0), vec3(6.0, 0.0, 0.0), vec3(0.0, 2.5, 0.0), 2);
+            scene
+        }),
         ("point inside a target", lit(&|s| s.lights.push(point_light(vec3(1.3, 0.95, 0.1), 3.0)))),
         ("spot", lit(&|s| s.lights.push(spot(vec3(0.0, 2.0, 0.5), vec3(0.9, -1.5, 0.0), 3.0, 0.2, 0.5)))),
         ("directional", lit(&|s| s.lights.push(sun.clone()))),
@@ -166,6 +181,40 @@ fn aimed_paths_make_the_picture_of_unaimed_ones() {
     let paths = |stats: &Stats| stats.photons.caustic.emitted as f64 / stats.photons.caustic.stored as f64;
     let (few, many) = (paths(&aimed_stats), paths(&unaimed_stats));
     assert!(few < 0.4 * many, "{few} paths a caustic photon aimed, {many} unaimed");
+}
+
+#[test]
+fn the_caustic_of_a_small_ball_is_that_beside_a_wide_mirror() {
+    // The mirror stands behind the lamp's shade, and sends nothing to where the camera looks.
+    let ball = |with_mirror: bool, photons: u32, ior: f32| {
+        let mut scene = scene(&[diffuse(0.5), Surface::Glass { ior, tint: Vec3::ONE }]);
+        scene.materials.push(Material::new("mirror", Surface::Mirror { tint: Vec3::ONE }));
+        add_quad(&mut scene, vec3(-1.0, 0.0, 1.0), vec3(2.0, 0.0, 0.0), vec3(0.0, 0.0, -2.0), 0);
+        scene.spheres.push(sphere(vec3(0.0, 0.03, 0.0), 0.03, 1));
+        if with_mirror {
+            add_quad(&mut scene, vec3(-4.0, 0.0, -4.0), vec3(8.0, 0.0, 0.0), vec3(0.0, 6.0, 0.0), 2);
+            scene.triangles[2..].iter_mut().for_each(|triangle| triangle.object = 1);
+        }
+        scene.lights.push(point_light(vec3(0.3, 0.6, 0.2), 1.0));
+        // What the mirror gets falls back behind it.
+        add_box(&mut scene, vec3(-1.0, -0.5, -1.1), vec3(1.0, 1.2, -1.05), 0);
+        scene.cameras.push(camera(vec3(0.0, 0.3, 0.25), vec3(-0.02, 0.0, -0.01), 25.0));
+        let settings = settings(Mode::Hybrid, 1, 32).with(|s| {
+            (s.photons.caustic, s.photons.seed) = (photons, u32::from(with_mirror));
+            (s.photons.global, s.estimate.neighbors) = (100, 30);
+        });
+        reds(&render_scene(&scene, &settings))
+    };
+    let right = ball(false, 200_000, 1.5);
+    let error = |picture: &[f64]| {
+        let errors = blocks(picture).into_iter().zip(blocks(&right)).map(|(a, b)| ((a - b) / b).powi(2));
+        (errors.sum::<f64>() / 16.0).sqrt()
+    };
+    let (alone, beside) = (error(&ball(false, 20_000, 1.5)), error(&ball(true, 20_000, 1.5)));
+    println!("{alone} alone, {beside} beside the mirror");
+    assert!(beside < 0.03 && beside < 3.0 * alone, "{alone} alone, {beside} beside the mirror");
+    let other = error(&ball(true, 20_000, 1.25));
+    assert!(other > 2.0 * beside, "control: another index: {other}, {beside}");
 }
 
 /// A wall of 1 m on a ground of half side `reach`, under the sun or a sky that shines from above.
