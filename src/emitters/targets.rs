@@ -2,7 +2,10 @@
 //! that could become a caustic is left out, and few others are traced. This is the projection map
 //! of Jensen 2001, section 5.3, as bounding spheres.
 
-use std::{collections::BTreeMap, f64::consts::TAU};
+use std::{
+    collections::{BTreeMap, HashMap},
+    f64::consts::TAU,
+};
 
 use glam::Vec3;
 
@@ -61,40 +64,41 @@ impl Item {
     }
 }
 
-/// Greatest sum of the cross-sections of two clusters of different objects, over that of both
+/// Greatest sum of the cross-sections of two clusters of different parts, over that of both
 /// together, at which they stay apart: a small one beside a large one.
 const APART: f64 = 1.1;
 
-/// A cluster of primitives, by their objects. `halves`: indices of its two halves, if it was split.
+/// A cluster of primitives, by the connected parts that they make. `halves`: indices of its two
+/// halves, if it was split.
 struct Cluster {
     target: Target,
-    objects: Vec<Vec<Item>>,
+    parts: Vec<Vec<Item>>,
     halves: Option<[usize; 2]>,
     /// Greatest sum of the cross-sections of the halves at which they are kept, over its own.
     slack: f64,
 }
 
 impl Cluster {
-    fn new(objects: Vec<Vec<Item>>) -> Self {
-        let slack = if objects.len() > 1 { APART } else { 1.0 };
-        Self { target: sphere_around(objects.iter().flatten()), objects, halves: None, slack }
+    fn new(parts: Vec<Vec<Item>>) -> Self {
+        let slack = if parts.len() > 1 { APART } else { 1.0 };
+        Self { target: sphere_around(parts.iter().flatten()), parts, halves: None, slack }
     }
 
     fn can_be_split(&self) -> bool {
-        self.objects.len() > 1 || self.objects.first().is_some_and(|items| items.len() > 1)
+        self.parts.len() > 1 || self.parts.first().is_some_and(|items| items.len() > 1)
     }
 
-    /// Its objects, or the primitives of its only one, on either side of the middle of the longest
+    /// Its parts, or the primitives of its only one, on either side of the middle of the longest
     /// extent of their centres; `None` if one side is empty, as when all centres coincide.
     fn split(&mut self) -> Option<[Self; 2]> {
-        let mut objects = std::mem::take(&mut self.objects);
-        if objects.len() > 1 {
-            match split(objects, |object| sphere_around(object).center) {
+        let mut parts = std::mem::take(&mut self.parts);
+        if parts.len() > 1 {
+            match split(parts, |part| sphere_around(part).center) {
                 Ok(halves) => return Some(halves.map(Self::new)),
-                Err(all) => objects = all,
+                Err(all) => parts = all,
             }
         }
-        let halves = split(objects.into_iter().flatten().collect(), Item::middle).ok()?;
+        let halves = split(parts.into_iter().flatten().collect(), Item::middle).ok()?;
         Some(halves.map(|half| Self::new(vec![half])))
     }
 }
@@ -108,20 +112,20 @@ pub fn scene_target(scene: &Scene) -> Target {
 
 /// Spheres that together contain all specular surfaces, at most [`MAX_TARGETS`]; none if there are
 /// no such surfaces. The largest cluster is split along its longest axis until there are
-/// [`MAX_TARGETS`] clusters, those of several objects first. Then halves are kept only where the
-/// sum of their cross-sections is smaller than that of the whole cluster, or hardly greater where
-/// they are different objects: so a glass beside a large window has a sphere of its own.
+/// [`MAX_TARGETS`] clusters, those of several connected parts first. Then halves are kept only
+/// where the sum of their cross-sections is smaller than that of the whole cluster, or hardly
+/// greater where no part is in both: so a glass beside a large window has a sphere of its own.
 #[must_use]
 pub fn specular_targets(scene: &Scene) -> Vec<Target> {
     let casts = scene.caustic_materials();
-    let specular = objects(scene, |material| casts[material as usize]);
+    let specular = parts(scene, |material| casts[material as usize]);
     if specular.is_empty() {
         return Vec::new();
     }
     let mut tree = vec![Cluster::new(specular)];
     for _ in 1..MAX_TARGETS {
         let leaves = (0..tree.len()).filter(|&i| tree[i].halves.is_none() && tree[i].can_be_split());
-        let several = |i: usize| tree[i].objects.len() > 1;
+        let several = |i: usize| tree[i].parts.len() > 1;
         let radius = |i: usize| tree[i].target.radius;
         let largest = leaves.max_by(|&a, &b| several(a).cmp(&several(b)).then(radius(a).total_cmp(&radius(b))));
         let Some(largest) = largest else { break };
@@ -167,8 +171,8 @@ fn sphere_around<'a>(items: impl IntoIterator<Item = &'a Item> + Clone) -> Targe
     Target { center, radius: radius * 1.00001 }
 }
 
-/// The primitives of each object that has some.
-fn objects(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Vec<Item>> {
+/// The wanted primitives, by connected parts.
+fn parts(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Vec<Item>> {
     let triangles = scene.triangles.iter().filter(|t| wanted(t.material));
     let spheres = scene.spheres.iter().filter(|s| wanted(s.material));
     let has = |mesh: &SharedMesh| mesh.triangles.iter().any(|t| wanted(t.material));
@@ -178,11 +182,37 @@ fn objects(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Vec<Item>> {
     let around = |bounds: Bounds| Item::Sphere(0.5 * (bounds.min + bounds.max), 0.5 * bounds.diagonal());
     let boxes = scene.instances.iter().zip(instance_bounds(&scene.meshes, &scene.instances));
     let instances = boxes.filter(|(instance, _)| meshes[instance.mesh as usize]);
-    let mut objects = BTreeMap::<u32, Vec<Item>>::new();
-    triangles.for_each(|t| objects.entry(t.object).or_default().push(Item::Triangle(t.positions)));
-    spheres.for_each(|s| objects.entry(s.object).or_default().push(Item::Sphere(s.center, s.radius)));
-    let instances = instances.map(|(_, bounds)| vec![around(bounds)]);
-    objects.into_values().chain(instances).collect()
+    let single = spheres.map(|s| Item::Sphere(s.center, s.radius)).chain(instances.map(|(_, bounds)| around(bounds)));
+    let triangles: Vec<[Vec3; 3]> = triangles.map(|t| t.positions).collect();
+    connected(&triangles).into_iter().chain(single.map(|item| vec![item])).collect()
+}
+
+/// Triangles that hang together by corners in one place.
+fn connected(triangles: &[[Vec3; 3]]) -> Vec<Vec<Item>> {
+    let mut corners = HashMap::<[u32; 3], usize>::new();
+    // Each leads to an earlier triangle of its part, or to itself.
+    let mut leads: Vec<usize> = (0..triangles.len()).collect();
+    let first_of = |leads: &mut Vec<usize>, mut triangle: usize| {
+        while leads[triangle] != triangle {
+            leads[triangle] = leads[leads[triangle]];
+            triangle = leads[triangle];
+        }
+        triangle
+    };
+    for (i, positions) in triangles.iter().enumerate() {
+        for corner in positions {
+            // Sums with 0 make both zeros one.
+            let key = (*corner + Vec3::ZERO).to_array().map(f32::to_bits);
+            let other = *corners.entry(key).or_insert(i);
+            let (a, b) = (first_of(&mut leads, i), first_of(&mut leads, other));
+            leads[a.max(b)] = a.min(b);
+        }
+    }
+    let mut parts = BTreeMap::<usize, Vec<Item>>::new();
+    for (i, positions) in triangles.iter().enumerate() {
+        parts.entry(first_of(&mut leads, i)).or_default().push(Item::Triangle(*positions));
+    }
+    parts.into_values().collect()
 }
 
 /// Approximate fraction of a light's power that goes towards the targets; above 0 if any light can
@@ -224,7 +254,7 @@ mod tests {
     use glam::vec3;
 
     use super::*;
-    use crate::scene::{Material, Sphere, Surface};
+    use crate::scene::{Material, Sphere, Surface, Triangle};
 
     fn scene(centers: &[Vec3], radius: f32) -> Scene {
         let surface = Surface::Mirror { tint: Vec3::ONE };
@@ -246,16 +276,25 @@ mod tests {
     }
 
     #[test]
-    fn small_objects_beside_large_ones_have_spheres_of_their_own() {
+    fn small_parts_beside_large_ones_have_spheres_of_their_own() {
         let mut scene = scene(&[vec3(0.0, 0.0, 0.0), vec3(0.7, 0.6, 0.0)], 1.0);
         scene.spheres[1].radius = 0.05;
         let sizes = |scene: &Scene| specular_targets(scene).iter().map(|t| t.radius).collect::<Vec<_>>();
-        assert_eq!(sizes(&scene).len(), 1, "of one object");
-        scene.spheres[1].object = 1;
         let found = sizes(&scene);
         assert!(found.len() == 2 && found.iter().any(|radius| (0.05..0.051).contains(radius)), "{found:?}");
-        // Objects about one centre are one cluster.
+        // Parts about one centre are one cluster.
         scene.spheres[1].center = Vec3::ZERO;
+        assert_eq!(sizes(&scene).len(), 1);
+        // A small square in the middle of a large one, of one mesh, and hanging on to it.
+        let square = |corner: Vec3, side: f32| {
+            let [a, b, c, d] =
+                [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)].map(|(x, y)| corner + vec3(x, y, 0.0));
+            [[a, b, c], [a, c, d]].map(|corners| Triangle::new(corners, [Vec3::Z; 3], 0))
+        };
+        scene.spheres.clear();
+        scene.triangles = [square(Vec3::ZERO, 2.0), square(Vec3::splat(0.8), 0.1)].concat();
+        assert_eq!(sizes(&scene).len(), 2);
+        scene.triangles[2].positions[1] = Vec3::ZERO;
         assert_eq!(sizes(&scene).len(), 1);
     }
 

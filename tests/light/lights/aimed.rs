@@ -36,8 +36,6 @@ fn balls() -> Scene {
 fn wide_mirror(scene: &mut Scene, light: Vec3) {
     scene.lights.push(point_light(light, 3.0));
     add_quad(scene, vec3(-3.0, 0.0, -2.0), vec3(6.0, 0.0, 0.0), vec3(0.0, 2.5, 0.0), 2);
-    let first = scene.triangles.len() - 2;
-    scene.triangles[first..].iter_mut().for_each(|triangle| triangle.object = 1);
 }
 
 /// The balls under each kind of light.
@@ -193,7 +191,6 @@ fn the_caustic_of_a_small_ball_is_that_beside_a_wide_mirror() {
         scene.spheres.push(sphere(vec3(0.0, 0.03, 0.0), 0.03, 1));
         if with_mirror {
             add_quad(&mut scene, vec3(-4.0, 0.0, -4.0), vec3(8.0, 0.0, 0.0), vec3(0.0, 6.0, 0.0), 2);
-            scene.triangles[2..].iter_mut().for_each(|triangle| triangle.object = 1);
         }
         scene.lights.push(point_light(vec3(0.3, 0.6, 0.2), 1.0));
         // What the mirror gets falls back behind it.
