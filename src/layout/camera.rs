@@ -96,8 +96,8 @@ pub struct CameraTile {
     pub samples: u32,
     /// 1: the paths are rays of final gathering; 0: they start at the camera.
     pub gathers: u32,
-    /// Path slots per sample: reflection and refraction are both followed at its first
-    /// log2(branches) dielectric interfaces.
+    /// Path slots per sample, a power of 2: where a path may go on in two ways, both are followed
+    /// while it has slots for them.
     pub branches: u32,
     /// Pixels of the tile, in Morton order.
     pub pixels: u32,
@@ -139,7 +139,16 @@ pub struct CameraTile {
     pub pad2: u32,
 }
 
-/// First hit of a camera sample.
+/// Veils, surfaces of an opacity between 0 and 1, that a camera path passes at most before it draws
+/// which of the others it meets.
+pub const MOST_VEILS: u32 = 64;
+
+/// [`FirstHit::material`] where nothing is seen.
+pub const NO_MATERIAL: u32 = u32::MAX;
+
+/// First hit of a camera sample. Behind veils there are several: numbers are their means, weighted by
+/// what each covers of those behind it, the primitive and its material those of one that is drawn by
+/// these weights.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct FirstHit {
@@ -148,7 +157,7 @@ pub struct FirstHit {
     /// Distance along the camera's axis, metres.
     pub depth: f32,
     pub albedo: [f32; 3],
-    /// 1 if something was hit.
+    /// Sum of the weights: 1 if something was hit that covers all behind it.
     pub alpha: f32,
     /// Relative to the scene's centre, metres.
     pub position: [f32; 3],

@@ -7,7 +7,7 @@ use crate::{
         Film,
         layers::{HITS, LightComponent, POSITIONS, Source},
     },
-    layout::{FirstHit, Gathered, PixelSums},
+    layout::{FirstHit, Gathered, NO_MATERIAL, PixelSums},
     map_kind::MapKind,
     passes::Tile,
     scene::Scene,
@@ -83,7 +83,7 @@ impl CameraPass<'_> {
         let hits = self.tracer.first_hits(self.gpu, tile)?;
         for (i, hits) in (0..).zip(hits.chunks(tile.samples as usize)) {
             let Some(pixel) = self.tracer.pixel(tile, i) else { continue };
-            let seen = || hits.iter().filter(|hit| hit.alpha > 0.0);
+            let seen = || hits.iter().filter(|hit| hit.material != NO_MATERIAL);
             let of = |hashes: &[u32], index: u32| hashes.get(index as usize).copied();
             let [objects, materials] = &self.hashes;
             film.add_to_matte(ExtraLayers::Objects, pixel, seen().filter_map(|hit| of(objects, object(hit))));

@@ -31,6 +31,8 @@ pub struct MaterialBuffers {
     pub has_textures: bool,
     /// Some surface is not there everywhere.
     pub has_alpha: bool,
+    /// Some surface is there in part.
+    pub has_veils: bool,
 }
 
 impl MaterialBuffers {
@@ -54,6 +56,7 @@ impl MaterialBuffers {
             has_finishes: materials().any(Material::is_finished),
             has_rough: materials().any(is_rough),
             has_alpha: materials().any(|m| m.alpha != Alpha::Opaque),
+            has_veils: materials().any(|m| may_be_veil(scene, m)),
             materials: Table::new(gpu, "materials", &rows)?,
             attributes: Table::layered(gpu, "attributes of triangles", &attributes)?,
             texels: Table::layered(gpu, "texels", &texels.into_words())?,
@@ -109,6 +112,17 @@ fn is_rough(material: &Material) -> bool {
     let is_opaque = !material.surface.transmits() || material.transmission < 1.0;
     let is_rough = (has_gloss && material.roughness >= SHARP_ROUGHNESS) || material.clearcoat > 0.0;
     is_rough || (material.is_finished() && is_opaque)
+}
+
+/// Whether a material may have an opacity between 0 and 1.
+fn may_be_veil(scene: &Scene, material: &Material) -> bool {
+    let varies = |texture: &Texture| scene.images[texture.image as usize].texels.iter().any(|texel| texel[3] < u8::MAX);
+    let is_in_part = || {
+        material.opacity < 1.0
+            || material.textures.base_color.as_ref().is_some_and(varies)
+            || scene.attributes.iter().any(|own| own.colors.iter().any(|color| color.w < 1.0))
+    };
+    material.alpha == Alpha::Blend && material.opacity > 0.0 && is_in_part()
 }
 
 /// The attributes of the triangles, in the order of the corners as they are now.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::{light_buffers::LightBuffers, material_buffers::MaterialBuffers};
 use crate::{
-    bvh::{Bvh, Contacts, MediaProbe, contacts},
+    bvh::{Bvh, Contacts, FILLER, MediaProbe, contacts},
     emitters::light_table::LightTable,
     error::Result,
     gpu::{
@@ -41,6 +41,8 @@ pub struct SceneBuffers {
     stack: usize,
     /// Nodes and primitives: no ray visits more.
     visits: u32,
+    /// No primitive is listed several times.
+    is_listed_once: bool,
     no_lists: Arc<Buffer>,
     /// Ranks of primitives that lie in each other.
     contacts: Arc<Contacts>,
@@ -125,6 +127,7 @@ impl SceneBuffers {
             instances: Table::new(gpu, "instances", &bvh.instances)?,
             has_instances: !bvh.instances.is_empty(),
             visits: visits(bvh),
+            is_listed_once: is_listed_once(scene, bvh),
             no_lists: Arc::new(gpu.storage::<u32>("no lists", 1)?),
             contacts,
             has_lobes: scene.has_lobes(),
@@ -162,6 +165,12 @@ impl SceneBuffers {
         })
     }
 
+    /// Whether some surface is there in part.
+    #[must_use]
+    pub fn has_veils(&self) -> bool {
+        self.materials.has_veils
+    }
+
     /// Whether a ray may visit more than an invocation can.
     #[must_use]
     pub fn has_late_rays(&self, gpu: &Gpu) -> bool {
@@ -196,6 +205,8 @@ impl SceneBuffers {
             ("HAS_DISPERSION", f64::from(u8::from(self.has_dispersion))),
             ("HAS_TEXTURES", f64::from(u8::from(self.materials.has_textures))),
             ("HAS_ALPHA", f64::from(u8::from(self.materials.has_alpha))),
+            ("HAS_VEILS", f64::from(u8::from(self.has_veils()))),
+            ("WEIGHS_VEILS", f64::from(u8::from(self.is_listed_once))),
             ("HAS_ABSORPTION", f64::from(u8::from(self.has_absorption))),
             ("HAS_VARIED_LIGHTS", f64::from(u8::from(self.lights.table.is_varied))),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
@@ -242,6 +253,13 @@ impl Split {
     fn constant(&self) -> f64 {
         if self.at == 0 { f64::from(u32::MAX) } else { self.at as f64 }
     }
+}
+
+/// Whether the hierarchy lists each of the scene's primitives once.
+fn is_listed_once(scene: &Scene, bvh: &Bvh) -> bool {
+    let of_meshes: usize = scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+    let all = scene.triangles.len() + scene.spheres.len() + of_meshes;
+    bvh.primitives.iter().filter(|p| p.id != FILLER && p.emitter != INSTANCE).count() <= all
 }
 
 /// Nodes and primitives that a ray may visit, those of each instance counted.

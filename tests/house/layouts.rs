@@ -112,6 +112,8 @@ fn constants() -> Vec<(&'static str, f64)> {
         MATERIAL_MASK,
         NOTHING_LEFT,
         CHAIN_LIMIT,
+        MOST_VEILS,
+        NO_MATERIAL,
         LOST_SCALE,
         MARGIN_CELL,
         MARGIN_SAMPLES,

@@ -22,4 +22,5 @@ mod solids;
 mod spaced_gathering;
 mod transport;
 mod uneven_pixels;
+mod veils;
 mod wide_grounds;

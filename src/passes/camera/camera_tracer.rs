@@ -26,6 +26,9 @@ use crate::{
 /// Path slots per sample if the scene has dielectrics: reflection and refraction are both followed
 /// at the first two interfaces.
 const BRANCHES: u32 = 4;
+/// Path slots per sample if some surfaces are there in part: three with a coat leave two for what is
+/// behind them.
+const VEILED_BRANCHES: u32 = 8;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
@@ -106,7 +109,11 @@ impl CameraTracer {
         picture: &PictureSettings,
         shares: bool,
     ) -> Result<Self> {
-        let branches = if scene.splits { BRANCHES } else { 1 };
+        let branches = match (scene.has_veils(), scene.splits) {
+            (true, _) => VEILED_BRANCHES,
+            (false, true) => BRANCHES,
+            (false, false) => 1,
+        };
         let offsets = picture.pixel_filter_offsets();
         let view = CameraTile {
             branches,
@@ -270,7 +277,8 @@ impl CameraTracer {
         let light = lobes.map(|kernel| Step { kernel, buffers: &followed });
         let steps: Vec<Step> = light.into_iter().chain([trace]).collect();
         // Without mirrors and glass, the first surface that the camera sees ends every path.
-        let surfaces = if scene.has_lobes { layout::CHAIN_LIMIT } else { 1 };
+        let veils = if scene.has_veils() { layout::MOST_VEILS } else { 0 };
+        let surfaces = if scene.has_lobes { layout::CHAIN_LIMIT } else { 1 + veils };
         let most_surfaces = surfaces + if self.view.near_depth == UNCLIPPED { 0 } else { MAX_UNSEEN };
         let counters = self.wavefront.run(
             gpu,
