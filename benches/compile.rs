@@ -29,7 +29,7 @@ fn main() {
         let buffers: Vec<(&str, Buffer)> = shader
             .bindings
             .iter()
-            .filter(|b| b.kind != BindingKind::Table)
+            .filter(|b| !matches!(b.kind, BindingKind::Table | BindingKind::LayeredTable))
             .map(|b| match b.kind {
                 BindingKind::Uniform => (b.name, gpu.uniform("zeros", &[0_u32; 256])),
                 _ => (b.name, gpu.storage::<u8>("zeros", BYTES).expect("a small buffer fits")),
@@ -37,7 +37,9 @@ fn main() {
             .collect();
         let named: Vec<_> = buffers.iter().map(|(name, buffer)| (*name, buffer)).collect();
         let zeros = Table::new(&gpu, "zeros", &[[0_u32; 4]; 64]).expect("a small table fits");
-        let tables: Vec<_> = shader.bindings.iter().map(|b| (b.name, &zeros)).collect();
+        let layered = Table::layered(&gpu, "zeros", &[[0_u32; 4]; 64]).expect("a small table fits");
+        let table = |kind| if kind == BindingKind::LayeredTable { &layered } else { &zeros };
+        let tables: Vec<_> = shader.bindings.iter().map(|b| (b.name, table(b.kind))).collect();
         gpu.wait().expect("the device works");
         let start = Instant::now();
         let kernel = Kernel::new(&gpu, shader.stem, &[]).with_tables(&tables);
