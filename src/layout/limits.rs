@@ -42,4 +42,4 @@ pub const LATE_SLICE: u32 = 1024;
 pub const LATE_RAY: u32 = 80;
 /// Words that are kept of an entry: whether it is done, and two rays.
 pub const LATE_WORDS: u32 = 1 + 2 * LATE_RAY;
-const _: () = assert!(INSTANCED_STACK + 16 <= LATE_RAY as usize);
+const _: () = assert!(INSTANCED_STACK + 17 <= LATE_RAY as usize);
