@@ -146,9 +146,9 @@ pub const MOST_VEILS: u32 = 64;
 /// [`FirstHit::material`] where nothing is seen.
 pub const NO_MATERIAL: u32 = u32::MAX;
 
-/// First hit of a camera sample. Behind veils there are several: numbers are their means, weighted by
-/// what each covers of those behind it, the primitive and its material those of one that is drawn by
-/// these weights.
+/// First hit of a camera sample. Behind veils there are several: numbers are their means, weighted
+/// by what each covers of those behind it, the primitive and its material those of one that is
+/// drawn by these weights.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct FirstHit {

@@ -23,12 +23,9 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Path slots per sample if the scene has dielectrics: reflection and refraction are both followed
-/// at the first two interfaces.
+/// Path slots per sample if the scene has dielectrics, of which reflection and refraction are both
+/// followed, or veils, which are followed both ways.
 const BRANCHES: u32 = 4;
-/// Path slots per sample if some surfaces are there in part: three with a coat leave two for what is
-/// behind them.
-const VEILED_BRANCHES: u32 = 8;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
@@ -109,11 +106,7 @@ impl CameraTracer {
         picture: &PictureSettings,
         shares: bool,
     ) -> Result<Self> {
-        let branches = match (scene.has_veils(), scene.splits) {
-            (true, _) => VEILED_BRANCHES,
-            (false, true) => BRANCHES,
-            (false, false) => 1,
-        };
+        let branches = if scene.splits || scene.has_veils() { BRANCHES } else { 1 };
         let offsets = picture.pixel_filter_offsets();
         let view = CameraTile {
             branches,
