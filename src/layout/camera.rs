@@ -141,7 +141,7 @@ pub struct CameraTile {
 
 /// Veils, surfaces of an opacity between 0 and 1, that a camera path passes at most before it draws
 /// which of the others it meets.
-pub const MOST_VEILS: u32 = 64;
+pub const MOST_VEILS: u32 = 16;
 
 /// [`FirstHit::material`] where nothing is seen.
 pub const NO_MATERIAL: u32 = u32::MAX;

@@ -82,8 +82,9 @@ fn no_ray_is_given_up_in_a_crowd() {
     let scene = sheets(9000);
     let crowd = render_scene(&scene, &settings);
     assert_eq!(crowd.stats.unfinished_rays, 0);
+    // All sheets together take a thousandth of the light.
     let right = mean(&render_scene(&sheets(0), &settings));
-    assert!(within(mean(&crowd), right, 1e-3), "{} behind the sheets, {right} without", mean(&crowd));
+    assert!(within(mean(&crowd), right, 2e-3), "{} behind the sheets, {right} without", mean(&crowd));
     let through = [(Vec3::Z - scene.center.as_vec3(), Vec3::NEG_Z)];
     let once = rays::trace(&scene, &[("TRACE_BUDGET", 8000.0)], &through).0.unfinished;
     assert_eq!(once, 1, "control: one dispatch is not enough");
