@@ -23,9 +23,11 @@ use crate::{
     upload::{SceneBuffers, sampler_constant},
 };
 
-/// Path slots per sample if the scene has dielectrics, of which reflection and refraction are both
-/// followed, or veils, which are followed both ways.
+/// Path slots per sample if the scene has dielectrics: reflection and refraction are both followed
+/// at the first two interfaces.
 const BRANCHES: u32 = 4;
+/// Path slots per sample if the scene has veils: enough for the four walls of a hollow vessel.
+const VEILED_BRANCHES: u32 = 8;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
@@ -106,7 +108,11 @@ impl CameraTracer {
         picture: &PictureSettings,
         shares: bool,
     ) -> Result<Self> {
-        let branches = if scene.splits || scene.has_veils() { BRANCHES } else { 1 };
+        let branches = match (scene.has_veils(), scene.splits) {
+            (true, _) => VEILED_BRANCHES,
+            (false, true) => BRANCHES,
+            (false, false) => 1,
+        };
         let offsets = picture.pixel_filter_offsets();
         let view = CameraTile {
             branches,
