@@ -56,6 +56,8 @@ pub struct SceneBuffers {
     /// Some surface sends light on in two ways: it reflects and transmits, or has a coat above its
     /// diffuse base.
     pub splits: bool,
+    /// The environment is a picture.
+    pub has_environment_map: bool,
     pub lights: LightBuffers,
     /// Solids and the surfaces that bound them.
     pub solids: Solids,
@@ -135,6 +137,7 @@ impl SceneBuffers {
                 .materials
                 .iter()
                 .any(|m| m.surface.ior().is_some() || m.surface.is_coated() || m.is_finished()),
+            has_environment_map: scene.environment.as_ref().is_some_and(|sky| sky.pixels.len() > 1),
             has_spheres: !scene.spheres.is_empty(),
             // Rounded up to multiples of 16, so that few variants of a kernel are compiled.
             stack: bvh.max_stack_depth().max(1).next_multiple_of(16).min(INSTANCED_STACK),

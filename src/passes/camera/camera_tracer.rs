@@ -26,8 +26,10 @@ use crate::{
 /// Path slots per sample if the scene has dielectrics: reflection and refraction are both followed
 /// at the first two interfaces.
 const BRANCHES: u32 = 4;
-/// Path slots per sample if the scene has veils: enough for the four walls of a hollow vessel.
-const VEILED_BRANCHES: u32 = 8;
+/// Path slots per sample if the scene has veils, or glass in a picture of an environment, small bright
+/// parts of which a faint reflection would find by chance: enough for the four walls of a hollow
+/// vessel.
+const MANY_BRANCHES: u32 = 8;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
 const DIRECT_STEPS_PER_READ: u32 = 1024;
@@ -108,10 +110,11 @@ impl CameraTracer {
         picture: &PictureSettings,
         shares: bool,
     ) -> Result<Self> {
-        let branches = match (scene.has_veils(), scene.splits) {
-            (true, _) => VEILED_BRANCHES,
-            (false, true) => BRANCHES,
-            (false, false) => 1,
+        let branches = match scene.splits {
+            true if scene.has_environment_map => MANY_BRANCHES,
+            _ if scene.has_veils() => MANY_BRANCHES,
+            true => BRANCHES,
+            false => 1,
         };
         let offsets = picture.pixel_filter_offsets();
         let view = CameraTile {
