@@ -26,9 +26,9 @@ use crate::{
 /// Path slots per sample if the scene has dielectrics: reflection and refraction are both followed
 /// at the first two interfaces.
 const BRANCHES: u32 = 4;
-/// Path slots per sample if the scene has veils, or glass in a picture of an environment, small bright
-/// parts of which a faint reflection would find by chance: enough for the four walls of a hollow
-/// vessel.
+/// Path slots per sample if the scene has veils, or glass in a picture of an environment, small
+/// bright parts of which a faint reflection would find by chance: enough for the four walls of a
+/// hollow vessel.
 const MANY_BRANCHES: u32 = 8;
 /// Dispatches of direct light per readback of the counter of shadow rays. With one ray per point
 /// and dispatch, it stays far below 2^32.
