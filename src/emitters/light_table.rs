@@ -163,6 +163,16 @@ impl LightTable {
         self.trees.nodes.iter().take(self.sampled_roots as usize).any(|root| root.intensity() > 0.0)
     }
 
+    /// Number of lights, from the first, among which are all that visible points sum; 0 if these
+    /// are fewer than two, or do not lie together.
+    #[must_use]
+    pub fn weighed(&self) -> u32 {
+        let trees = self.trees.roots.iter().filter(|root| **root >= layout::SUMMED_ROOT).count();
+        let end = self.summed.last().map_or(0, |last| last + 1);
+        let is_small = trees == self.summed.len() && end as usize <= 2 * MAX_SUMMED;
+        if self.summed.len() > 1 && is_small { end } else { 0 }
+    }
+
     /// Power of all lights that may reach what is seen, W, mean of the channels.
     #[must_use]
     pub fn power(&self) -> f64 {

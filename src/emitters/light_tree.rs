@@ -7,17 +7,17 @@ use glam::Vec3;
 
 use super::light_bounds::LightBounds;
 use crate::{
-    layout::{LEAF_BIT, LIGHT_ROOTS, LightNode, NEXT_MASK, NO_LEAF},
+    layout::{LEAF_BIT, LIGHT_ROOTS, LightNode, NEXT_MASK, NO_LEAF, SUMMED_ROOT},
     scene::Bounds,
 };
 
 /// Roots besides that of the environment: of surfaces, with points and spots where these are many;
 /// of directional lights; of few points and spots.
 pub const EMITTER_ROOT: u32 = 1;
-pub const DIRECTIONAL_ROOT: u32 = 2;
-pub const PUNCTUAL_ROOT: u32 = 3;
+pub const DIRECTIONAL_ROOT: u32 = SUMMED_ROOT;
+pub const PUNCTUAL_ROOT: u32 = SUMMED_ROOT + 1;
 /// Number of trees from which visible points always choose, the first ones.
-pub const EMITTER_ROOTS: u32 = 2;
+pub const EMITTER_ROOTS: u32 = SUMMED_ROOT;
 /// Intervals along an axis between which lights are divided.
 const BUCKETS: usize = 12;
 /// Depth from which on lights are divided in halves, so that no descent is longer than this and the

@@ -89,6 +89,9 @@ pub struct LightChoice {
 /// among them; see `src/emitters/light_tree.rs`.
 pub const LIGHT_ROOTS: u32 = 4;
 pub const ENVIRONMENT_ROOT: u32 = 0;
+/// First root of the trees of lights that visible points sum where they are few: directional ones,
+/// then points and spots.
+pub const SUMMED_ROOT: u32 = 2;
 /// In place of the leaf of a light that is never chosen: none.
 pub const NO_LEAF: u32 = u32::MAX;
 /// Bits of [`LightNode::next`]: the node is a leaf; its surfaces may shine along the opposite cone

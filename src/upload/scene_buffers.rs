@@ -212,6 +212,7 @@ impl SceneBuffers {
             ("WEIGHS_VEILS", f64::from(u8::from(self.is_listed_once))),
             ("HAS_ABSORPTION", f64::from(u8::from(self.has_absorption))),
             ("HAS_VARIED_LIGHTS", f64::from(u8::from(self.lights.table.is_varied))),
+            ("WEIGHED_LIGHTS", f64::from(self.lights.table.weighed())),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
             ("SPLIT", f64::from(u8::from(self.primitives.at + self.nodes.at > 0))),
             ("NODE_SPLIT", self.nodes.constant()),

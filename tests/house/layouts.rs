@@ -151,6 +151,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         ENVIRONMENT_LIGHT,
         TURNED_BIT,
         LIGHT_ROOTS,
+        SUMMED_ROOT,
         ENVIRONMENT_ROOT,
         NO_LEAF,
         LEAF_BIT,

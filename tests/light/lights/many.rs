@@ -5,6 +5,7 @@
 //! | points, spots | 2,000 of them give the sum of I a(θ)² cos θ/d² | every third one left out |
 //! | suns | 40 of them give the sum of E cos θ | every third one left out |
 //! | few | 16 have no noise | 17 have |
+//! | metal | 16 light rough metal as their sum, without noise | 17 do with noise; one left out |
 //! | parts | a lamp in 800 pieces lights diffuse and rough surfaces like one | some pieces left out |
 //! | agreement | photons and rays have the same mean under many lights of all kinds | without the second bounce |
 //! | dark | a million lights of no power, and one of infinite or undefined position, change nothing | the position in order |
@@ -98,6 +99,29 @@ fn sixteen_lights_have_no_noise() {
     };
     assert!(spread(16) < 1e-3, "{}", spread(16));
     assert!(spread(17) > 1e-3, "control: {}", spread(17));
+}
+
+#[test]
+fn sixteen_lights_on_rough_metal_have_no_noise() {
+    let metal = Surface::Layered { base: Vec3::splat(0.8), metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    let seen = |lights: &[Light]| {
+        let mut scene = floor(2.0);
+        scene.materials[0] = Material { surface: metal, roughness: 0.2, ..scene.materials[0].clone() };
+        scene.lights = lights.to_vec();
+        scene.cameras = vec![camera(vec3(0.0, 0.9, 1.9), vec3(0.0, 0.0, 0.3), 30.0)];
+        let render = render_scene(&scene, &settings(Mode::DirectRays, 1, 16));
+        render.frame.radiance().iter().map(|pixel| f64::from(pixel[0])).collect::<Vec<_>>()
+    };
+    let lights = hall(17, |random, position, _| point_light(position, 0.1 + 5.0 * random.unit().powi(4))).lights;
+    // One light needs no choice.
+    let alone: Vec<_> = lights.iter().map(|light| seen(std::slice::from_ref(light))).collect();
+    let furthest = |picture: &[f64], count: usize| {
+        let right = |i: usize| alone[..count].iter().map(|one| one[i]).sum::<f64>();
+        (0..picture.len()).map(|i| (picture[i] / right(i) - 1.0).abs()).fold(0.0, f64::max)
+    };
+    assert!(furthest(&seen(&lights[..16]), 16) < 1e-3, "{}", furthest(&seen(&lights[..16]), 16));
+    assert!(furthest(&seen(&lights), 17) > 0.1, "control: {}", furthest(&seen(&lights), 17));
+    assert!(furthest(&seen(&lights[1..16]), 16) > 1e-3, "control: one left out");
 }
 
 /// A surface under a lamp of `side` x `side` squares, all but each `gap`-th of them.
