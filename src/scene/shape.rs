@@ -37,6 +37,14 @@ impl Triangle {
         (b - a).cross(c - a).normalize_or_zero().as_vec3()
     }
 
+    /// Whether the normals of all corners point to the back, as in a mesh that is wound the wrong
+    /// way round, or has its normals inside out.
+    #[must_use]
+    pub fn has_normals_behind(&self) -> bool {
+        let flat = self.geometric_normal();
+        self.normals.iter().all(|normal| normal.dot(flat) < 0.0)
+    }
+
     /// Square metres.
     #[must_use]
     pub fn area(&self) -> f64 {

@@ -1,7 +1,7 @@
 //! Attributes of corners of triangles for textures: coordinates, colours, tangents.
 
 use caustica::scene::{Attributes, Scene};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4, vec3};
 use serde_json::{Value, json};
 use support::gltf::{add_accessor, floats, lambert, load, loaded, message, push, triangle};
 
@@ -265,6 +265,31 @@ fn attributes_stay_with_their_triangles_when_others_are_left_out() {
     // But a lamp in a lamp is one lamp.
     gltf["materials"][0]["emissiveFactor"] = json!([1, 1, 1]);
     assert_eq!(uvs(&gltf), [Vec2::ZERO]);
+}
+
+#[test]
+fn normals_behind_their_triangles_are_turned_with_their_maps() {
+    // Corner normals and what a texel of (0.6, 0, 0.8) gives there, and whether a note tells.
+    let read = |normals: [[f32; 3]; 3]| {
+        let mut gltf = with_normal_map();
+        let normals = add_accessor(&mut gltf, &floats(normals.as_flattened()), 5126, 3, "VEC3");
+        gltf["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = normals.into();
+        let scene = loaded(&gltf);
+        let (tangents, normals) = (only(&scene).tangents, scene.triangles[0].normals);
+        let mapped = [0, 1, 2].map(|i| 0.6 * tangents[i].truncate() + 0.8 * normals[i]);
+        (normals, mapped, scene.warnings.iter().any(|note| note.contains("point behind them and are turned")))
+    };
+    let front = loaded(&with_normal_map()).triangles[0].geometric_normal();
+    let leaning = [0.3, 0.0, -0.3].map(|x| (front + vec3(x, 0.0, 0.0)).normalize().to_array());
+    let (right, right_mapped, told) = read(leaning);
+    assert!(!told && right.iter().all(|normal| normal.dot(front) > 0.9));
+    let behind = leaning.map(|normal| normal.map(|x| -x));
+    let (turned, mapped, told) = read(behind);
+    assert!(told && turned == right, "{turned:?} {right:?}");
+    assert!(mapped.iter().zip(right_mapped).all(|(a, b)| a.dot(front) > 0.0 && b.dot(front) > 0.0), "{mapped:?}");
+    // Control: of a triangle at an edge, where one normal points to the front, none is turned.
+    let (mixed, _, told) = read([behind[0], behind[1], leaning[2]]);
+    assert!(!told && mixed[0].dot(front) < 0.0 && mixed[2].dot(front) > 0.0, "{mixed:?}");
 }
 
 #[test]

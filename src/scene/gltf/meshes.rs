@@ -10,6 +10,7 @@ use super::fault::{Notes, Read, fault};
 use super::material_table::MaterialTable;
 use super::primitives::{Checker, Shape, attribute, joint_sets};
 use super::topology::corners;
+use crate::scene::Triangle;
 
 /// Triangles that share vertices and a material.
 #[derive(Debug, Default)]
@@ -27,6 +28,8 @@ pub(super) struct MeshPrimitive {
     pub(super) material: u32,
     /// Attributes of each position that textures and colours need.
     pub(super) attributes: Option<VertexAttributes>,
+    /// Number of triangles whose normals point behind them.
+    pub(super) behind: usize,
     /// Joint influences per position; empty without a skin.
     pub(super) influences: Vec<Vec<Influence>>,
 }
@@ -139,6 +142,7 @@ fn read_part(
         let normal = |vertex: &u32| morphed(&normals, &morphs, *vertex, |morph| morph.normals.as_ref());
         vertices.used.iter().map(normal).collect()
     });
+    part.behind = part.count_behind();
     let triangles = Triangles {
         vertices: &vertices.used,
         positions: &part.positions,
@@ -151,6 +155,17 @@ fn read_part(
         part.influences = influences(document, primitive, &vertices.used, joints, place)?;
     }
     Ok(part)
+}
+
+impl MeshPrimitive {
+    fn count_behind(&self) -> usize {
+        let Some(normals) = &self.normals else { return 0 };
+        let is_behind = |corners: &&[u32; 3]| {
+            let [positions, normals] = [&self.positions, normals].map(|of| corners.map(|i| of[i as usize]));
+            Triangle::new(positions, normals, 0).has_normals_behind()
+        };
+        self.corners.iter().filter(is_behind).count()
+    }
 }
 
 /// Vertices in use, in the order of their first appearance.

@@ -112,10 +112,11 @@ pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut N
     placed
         .attributes
         .reserve_exact(sum(|p, shared| if p.attributes.is_some() && !shared { p.corners.len() } else { 0 }));
-    let mut of_instances = 0;
+    let (mut of_instances, mut behind) = (0, 0);
     for instance in instances {
         for i in 0..instance.copies() {
             let to_scene = DMat4::from_translation(-center) * instance.world(i)?;
+            behind += instance.primitives.iter().map(|primitive| primitive.behind).sum::<usize>();
             let first = placed.triangles.len();
             let is_shared = instance.shared.contains(&true);
             let added = if is_shared { placed.shared.add(instance, to_scene, &place_rigid) } else { None };
@@ -142,6 +143,10 @@ pub(super) fn place(instances: &[MeshInstance<'_>], center: DVec3, notes: &mut N
     let dropped = claimed - placed.triangles.len() - of_instances;
     if dropped > 0 {
         notes.add(format!("{dropped} of {claimed} triangles have no area and are not drawn"));
+    }
+    // A few are slivers at sharp edges.
+    if 100 * behind > claimed {
+        notes.add(format!("the normals of {behind} of {claimed} triangles point behind them and are turned"));
     }
     Ok(placed.without_copies(notes))
 }
@@ -302,10 +307,14 @@ fn add_triangles<'m>(
         }
         let normals = normals.unwrap_or([Vec3::ZERO; 3]);
         triangle.normals = normals.map(|normal| if normal == Vec3::ZERO { flat } else { normal });
+        // With the opposite normal, tangent and sign, a normal map gives the opposite normal.
+        let sign = if triangle.has_normals_behind() { -1.0 } else { 1.0 };
+        triangle.normals = triangle.normals.map(|normal| sign * normal);
         if let Some(own) = &primitive.attributes {
             let mut attributes = own.of(corners);
             if let Some(tangents) = own.tangents(i, corners, order) {
-                attributes.tangents = [0, 1, 2].map(|k| moved(corners[k]).tangent(tangents[k], triangle.normals[k]));
+                attributes.tangents =
+                    [0, 1, 2].map(|k| sign * moved(corners[k]).tangent(tangents[k], triangle.normals[k]));
             }
             attributes_of_corners.push(attributes);
             triangle.attributes = attributes_of_corners.len() as u32;
