@@ -6,6 +6,7 @@
 //! | rough glass | a floor has the same light by photons and by rays through a slab of leaning normals | upright normals |
 //! | sharp glass | its photons are those of glass that is hardly rough | upright normals |
 //! | metal | a floor has the same light by photons and by rays off metal of strongly leaning normals, rough or not | upright normals |
+//! | cloth | sheen shows the light above the surface and its normal, none from below | half of the sheen |
 //! | furnace | white metal shows all light above it, and none from below, however its normals lean | grey metal; light from below alone |
 
 use caustica::{
@@ -142,5 +143,20 @@ fn leaning_normals_show_all_light_above_the_surface_and_none_below() {
         assert!(grey < 0.99, "control: grey metal, slope {slope}, roughness {roughness}: {grey}");
         let below = of(1.0, 0.0, 1.0);
         assert!(below < 0.02, "slope {slope}, roughness {roughness}: {below} from below");
+    }
+}
+
+#[test]
+fn sheen_of_leaning_normals_has_the_light_above_the_surface_alone() {
+    let cloth = |color: f32| {
+        let surface = Surface::Layered { base: Vec3::ZERO, metallic: 0.0, f0: Vec3::ZERO, specular: 0.0 };
+        Material { sheen_color: Vec3::splat(color), sheen_roughness: 0.5, ..Material::new("cloth", surface) }
+    };
+    // Integrals of the lobe over the directions above both, by 720,000 of them.
+    for (slope, right) in [(0.0, 0.2880), (0.2, 0.4701), (2.0, 0.0710)] {
+        let found = plane(cloth(1.0), slope, 1.0, 0.0);
+        assert!(within(found, right, 0.03), "slope {slope}: {found} instead of {right}");
+        let half = plane(cloth(0.5), slope, 1.0, 0.0);
+        assert!(!within(half, right, 0.03), "control, slope {slope}: {half}");
     }
 }
