@@ -13,8 +13,8 @@ use crate::{
     upload::SceneBuffers,
 };
 
-/// Photon maps of a first pass, on the device: one of each kind that holds a photon, or several,
-/// see [`super::power_classes`].
+/// Photon maps of a first pass, on the device: one of each kind that holds a photon, or several by
+/// the powers of their photons.
 #[derive(Debug)]
 pub struct PhotonMaps {
     maps: Vec<PhotonMap>,
