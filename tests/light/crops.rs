@@ -74,6 +74,7 @@ fn parts_side_by_side_are_the_whole() {
     let settings = Quality::Normal.settings_for(SIZE).with(|s| {
         s.picture.size = Some(SIZE);
         (s.photons.global, s.photons.caustic, s.photons.final_gather) = (20_000, 20_000, 16);
+        s.picture.max_spp = Some(16);
     });
     assert!(settings.photons.final_gather > 0 && settings.picture.max_spp.is_some(), "defaults");
     // Odd borders, that cut balls and tiles.
