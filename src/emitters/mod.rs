@@ -11,6 +11,7 @@ pub mod light_table;
 pub mod light_tree;
 pub mod sight;
 mod surface_lights;
+mod target_shares;
 pub mod targets;
 
 pub(crate) use light_media::set_media;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     importance::Importance,
+    target_shares::shares_whatever_size,
     targets::{Target, scene_target},
 };
 use crate::{
@@ -40,10 +41,6 @@ const MARGIN: f32 = 1.2;
 const RATIO: f32 = 3.0;
 /// Maximum number of spheres: the last is then smaller than the scene by more than the ratio.
 const MAX_SPHERES: usize = 12;
-/// Radius about mirrors and glass in which points count for their share, in that of their sphere;
-/// and the least share, in the greatest.
-const AROUND: f32 = 3.0;
-const LEAST_SHARE: f32 = 1.0 / 64.0;
 /// Steps of a low-discrepancy sequence in two dimensions (Roberts 2018, "The Unreasonable
 /// Effectiveness of Quasirandom Sequences").
 const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
@@ -59,8 +56,8 @@ pub struct Sight {
     pub enclosure: f64,
     /// Density of that and of what lies around it; none without spheres.
     pub importance: Option<Importance>,
-    /// Shares of mirrors and glass in the paths that are aimed at them, whatever their size; 1 in
-    /// all.
+    /// Fraction of the paths to mirrors and glass that is aimed at each of their spheres whatever its
+    /// size.
     pub shares: Vec<f32>,
 }
 
@@ -77,7 +74,7 @@ impl Sight {
         let targets = spheres_around(&points, &scene_target(scene));
         let fewer = || points.iter().step_by(points.len().div_ceil(MAX_POINTS)).copied().collect::<Vec<_>>();
         let importance = (!targets.is_empty()).then(|| Importance::new(&fewer(), scene.bounds()));
-        Self { targets, enclosure, importance, shares: shares(&points, specular) }
+        Self { targets, enclosure, importance, shares: shares_whatever_size(&points, specular) }
     }
 }
 
@@ -168,21 +165,6 @@ fn cosine_direction(normal: Vec3, i: u32) -> Vec3 {
     (local.x * right + local.y * up + local.z * normal).normalize()
 }
 
-/// Shares of spheres: as the roots of the density of the points about them, where what they throw
-/// is seen.
-fn shares(points: &[Vec3], spheres: &[Target]) -> Vec<f32> {
-    let density = |sphere: &Target| {
-        let reach = AROUND * sphere.radius;
-        let near = points.iter().filter(|point| point.distance_squared(sphere.center) <= reach * reach).count();
-        (near as f32).sqrt() / reach.max(f32::MIN_POSITIVE)
-    };
-    let roots: Vec<f32> = spheres.par_iter().map(density).collect();
-    let least = roots.iter().copied().fold(0.0, f32::max) * LEAST_SHARE;
-    let roots: Vec<f32> = roots.into_iter().map(|root| if least > 0.0 { root.max(least) } else { 1.0 }).collect();
-    let sum: f32 = roots.iter().sum();
-    roots.into_iter().map(|root| root / sum).collect()
-}
-
 /// Spheres about the middle of the points, up to one that is not much smaller than the scene.
 fn spheres_around(points: &[Vec3], whole: &Target) -> Vec<Target> {
     if points.len() < MIN_POINTS {
@@ -246,18 +228,6 @@ mod tests {
     #[test]
     fn a_scene_that_is_seen_whole_has_none() {
         assert_eq!(seen(3.0).targets, Vec::new());
-    }
-
-    #[test]
-    fn what_is_seen_close_by_has_the_larger_share() {
-        let points: Vec<Vec3> = (0..900).map(|i| vec3(0.01 * (i % 30) as f32, 0.0, 0.01 * (i / 30) as f32)).collect();
-        let at = |center: Vec3, radius: f32| Target { center, radius };
-        let found =
-            shares(&points, &[at(vec3(0.1, 0.05, 0.1), 0.03), at(Vec3::ZERO, 2.0), at(vec3(50.0, 0.0, 0.0), 0.1)]);
-        assert!((found.iter().sum::<f32>() - 1.0).abs() < 1e-5);
-        assert!(found[0] > 5.0 * found[1] && found[1] > found[2] && found[2] > 0.0, "{found:?}");
-        assert_eq!(shares(&[], &[at(Vec3::ZERO, 1.0), at(Vec3::X, 0.1)]), [0.5, 0.5], "nothing is seen");
-        assert!(shares(&points, &[]).is_empty());
     }
 
     #[test]

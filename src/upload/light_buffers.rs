@@ -20,13 +20,6 @@ use crate::{
     settings::LightSettings,
 };
 
-/// Fraction of the paths to mirrors and glass that are aimed at those that matter to the picture,
-/// whatever their size: what a glass throws has as many photons as it needs beside a mirror that
-/// fills a wall.
-const WHATEVER_SIZE: f32 = 0.5;
-/// Ratio of the powers that photons of different targets then have, up to which size alone decides.
-const LEVEL: f32 = 4.0;
-
 /// A table of [`Choices`] on the device, `array<LightChoice>`.
 #[derive(Debug)]
 pub struct ChoiceBuffer {
@@ -57,7 +50,7 @@ pub struct LightBuffers {
     /// The smallest sphere around what the cameras see, centre and radius, metres; radius 0: none.
     pub seen: [f32; 4],
     pub specular_targets: u32,
-    /// Whether photons from there have quite different powers.
+    /// Whether photons of mirrors and glass have quite different powers.
     pub mixes_powers: bool,
     /// See [`Sight::enclosure`].
     pub enclosure: f64,
@@ -94,9 +87,8 @@ impl LightBuffers {
         // Paths are aimed at what is seen, and at all, as often, whatever the size.
         let even = 1.0 / (seen.len() + 1) as f32;
         let general = seen.iter().chain([&around]).map(|sphere| (sphere, even));
-        let mixes_powers = powers_ratio(&targets, &shares) > LEVEL;
-        let aside = if mixes_powers { WHATEVER_SIZE } else { 0.0 };
-        let specular = targets.iter().zip(shares).map(|(sphere, share)| (sphere, aside * share));
+        let mixes_powers = shares.iter().any(|share| *share > 0.0);
+        let specular = targets.iter().zip(shares);
         let spheres: Vec<layout::Target> = general
             .chain(specular)
             .map(|(Target { center, radius }, share)| layout::Target {
@@ -172,16 +164,6 @@ impl LightBuffers {
             ("importance_table", &self.importance_words),
         ]
     }
-}
-
-/// Greatest power of photons of parallel light from one of the targets over the least, if they have
-/// these shares.
-fn powers_ratio(targets: &[Target], shares: &[f32]) -> f32 {
-    let size = |target: &Target| target.radius * target.radius;
-    let sum: f32 = targets.iter().map(size).sum();
-    let densities = targets.iter().zip(shares).map(|(t, share)| 1.0 / sum + share / size(t).max(f32::MIN_POSITIVE));
-    let (least, most) = densities.fold((f32::INFINITY, 0.0_f32), |(least, most), d| (least.min(d), most.max(d)));
-    if least > 0.0 && least.is_finite() { most / least } else { 1.0 }
 }
 
 /// Warning that the environment map was reduced, if it was.
