@@ -56,8 +56,8 @@ pub struct Sight {
     pub enclosure: f64,
     /// Density of that and of what lies around it; none without spheres.
     pub importance: Option<Importance>,
-    /// Fraction of the paths to mirrors and glass that is aimed at each of their spheres whatever its
-    /// size.
+    /// Fraction of the paths to mirrors and glass that is aimed at each of their spheres whatever
+    /// its size.
     pub shares: Vec<f32>,
 }
 
