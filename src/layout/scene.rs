@@ -132,7 +132,7 @@ pub const PANE: u32 = 3;
 pub const LAYERED: u32 = 4;
 
 /// Texels of a [`MaterialRecord`].
-pub const MATERIAL_TEXELS: u32 = 14;
+pub const MATERIAL_TEXELS: u32 = 10;
 
 /// Bits of [`MaterialRecord::flags`]: the back emits as much as the front; the surface is there
 /// where its opacity reaches the cutoff; its opacity is its coverage.
@@ -184,11 +184,12 @@ pub struct MaterialRecord {
     pub iridescence_ior: f32,
     /// Thickness of the film where its texture is 0 and where it is 1, nanometres.
     pub iridescence_thickness: [f32; 2],
-    /// Texels of the table of materials where the [`TextureRecord`]s begin, 0 for none: base
-    /// colour, metallic and roughness, normal, emission; specular, specular colour, transmission,
-    /// diffuse transmission; its colour, clear coat, its roughness, its normal; sheen, its
-    /// roughness, anisotropy, iridescence; thickness of the film.
-    pub textures: [[u32; 4]; 5],
+    /// Texel of the table of materials where its [`TextureRecord`]s begin, in the order of their
+    /// slots.
+    pub first_texture: u32,
+    /// Bit 1 << slot for each texture that it has.
+    pub textures: u32,
+    pub pad: [u32; 2],
 }
 
 /// A texture of a material.
@@ -200,7 +201,8 @@ pub struct TextureRecord {
     /// Width, and height shifted by 16 bits.
     pub size: u32,
     /// Two bits each for what lies beyond the borders of u and v ([`WRAP_REPEAT`] …), then
-    /// [`LINEAR_BIT`], [`SRGB_BIT`], [`SECOND_UV_BIT`].
+    /// [`LINEAR_BIT`], [`SRGB_BIT`], [`SECOND_UV_BIT`]; the texture's slot from [`TEXTURE_SLOT_SHIFT`]
+    /// on.
     pub flags: u32,
     /// The image, and smaller versions of it that follow.
     pub levels: u32,
@@ -218,6 +220,29 @@ pub const LINEAR_BIT: u32 = 16;
 pub const SRGB_BIT: u32 = 32;
 /// The second set of texture coordinates is read.
 pub const SECOND_UV_BIT: u32 = 64;
+pub const TEXTURE_SLOT_SHIFT: u32 = 8;
+
+/// Texels of a [`TextureRecord`].
+pub const TEXTURE_TEXELS: u32 = 3;
+
+/// Slots: what a texture is a factor of.
+pub const BASE_COLOR_TEXTURE: u32 = 0;
+pub const METALLIC_ROUGHNESS_TEXTURE: u32 = 1;
+pub const NORMAL_TEXTURE: u32 = 2;
+pub const EMISSION_TEXTURE: u32 = 3;
+pub const SPECULAR_TEXTURE: u32 = 4;
+pub const SPECULAR_COLOR_TEXTURE: u32 = 5;
+pub const TRANSMISSION_TEXTURE: u32 = 6;
+pub const DIFFUSE_TRANSMISSION_TEXTURE: u32 = 7;
+pub const DIFFUSE_TRANSMISSION_COLOR_TEXTURE: u32 = 8;
+pub const CLEARCOAT_TEXTURE: u32 = 9;
+pub const CLEARCOAT_ROUGHNESS_TEXTURE: u32 = 10;
+pub const CLEARCOAT_NORMAL_TEXTURE: u32 = 11;
+pub const SHEEN_COLOR_TEXTURE: u32 = 12;
+pub const SHEEN_ROUGHNESS_TEXTURE: u32 = 13;
+pub const ANISOTROPY_TEXTURE: u32 = 14;
+pub const IRIDESCENCE_TEXTURE: u32 = 15;
+pub const IRIDESCENCE_THICKNESS_TEXTURE: u32 = 16;
 
 /// Values at the corners of a triangle.
 #[repr(C)]

@@ -9,9 +9,10 @@ use crate::{
     gpu::{Gpu, Table},
     layout::{
         self, BLEND_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS, MaterialRecord,
-        SECOND_UV_BIT, SRGB_BIT, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
+        SECOND_UV_BIT, SRGB_BIT, TEXTURE_SLOT_SHIFT, TEXTURE_TEXELS, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR,
+        WRAP_REPEAT, octahedral,
     },
-    scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
+    scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Textures, Wrap},
     settings::LightUnit,
 };
 
@@ -81,20 +82,11 @@ impl MaterialBuffers {
 
 /// Rows of the table of materials, followed by those of their textures.
 fn rows(scene: &Scene, unit: LightUnit, texels: &mut Texels<'_>) -> Vec<[u32; 4]> {
-    let first = scene.materials.len() as u32 * MATERIAL_TEXELS;
+    let first_row = scene.materials.len() as u32 * MATERIAL_TEXELS;
     let mut textures = Vec::new();
-    let mut rows: Vec<[u32; 4]> = Vec::with_capacity(first as usize);
-    for material in &scene.materials {
-        let record = record(material, unit, |texture, is_color| {
-            let at = first + textures.len() as u32;
-            let rows: [[u32; 4]; 3] = bytemuck::cast(texture_record(texture, is_color, texels));
-            textures.extend(rows);
-            at
-        });
-        rows.extend::<[[u32; 4]; MATERIAL_TEXELS as usize]>(bytemuck::cast(record));
-    }
-    rows.extend(textures);
-    rows
+    let record = |material| record(material, unit, first_row, &mut textures, texels);
+    let records: Vec<MaterialRecord> = scene.materials.iter().map(record).collect();
+    [bytemuck::cast_slice(&records), bytemuck::cast_slice(&textures)].concat()
 }
 
 /// Whether a material has more lobes than the kernels' shorter code follows.
@@ -146,9 +138,15 @@ fn attributes(own: &Attributes) -> layout::Attributes {
     }
 }
 
-/// Row of the table of materials. `add` adds a texture, of colours or not, and returns where it
-/// lies.
-fn record(material: &Material, unit: LightUnit, mut add: impl FnMut(&Texture, bool) -> u32) -> MaterialRecord {
+/// The record of a material. Those of its textures are added to `textures`, which begin at row
+/// `first_row` of the table, and their images to `texels`.
+fn record(
+    material: &Material,
+    unit: LightUnit,
+    first_row: u32,
+    textures: &mut Vec<TextureRecord>,
+    texels: &mut Texels<'_>,
+) -> MaterialRecord {
     let surface = &material.surface;
     let (metallic, f0, specular) = match *surface {
         Surface::Layered { metallic, f0, specular, .. } => (metallic, f0.to_array(), specular),
@@ -163,35 +161,12 @@ fn record(material: &Material, unit: LightUnit, mut add: impl FnMut(&Texture, bo
         Alpha::Mask { .. } => MASK_BIT,
         Alpha::Blend => BLEND_BIT,
     };
-    let all = &material.textures;
-    let mut row_of = |texture: &Option<Texture>, is_color| texture.as_ref().map_or(0, |t| add(t, is_color));
-    let textures = [
-        [
-            row_of(&all.base_color, true),
-            row_of(&all.metallic_roughness, false),
-            row_of(&all.normal, false),
-            row_of(&all.emission, true),
-        ],
-        [
-            row_of(&all.specular, false),
-            row_of(&all.specular_color, true),
-            row_of(&all.transmission, false),
-            row_of(&all.diffuse_transmission, false),
-        ],
-        [
-            row_of(&all.diffuse_transmission_color, true),
-            row_of(&all.clearcoat, false),
-            row_of(&all.clearcoat_roughness, false),
-            row_of(&all.clearcoat_normal, false),
-        ],
-        [
-            row_of(&all.sheen_color, true),
-            row_of(&all.sheen_roughness, false),
-            row_of(&all.anisotropy, false),
-            row_of(&all.iridescence, false),
-        ],
-        [row_of(&all.iridescence_thickness, false), 0, 0, 0],
-    ];
+    let first_texture = textures.len() as u32;
+    let mut slots = 0;
+    for (slot, texture, is_color) in in_slots(&material.textures) {
+        slots |= 1 << slot;
+        textures.push(texture_record(&texture, slot, is_color, texels));
+    }
     // Finishes are those of layers.
     let is_finished = material.is_finished() && !surface.transmits();
     MaterialRecord {
@@ -229,11 +204,40 @@ fn record(material: &Material, unit: LightUnit, mut add: impl FnMut(&Texture, bo
         iridescence: material.iridescence,
         iridescence_ior: material.iridescence_ior,
         iridescence_thickness: material.iridescence_thickness,
-        textures,
+        first_texture: first_row + first_texture * TEXTURE_TEXELS,
+        textures: slots,
+        pad: [0; 2],
     }
 }
 
-fn texture_record(texture: &Texture, is_color: bool, texels: &mut Texels<'_>) -> TextureRecord {
+/// The textures with their slots, in the order of these, and whether they are of colours.
+fn in_slots(all: &Textures) -> impl Iterator<Item = (u32, Texture, bool)> {
+    let of_colors = |slot, texture: Option<Texture>| texture.map(|texture| (slot, texture, true));
+    let of_data = |slot, texture: Option<Texture>| texture.map(|texture| (slot, texture, false));
+    [
+        of_colors(layout::BASE_COLOR_TEXTURE, all.base_color),
+        of_data(layout::METALLIC_ROUGHNESS_TEXTURE, all.metallic_roughness),
+        of_data(layout::NORMAL_TEXTURE, all.normal),
+        of_colors(layout::EMISSION_TEXTURE, all.emission),
+        of_data(layout::SPECULAR_TEXTURE, all.specular),
+        of_colors(layout::SPECULAR_COLOR_TEXTURE, all.specular_color),
+        of_data(layout::TRANSMISSION_TEXTURE, all.transmission),
+        of_data(layout::DIFFUSE_TRANSMISSION_TEXTURE, all.diffuse_transmission),
+        of_colors(layout::DIFFUSE_TRANSMISSION_COLOR_TEXTURE, all.diffuse_transmission_color),
+        of_data(layout::CLEARCOAT_TEXTURE, all.clearcoat),
+        of_data(layout::CLEARCOAT_ROUGHNESS_TEXTURE, all.clearcoat_roughness),
+        of_data(layout::CLEARCOAT_NORMAL_TEXTURE, all.clearcoat_normal),
+        of_colors(layout::SHEEN_COLOR_TEXTURE, all.sheen_color),
+        of_data(layout::SHEEN_ROUGHNESS_TEXTURE, all.sheen_roughness),
+        of_data(layout::ANISOTROPY_TEXTURE, all.anisotropy),
+        of_data(layout::IRIDESCENCE_TEXTURE, all.iridescence),
+        of_data(layout::IRIDESCENCE_THICKNESS_TEXTURE, all.iridescence_thickness),
+    ]
+    .into_iter()
+    .flatten()
+}
+
+fn texture_record(texture: &Texture, slot: u32, is_color: bool, texels: &mut Texels<'_>) -> TextureRecord {
     let wrap = |wrap| match wrap {
         Wrap::Repeat => WRAP_REPEAT,
         Wrap::Mirror => WRAP_MIRROR,
@@ -250,7 +254,8 @@ fn texture_record(texture: &Texture, is_color: bool, texels: &mut Texels<'_>) ->
             | (v << 2)
             | bit(texture.is_linear, LINEAR_BIT)
             | bit(is_color, SRGB_BIT)
-            | bit(texture.uv_set == 1, SECOND_UV_BIT),
+            | bit(texture.uv_set == 1, SECOND_UV_BIT)
+            | (slot << TEXTURE_SLOT_SHIFT),
         levels: image.levels,
         transform: texture.transform.map(row),
     }

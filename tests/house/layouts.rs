@@ -43,7 +43,7 @@ fn twins() -> Vec<Twin> {
         Primitive { v0, material, e1, id, e2, emitter }
         Instance { to_scene, from_scene_x, first, from_scene_y, stored, from_scene_z, root }
         Normals { n0, n1, n2, attributes }
-        MaterialRecord { color, kind, emission, ior, roughness, metallic, transmission, flags, f0, specular, normal_scale, opacity, cutoff, diffuse_transmission, diffuse_transmission_color, clearcoat, clearcoat_roughness, clearcoat_normal_scale, anisotropy, anisotropy_rotation, sheen_color, sheen_roughness, iridescence, iridescence_ior, iridescence_thickness, textures }
+        MaterialRecord { color, kind, emission, ior, roughness, metallic, transmission, flags, f0, specular, normal_scale, opacity, cutoff, diffuse_transmission, diffuse_transmission_color, clearcoat, clearcoat_roughness, clearcoat_normal_scale, anisotropy, anisotropy_rotation, sheen_color, sheen_roughness, iridescence, iridescence_ior, iridescence_thickness, first_texture, textures, pad }
         TextureRecord { first, size, flags, levels, transform }
         Attributes { uvs, colors, tangents, pad }
         Medium { tint, ior, absorption, dispersion }
@@ -143,6 +143,25 @@ fn constants() -> Vec<(&'static str, f64)> {
         LINEAR_BIT,
         SRGB_BIT,
         SECOND_UV_BIT,
+        TEXTURE_SLOT_SHIFT,
+        TEXTURE_TEXELS,
+        BASE_COLOR_TEXTURE,
+        METALLIC_ROUGHNESS_TEXTURE,
+        NORMAL_TEXTURE,
+        EMISSION_TEXTURE,
+        SPECULAR_TEXTURE,
+        SPECULAR_COLOR_TEXTURE,
+        TRANSMISSION_TEXTURE,
+        DIFFUSE_TRANSMISSION_TEXTURE,
+        DIFFUSE_TRANSMISSION_COLOR_TEXTURE,
+        CLEARCOAT_TEXTURE,
+        CLEARCOAT_ROUGHNESS_TEXTURE,
+        CLEARCOAT_NORMAL_TEXTURE,
+        SHEEN_COLOR_TEXTURE,
+        SHEEN_ROUGHNESS_TEXTURE,
+        ANISOTROPY_TEXTURE,
+        IRIDESCENCE_TEXTURE,
+        IRIDESCENCE_THICKNESS_TEXTURE,
         POINT_LIGHT,
         SPOT_LIGHT,
         DIRECTIONAL_LIGHT,
