@@ -26,6 +26,8 @@ pub struct MaterialBuffers {
     pub has_layers: bool,
     /// Some material has more than a base and its coat.
     pub has_finishes: bool,
+    /// Some material is iridescent.
+    pub has_films: bool,
     /// Some material has a rough lobe, which is lit at every vertex.
     pub has_rough: bool,
     /// Some material has a texture, or some triangle has colours.
@@ -55,6 +57,7 @@ impl MaterialBuffers {
             has_textures: !attributes.is_empty(),
             has_layers: materials().any(is_layered),
             has_finishes: materials().any(Material::is_finished),
+            has_films: materials().any(|m| m.is_finished() && m.iridescence > 0.0),
             has_rough: materials().any(is_rough),
             has_alpha: materials().any(|m| m.alpha != Alpha::Opaque),
             has_veils: materials().any(|m| may_be_veil(scene, m)),

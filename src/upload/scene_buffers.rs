@@ -203,6 +203,7 @@ impl SceneBuffers {
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_LAYERS", f64::from(u8::from(self.materials.has_layers))),
             ("HAS_FINISHES", f64::from(u8::from(self.materials.has_finishes))),
+            ("HAS_FILMS", f64::from(u8::from(self.materials.has_films))),
             ("CAUSTIC_ROUGHNESS", f64::from(self.caustic_roughness)),
             ("COMPENSATES", f64::from(u8::from(!self.single_scattering))),
             ("HAS_DISPERSION", f64::from(u8::from(self.has_dispersion))),
