@@ -1,8 +1,8 @@
 //! Benchmark: compile time of each kernel in the driver, without its disk cache.
 //!
-//! `cargo bench --bench compile [-- [KERNEL ...] [CONSTANT=VALUE ...]]`: of all kernels, or of those
-//! named, with `override` constants such as `HAS_TEXTURES=0`. Each kernel runs one workgroup over
-//! zeroed buffers, twice; the first run includes compilation.
+//! `cargo bench --bench compile [-- [KERNEL ...] [CONSTANT=VALUE ...]]`: of all kernels, or of
+//! those named, with `override` constants such as `HAS_TEXTURES=0`. Each kernel runs one workgroup
+//! over zeroed buffers, twice; the first run includes compilation.
 
 use std::{process::Command, time::Instant};
 

@@ -201,8 +201,8 @@ pub struct TextureRecord {
     /// Width, and height shifted by 16 bits.
     pub size: u32,
     /// Two bits each for what lies beyond the borders of u and v ([`WRAP_REPEAT`] …), then
-    /// [`LINEAR_BIT`], [`SRGB_BIT`], [`SECOND_UV_BIT`]; the texture's slot from [`TEXTURE_SLOT_SHIFT`]
-    /// on.
+    /// [`LINEAR_BIT`], [`SRGB_BIT`], [`SECOND_UV_BIT`]; the texture's slot from
+    /// [`TEXTURE_SLOT_SHIFT`] on.
     pub flags: u32,
     /// The image, and smaller versions of it that follow.
     pub levels: u32,
