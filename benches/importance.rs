@@ -1,6 +1,6 @@
 //! Benchmark: photons where the camera needs them, as squared error at equal time.
 //!
-//! `cargo bench --bench importance [-- ROUNDS [WORD]]`, 3 rounds by default, of the scenes with
+//! `cargo bench --bench importance [-- ROUNDS [WORD]]`, 10 rounds by default, of the scenes with
 //! that word in their names. Renders the light that comes over other surfaces, with final gathering
 //! and without, in scenes of which the camera sees a small part, with `--emission aimed`, which
 //! knows what the cameras see, and with `--emission unaimed`, which does not. The relMSE is against
@@ -26,7 +26,7 @@ const PHOTONS: u32 = 20_000;
 const REFERENCE: u32 = 20 * PHOTONS;
 
 fn main() {
-    let rounds: u32 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(3);
+    let rounds: u32 = std::env::args().find_map(|word| word.parse().ok()).unwrap_or(10);
     let word = std::env::args().skip(1).find(|word| !word.starts_with('-') && word.parse::<u32>().is_err());
     println!("{} ({})", gpu().name, gpu().driver);
     println!(

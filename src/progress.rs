@@ -7,7 +7,8 @@ use crate::error::{Error, Result};
 pub enum Stage {
     /// Reading the scene.
     Load,
-    /// Building the hierarchy and copying the scene to the device.
+    /// Building the hierarchy and copying the scene to the device. Units are primitives, of a large
+    /// scene.
     Bvh,
     /// Tracing photons. Units are photons stored, over all maps.
     Photons,

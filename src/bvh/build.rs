@@ -5,11 +5,14 @@ use rayon::prelude::*;
 
 use super::instance::{Place, instance_primitive, instances};
 use super::node::{FILLER, MAX_LEAF};
+use super::parallel::Watch;
 use super::{convert, parallel, split, widen};
+use crate::error::Result;
 use crate::layout::{
     BVH_STACK, BvhNode, INSTANCED_STACK, Instance, Normals, Primitive, SPHERE_BIT, TREE_HEIGHTS, even_height,
     octahedral,
 };
+use crate::progress::{Progress, Silent};
 use crate::scene::{Bounds, Scene, SharedMesh, Sphere, Triangle, instance_bounds};
 
 /// Nodes and primitives in device layout.
@@ -26,6 +29,15 @@ pub struct Bvh {
 }
 
 impl Bvh {
+    /// [`Self::build_watched`] without a listener.
+    ///
+    /// # Panics
+    /// If there are 2^28 triangles and spheres or more. The loader refuses such files earlier.
+    #[must_use]
+    pub fn build(scene: &Scene) -> Self {
+        Self::build_watched(scene, &Silent).expect("nothing stops this")
+    }
+
     /// Builds the tree over all triangles and spheres: PLOC with reinsertion (Meister and Bittner
     /// 2018, 2021). Large primitives among many that cross are listed several times, in smaller
     /// boxes. Large scenes are divided into parts that are built on all cores. Equal scenes give
@@ -35,10 +47,12 @@ impl Bvh {
     /// boxes in the tree of the scene (Wald et al. 2003, "Distributed Interactive Ray Tracing of
     /// Dynamic Scenes"): see [`INSTANCE`](crate::layout::INSTANCE).
     ///
+    /// # Errors
+    /// [`Error::Stopped`](crate::error::Error::Stopped) if the listener asks for that.
+    ///
     /// # Panics
-    /// If there are 2^28 triangles and spheres or more. The loader refuses such files earlier.
-    #[must_use]
-    pub fn build(scene: &Scene) -> Self {
+    /// As [`Self::build`].
+    pub fn build_watched(scene: &Scene, progress: &dyn Progress) -> Result<Self> {
         let triangles = scene.triangles.par_iter().map(triangle_primitive);
         let primitives = triangles.chain(scene.spheres.par_iter().map(sphere_primitive)).enumerate();
         let mut primitives: Vec<Primitive> =
@@ -46,7 +60,9 @@ impl Bvh {
         let boxes = instance_bounds(&scene.meshes, &scene.instances);
         primitives.extend(boxes.iter().zip(1..).map(|(bounds, number)| instance_primitive(bounds, number)));
         let heights = Heights::new(primitives.len(), scene);
-        let mut bvh = Self::of(primitives, &scene.triangles, heights.scene);
+        let of_meshes: usize = scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+        let watch = Watch::new(progress, primitives.len() + of_meshes);
+        let mut bvh = Self::of(primitives, &scene.triangles, heights.scene, &watch)?;
         let mut first_of_mesh = (scene.triangles.len() + scene.spheres.len()) as u32;
         let firsts = scene.meshes.iter().map(|mesh| {
             first_of_mesh += mesh.triangles.len() as u32;
@@ -56,17 +72,17 @@ impl Bvh {
         let of_mesh = |(mesh, first): (&SharedMesh, &u32)| {
             let numbered = mesh.triangles.iter().zip(*first..);
             let primitives = numbered.map(|(triangle, id)| Primitive { id, ..triangle_primitive(triangle) });
-            Self::of(primitives.collect(), &mesh.triangles, heights.mesh)
+            Self::of(primitives.collect(), &mesh.triangles, heights.mesh, &watch)
         };
-        let meshes: Vec<Self> = scene.meshes.par_iter().zip(&firsts).map(of_mesh).collect();
+        let meshes: Vec<Self> = scene.meshes.par_iter().zip(&firsts).map(of_mesh).collect::<Result<_>>()?;
         let places: Vec<Place> = meshes.into_iter().map(|mesh| bvh.append(mesh)).collect();
         bvh.instances = instances(&scene.instances, &places, bvh.primitives.len());
-        bvh
+        Ok(bvh)
     }
 
     /// A tree over primitives, whose triangles are those, the first of which is the first
     /// primitive.
-    fn of(mut primitives: Vec<Primitive>, triangles: &[Triangle], max_height: u32) -> Self {
+    fn of(mut primitives: Vec<Primitive>, triangles: &[Triangle], max_height: u32, watch: &Watch<'_>) -> Result<Self> {
         let first = primitives.first().map_or(0, |primitive| primitive.id);
         primitives.resize(primitives.len().max(2), Primitive { id: FILLER, ..Primitive::default() });
         let whole: Vec<Bounds> = primitives.par_iter().map(bounds).collect();
@@ -74,13 +90,13 @@ impl Bvh {
             pieces if even_height(pieces.0.len()) <= max_height => pieces,
             _ => (whole, (0..primitives.len() as u32).collect()),
         };
-        let (nodes, order) = widen::widen(&parallel::tree(&bounds, max_height), max_height);
+        let (nodes, order) = widen::widen(&parallel::tree(&bounds, max_height, watch)?, max_height);
         let normals = |primitive: &Primitive| {
             triangles.get(primitive.id.wrapping_sub(first) as usize).map_or(Normals::default(), corner_normals)
         };
         let primitives: Vec<Primitive> =
             order.par_iter().map(|i| primitives[of_bounds[*i as usize] as usize]).collect();
-        Self { normals: primitives.par_iter().map(normals).collect(), nodes, primitives, instances: Vec::new() }
+        Ok(Self { normals: primitives.par_iter().map(normals).collect(), nodes, primitives, instances: Vec::new() })
     }
 
     /// Appends the tree of a shared mesh.

@@ -8,7 +8,7 @@
 use std::{
     ops::Range,
     panic::resume_unwind,
-    sync::atomic::{AtomicUsize, Ordering},
+    sync::atomic::{AtomicU64, AtomicUsize, Ordering},
     thread,
 };
 
@@ -20,7 +20,12 @@ use super::{
     binary::build_binary,
     convert::{Binary, MAX_HEIGHT, convert, height},
 };
-use crate::{layout::even_height, scene::Bounds};
+use crate::{
+    error::Result,
+    layout::even_height,
+    progress::{Progress, Stage},
+    scene::Bounds,
+};
 
 /// Number of primitives from which on they are divided.
 pub(super) const LARGE: usize = 100_000;
@@ -40,10 +45,31 @@ const _: () = assert!(2 * PARTS * SMALLER_SIDE + MAX_APART < capacity(0));
 /// Primitives that decide about a division.
 const SAMPLE: usize = 1 << 15;
 
+/// Progress of all trees of a scene.
+pub(super) struct Watch<'a> {
+    progress: &'a dyn Progress,
+    done: AtomicU64,
+    primitives: u64,
+}
+
+impl<'a> Watch<'a> {
+    pub(super) fn new(progress: &'a dyn Progress, primitives: usize) -> Self {
+        Self { progress, done: AtomicU64::new(0), primitives: primitives as u64 }
+    }
+
+    /// The tree over a part of the primitives is there.
+    fn add(&self, primitives: usize) {
+        let primitives = primitives as u64;
+        let done = self.done.fetch_add(primitives, Ordering::Relaxed) + primitives;
+        self.progress.report(Stage::Bvh, done.min(self.primitives), self.primitives);
+    }
+}
+
 /// The tree over two or more boxes, of `limit` levels at most.
-pub(super) fn tree(bounds: &[Bounds], limit: u32) -> Binary {
+pub(super) fn tree(bounds: &[Bounds], limit: u32, watch: &Watch<'_>) -> Result<Binary> {
+    watch.progress.check()?;
     let is_low = LEVELS + even_height(bounds.len().div_ceil(PARTS)) <= limit;
-    if bounds.len() < LARGE || !is_low { part(bounds, limit, Curve::Whole) } else { joined(bounds, limit) }
+    if bounds.len() < LARGE || !is_low { Ok(part(bounds, limit, Curve::Whole)) } else { joined(bounds, limit, watch) }
 }
 
 /// Box through which the curve runs along which the builder sorts.
@@ -66,7 +92,7 @@ pub(super) fn part(bounds: &[Bounds], height: u32, curve: Curve) -> Binary {
     convert(&build_binary(bounds, within, MAX_LEAF), bounds, height)
 }
 
-fn joined(bounds: &[Bounds], limit: u32) -> Binary {
+fn joined(bounds: &[Bounds], limit: u32, watch: &Watch<'_>) -> Result<Binary> {
     let (parts, apart) = divide(bounds);
     let of = |indices: &[u32], height: u32| {
         let own: Vec<Bounds> = indices.iter().map(|i| bounds[*i as usize]).collect();
@@ -83,7 +109,13 @@ fn joined(bounds: &[Bounds], limit: u32) -> Binary {
         content: Content::Leaf(*leaf),
     }));
     let Top { mut nodes, places } = Top::new(&all, parts.len());
-    let built = on_all_cores(parts.len(), |i| of(&parts[i], limit - places[i].depth));
+    let built = on_all_cores(parts.len(), |i| {
+        watch.progress.check()?;
+        let tree = of(&parts[i], limit - places[i].depth);
+        watch.add(parts[i].len());
+        Ok(tree)
+    });
+    let built: Vec<Binary> = built.into_iter().collect::<Result<_>>()?;
     nodes.reserve_exact(built.iter().map(|tree| tree.nodes.len()).sum());
     let mut order = apart.order;
     order.reserve_exact(bounds.len() - order.len());
@@ -95,7 +127,7 @@ fn joined(bounds: &[Bounds], limit: u32) -> Binary {
         nodes.extend(tree.nodes.into_iter().map(|children| children.map(moved)));
         order.extend(tree.order);
     }
-    Binary { nodes, order }
+    Ok(Binary { nodes, order })
 }
 
 /// Results of `work` for 0 to `count`, in their order.

@@ -1,6 +1,8 @@
 //! Tests: the tree holds every primitive once, in boxes that contain it, and traversal finds the
 //! hits of brute force.
 
+use std::sync::Mutex;
+
 use glam::Vec3;
 
 use super::{
@@ -11,7 +13,9 @@ use super::{
     parallel::{Curve, LARGE, part},
     widen::widen,
 };
+use crate::error::Error;
 use crate::layout::{BVH_STACK, BvhNode, Primitive, SPHERE_BIT};
+use crate::progress::{Progress, Stage};
 use crate::scene::{Bounds, Scene, Sphere, Triangle};
 
 /// Random numbers in [0, 1) (PCG hash, Jarzynski and Olano 2020).
@@ -351,6 +355,36 @@ fn trees_in_parts_are_whole_and_as_good() {
             assert!(other.nodes == bvh.nodes && other.primitives == bvh.primitives, "{threads} threads");
         }
     }
+}
+
+/// Keeps the reports, and stops the work after so many.
+struct StopsAfter(usize, Mutex<Vec<(u64, u64)>>);
+
+impl Progress for StopsAfter {
+    fn report(&self, stage: Stage, done: u64, total: u64) {
+        assert_eq!(stage, Stage::Bvh);
+        self.1.lock().expect("no panic").push((done, total));
+    }
+
+    fn stop_requested(&self) -> bool {
+        self.1.lock().expect("no panic").len() >= self.0
+    }
+}
+
+#[test]
+fn a_large_tree_tells_its_progress_and_can_be_stopped() {
+    let scene = random_scene(LARGE + 5, 0, 0.01, 11);
+    let primitives = LARGE as u64 + 5;
+    let patient = StopsAfter(usize::MAX, Mutex::default());
+    Bvh::build_watched(&scene, &patient).expect("nothing stops this");
+    let mut told = patient.1.into_inner().expect("no panic");
+    told.sort_unstable();
+    assert!(told.len() > 16 && told.iter().all(|(_, total)| *total == primitives), "{told:?}");
+    assert_eq!(told.last(), Some(&(primitives, primitives)));
+    let impatient = StopsAfter(2, Mutex::default());
+    assert!(matches!(Bvh::build_watched(&scene, &impatient), Err(Error::Stopped)));
+    let stopped = impatient.1.into_inner().expect("no panic").len();
+    assert!(stopped < told.len(), "{stopped} of {} parts", told.len());
 }
 
 #[test]

@@ -174,14 +174,16 @@ fn name(stage: Stage) -> &'static str {
     }
 }
 
-/// Name of a stage's units; `None` if the stage is not counted, or has fewer than two units.
+/// Name of a stage's units; `None` if the stage is not counted, as that of the tree of few
+/// primitives, or has fewer than two units.
 fn unit(stage: Stage, total: u64) -> Option<&'static str> {
     let unit = match stage {
         Stage::Photons => "photons",
         Stage::Records => "rays",
+        Stage::Bvh => "primitives",
         _ => "tiles",
     };
-    (total > 1 && is_counted(stage)).then_some(unit)
+    (total > 1 && (is_counted(stage) || stage == Stage::Bvh)).then_some(unit)
 }
 
 fn is_counted(stage: Stage) -> bool {

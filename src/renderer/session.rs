@@ -106,7 +106,7 @@ impl<'a> Session<'a> {
         };
         gpu.memory.restart_peak();
         progress.report(Stage::Bvh, 0, 1);
-        let bvh = timed(&mut stats.seconds.bvh, || Bvh::build(scene));
+        let bvh = timed(&mut stats.seconds.bvh, || Bvh::build_watched(scene, progress))?;
         // They are those of the whole light in each of its groups.
         let contacts = Arc::new(timed(&mut stats.seconds.bvh, || contacts(scene, &bvh)));
         let lit = |group: &String| scene.lit_by(group);
