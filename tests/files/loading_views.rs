@@ -24,6 +24,20 @@ fn a_light_of_nothing_is_no_reason_for_a_sky() {
         gltf["nodes"][1]["scale"] = json!([0, 0, 0]);
         assert_eq!(said(&gltf), (None, vec![r#"light "lamp" has no intensity: it gives no light"#.to_owned(), off()]));
     }
+    // Of many one line is said.
+    for (count, lines) in [(8, 8), (9, 1)] {
+        let mut gltf = triangle();
+        let dark = json!({ "type": "point", "intensity": 0 });
+        gltf["extensions"]["KHR_lights_punctual"]["lights"] = json!(vec![dark; count]);
+        let node = |i| json!({ "name": format!("lamp {i}"), "extensions": { "KHR_lights_punctual": { "light": i } } });
+        let nodes: Vec<Value> = (0..count).map(node).collect();
+        gltf["scenes"][0]["nodes"] = (0..count + 3).filter(|i| *i != 1).collect();
+        gltf["nodes"].as_array_mut().expect("a list").extend(nodes);
+        let (_, warnings) = said(&gltf);
+        let mut first = r#"light "lamp 0" has no intensity: it gives no light"#.to_owned();
+        first += if count == lines { "" } else { " (and 8 others)" };
+        assert_eq!((warnings.len(), &warnings[0]), (lines + 1, &first), "{warnings:?}");
+    }
     let mut gltf = triangle();
     gltf["scenes"][0]["nodes"] = json!([0, 2]);
     gltf["materials"][0]["emissiveFactor"] = json!([1, 0.5, 0]);

@@ -1,6 +1,9 @@
 //! Faults of a file, independent of the file's name, and notes on ignored parts.
 
-use std::{collections::HashSet, path::Path};
+use std::{
+    collections::{HashMap, HashSet},
+    path::Path,
+};
 
 use crate::{Error, scene::words::one_line};
 
@@ -26,12 +29,17 @@ impl Fault {
     }
 }
 
+/// Number of things of which the same is said in a line each; of more, one line tells the number.
+const MOST_ALIKE: usize = 8;
+
 /// Notes on parts that were ignored or read in a special way: each line once, in the order of first
 /// appearance.
 #[derive(Debug, Default)]
 pub(crate) struct Notes {
     lines: Vec<String>,
     known: HashSet<String>,
+    /// Lines that say the same of things of one kind, each by its first words and the rest.
+    alike: HashMap<(&'static str, String), Vec<usize>>,
 }
 
 impl Notes {
@@ -42,7 +50,22 @@ impl Notes {
         }
     }
 
-    pub(crate) fn into_lines(self) -> Vec<String> {
-        self.lines
+    /// A note on the `kind` of thing of that name, of which there may be very many.
+    pub(crate) fn about(&mut self, kind: &'static str, name: &str, rest: &str) {
+        let before = self.lines.len();
+        self.add(format!("{kind} {name:?}{rest}"));
+        if self.lines.len() > before {
+            self.alike.entry((kind, rest.to_owned())).or_default().push(before);
+        }
+    }
+
+    pub(crate) fn into_lines(mut self) -> Vec<String> {
+        let mut left_out: HashSet<usize> = HashSet::new();
+        for lines in self.alike.values().filter(|lines| lines.len() > MOST_ALIKE) {
+            self.lines[lines[0]] += &format!(" (and {} others)", lines.len() - 1);
+            left_out.extend(&lines[1..]);
+        }
+        let kept = self.lines.into_iter().enumerate().filter(|(i, _)| !left_out.contains(i));
+        kept.map(|(_, line)| line).collect()
     }
 }

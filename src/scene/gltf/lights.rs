@@ -50,7 +50,7 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
         );
     }
     if intensity == Vec3::ZERO {
-        notes.add(format!("light {name:?} has no intensity: it gives no light"));
+        notes.about("light", &name, " has no intensity: it gives no light");
         let dark = Light {
             name,
             group: None,
@@ -90,7 +90,7 @@ fn spot(spot: Option<&Spot>, name: &str, place: &str, notes: &mut Notes) -> Read
     }
     let outer = given.min(FRAC_PI_2);
     if outer != given {
-        notes.add(format!("light {name:?}: outer cone angle {given} is read as pi/2"));
+        notes.about("light", name, &format!(": outer cone angle {given} is read as pi/2"));
     }
     if !(inner >= 0.0 && inner.is_finite()) {
         let problem = format!("{inner} is not between 0 and the outer angle, {outer}");
@@ -101,8 +101,7 @@ fn spot(spot: Option<&Spot>, name: &str, place: &str, notes: &mut Notes) -> Read
     }
     // The specification requires an inner angle below the outer one, but exporters write equal ones
     // for an edge without falloff, and angles that were edited one by one.
-    notes.add(format!(
-        "light {name:?}: inner cone angle {inner} is not below the outer, {outer}: an edge without falloff"
-    ));
+    let edge = format!(": inner cone angle {inner} is not below the outer, {outer}: an edge without falloff");
+    notes.about("light", name, &edge);
     Ok(LightKind::Spot { inner: outer.next_down(), outer })
 }

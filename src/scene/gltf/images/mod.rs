@@ -112,7 +112,8 @@ impl ImageList {
             images.iter().zip(sizes).filter(|(image, size)| [image.width, image.height] != *size)
         {
             let Image { name, width: w, height: h, .. } = image;
-            notes.add(format!("image {name:?} of {width} x {height} texels is made {w} x {h} (`load.texture_size`)"));
+            let made = format!(" of {width} x {height} texels is made {w} x {h} (`load.texture_size`)");
+            notes.about("image", name, &made);
         }
         Ok(images)
     }

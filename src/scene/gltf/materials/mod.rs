@@ -166,7 +166,7 @@ fn emission(material: &json::Material, name: &str, place: &str, notes: &mut Note
         return fault(at, format!("{strength} is not a positive number that its factor can be multiplied by"));
     }
     if factor != Vec3::ZERO && emission == Vec3::ZERO {
-        notes.add(format!("material {name:?}: emissive strength {strength} gives no light"));
+        notes.about("material", name, &format!(": emissive strength {strength} gives no light"));
     }
     Ok(emission)
 }

@@ -29,7 +29,7 @@ pub(super) struct Reader<'a> {
 impl Reader<'_> {
     /// Adds a note on the material.
     pub(super) fn note(&mut self, note: &str) {
-        self.notes.add(format!("material {:?}: {note}", self.name));
+        self.notes.about("material", &self.name, &format!(": {note}"));
     }
 
     /// An extension of the material that the crate does not know.
