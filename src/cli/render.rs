@@ -194,10 +194,20 @@ fn write_picture(path: &Path, frame: &Frame, attributes: &Attributes, args: &Ren
     }
 }
 
+/// Stops beyond which a picture shows little but the noise of what glows: a candle of 1 cd, in
+/// photometric units, asks for some 11. Files that viewers light by a sky of their own ask for more
+/// if their only light is a glowing dashboard.
+const DARK: f32 = 14.0;
+
 /// The exposure of a PNG in one line.
 pub(super) fn exposure_line(exposure: Exposure, frame: &Frame) -> String {
-    let how = if exposure == Exposure::Auto { " (auto)" } else { "" };
-    format!("exposure: {:+.2} EV{how}", exposure.of(frame))
+    let stops = exposure.of(frame);
+    let how = match exposure {
+        Exposure::Auto if stops > DARK => " (auto): what is seen is all but dark; `--env` or `--background` lights it",
+        Exposure::Auto => " (auto)",
+        Exposure::Stops(_) => "",
+    };
+    format!("exposure: {stops:+.2} EV{how}")
 }
 
 fn write_stats(path: &Path, stats: &Stats) -> Result<()> {
@@ -236,4 +246,22 @@ fn summary(stats: &Stats) -> String {
         stats.rays,
         stats.peak_device_bytes as f64 / f64::from(1 << 20),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_that_is_all_but_dark_is_named() {
+        let line = |radiance: f32, exposure| {
+            let mut frame = Frame::new(1, 1, &[[radiance; 3]]);
+            frame.layer_mut("alpha").copy_from_slice(&[1.0]);
+            exposure_line(exposure, &frame)
+        };
+        assert!(line(1e-6, Exposure::Auto).contains("--background"));
+        assert_eq!(line(0.09, Exposure::Auto), "exposure: +1.00 EV (auto)");
+        assert_eq!(line(1e-4, Exposure::Auto), "exposure: +10.81 EV (auto)");
+        assert_eq!(line(1e-6, Exposure::Stops(1.0)), "exposure: +1.00 EV");
+    }
 }
