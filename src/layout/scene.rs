@@ -185,9 +185,9 @@ pub struct MaterialRecord {
     /// Thickness of the film where its texture is 0 and where it is 1, nanometres.
     pub iridescence_thickness: [f32; 2],
     /// Texel of the table of materials where its [`TextureRecord`]s begin, in the order of their
-    /// slots.
+    /// roles.
     pub first_texture: u32,
-    /// Bit 1 << slot for each texture that it has.
+    /// Bit 1 << role for each texture that it has.
     pub textures: u32,
     pub pad: [u32; 2],
 }
@@ -201,8 +201,8 @@ pub struct TextureRecord {
     /// Width, and height shifted by 16 bits.
     pub size: u32,
     /// Two bits each for what lies beyond the borders of u and v ([`WRAP_REPEAT`] …), then
-    /// [`LINEAR_BIT`], [`SRGB_BIT`], [`SECOND_UV_BIT`]; the texture's slot from
-    /// [`TEXTURE_SLOT_SHIFT`] on.
+    /// [`LINEAR_BIT`], [`SRGB_BIT`], [`SECOND_UV_BIT`]; the texture's role from
+    /// [`TEXTURE_ROLE_SHIFT`] on.
     pub flags: u32,
     /// The image, and smaller versions of it that follow.
     pub levels: u32,
@@ -220,12 +220,12 @@ pub const LINEAR_BIT: u32 = 16;
 pub const SRGB_BIT: u32 = 32;
 /// The second set of texture coordinates is read.
 pub const SECOND_UV_BIT: u32 = 64;
-pub const TEXTURE_SLOT_SHIFT: u32 = 8;
+pub const TEXTURE_ROLE_SHIFT: u32 = 8;
 
 /// Texels of a [`TextureRecord`].
 pub const TEXTURE_TEXELS: u32 = 3;
 
-/// Slots: what a texture is a factor of.
+/// Roles: what a texture is a factor of.
 pub const BASE_COLOR_TEXTURE: u32 = 0;
 pub const METALLIC_ROUGHNESS_TEXTURE: u32 = 1;
 pub const NORMAL_TEXTURE: u32 = 2;

@@ -9,7 +9,7 @@ use crate::{
     gpu::{Gpu, Table},
     layout::{
         self, BLEND_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS, MaterialRecord,
-        SECOND_UV_BIT, SRGB_BIT, TEXTURE_SLOT_SHIFT, TEXTURE_TEXELS, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR,
+        SECOND_UV_BIT, SRGB_BIT, TEXTURE_ROLE_SHIFT, TEXTURE_TEXELS, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR,
         WRAP_REPEAT, octahedral,
     },
     scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Textures, Wrap},
@@ -165,10 +165,10 @@ fn record(
         Alpha::Blend => BLEND_BIT,
     };
     let first_texture = textures.len() as u32;
-    let mut slots = 0;
-    for (slot, texture, is_color) in in_slots(&material.textures) {
-        slots |= 1 << slot;
-        textures.push(texture_record(&texture, slot, is_color, texels));
+    let mut roles = 0;
+    for (role, texture, is_color) in by_role(&material.textures) {
+        roles |= 1 << role;
+        textures.push(texture_record(&texture, role, is_color, texels));
     }
     // Finishes are those of layers.
     let is_finished = material.is_finished() && !surface.transmits();
@@ -208,15 +208,15 @@ fn record(
         iridescence_ior: material.iridescence_ior,
         iridescence_thickness: material.iridescence_thickness,
         first_texture: first_row + first_texture * TEXTURE_TEXELS,
-        textures: slots,
+        textures: roles,
         pad: [0; 2],
     }
 }
 
-/// The textures with their slots, in the order of these, and whether they are of colours.
-fn in_slots(all: &Textures) -> impl Iterator<Item = (u32, Texture, bool)> {
-    let of_colors = |slot, texture: Option<Texture>| texture.map(|texture| (slot, texture, true));
-    let of_data = |slot, texture: Option<Texture>| texture.map(|texture| (slot, texture, false));
+/// The textures with their roles, in the order of these, and whether they are of colours.
+fn by_role(all: &Textures) -> impl Iterator<Item = (u32, Texture, bool)> {
+    let of_colors = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, true));
+    let of_data = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, false));
     [
         of_colors(layout::BASE_COLOR_TEXTURE, all.base_color),
         of_data(layout::METALLIC_ROUGHNESS_TEXTURE, all.metallic_roughness),
@@ -240,7 +240,7 @@ fn in_slots(all: &Textures) -> impl Iterator<Item = (u32, Texture, bool)> {
     .flatten()
 }
 
-fn texture_record(texture: &Texture, slot: u32, is_color: bool, texels: &mut Texels<'_>) -> TextureRecord {
+fn texture_record(texture: &Texture, role: u32, is_color: bool, texels: &mut Texels<'_>) -> TextureRecord {
     let wrap = |wrap| match wrap {
         Wrap::Repeat => WRAP_REPEAT,
         Wrap::Mirror => WRAP_MIRROR,
@@ -258,7 +258,7 @@ fn texture_record(texture: &Texture, slot: u32, is_color: bool, texels: &mut Tex
             | bit(texture.is_linear, LINEAR_BIT)
             | bit(is_color, SRGB_BIT)
             | bit(texture.uv_set == 1, SECOND_UV_BIT)
-            | (slot << TEXTURE_SLOT_SHIFT),
+            | (role << TEXTURE_ROLE_SHIFT),
         levels: image.levels,
         transform: texture.transform.map(row),
     }

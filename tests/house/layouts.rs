@@ -143,7 +143,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         LINEAR_BIT,
         SRGB_BIT,
         SECOND_UV_BIT,
-        TEXTURE_SLOT_SHIFT,
+        TEXTURE_ROLE_SHIFT,
         TEXTURE_TEXELS,
         BASE_COLOR_TEXTURE,
         METALLIC_ROUGHNESS_TEXTURE,
