@@ -203,7 +203,9 @@ const DARK: f32 = 14.0;
 pub(super) fn exposure_line(exposure: Exposure, frame: &Frame) -> String {
     let stops = exposure.of(frame);
     let how = match exposure {
-        Exposure::Auto if stops > DARK => " (auto): what is seen is all but dark; `--env` or `--background` lights it",
+        Exposure::Auto if stops > DARK => {
+            " (auto): what is seen is all but dark; `render --env` or `--background` lights it"
+        }
         Exposure::Auto => " (auto)",
         Exposure::Stops(_) => "",
     };
