@@ -1,5 +1,5 @@
 //! Code that several test programs, benchmarks or fuzz targets share: scenes built in code, and the
-//! one device of a test program.
+//! devices of a test program.
 
 pub mod any_environment;
 pub mod any_scene;
@@ -10,7 +10,10 @@ pub mod photons;
 pub mod rays;
 pub mod surfaces;
 
-use std::sync::OnceLock;
+use std::sync::{
+    OnceLock,
+    atomic::{AtomicUsize, Ordering},
+};
 
 use caustica::{
     gpu::Gpu,
@@ -21,10 +24,31 @@ use caustica::{
 };
 use glam::Vec3;
 
-/// The device of this test process; no adapter is a failure.
+/// The devices of this test process, each with the number of tests that have it. The driver
+/// compiles kernels in the queue of a device: with two of them one works meanwhile.
+static GPUS: [(OnceLock<Gpu>, AtomicUsize); 2] = [const { (OnceLock::new(), AtomicUsize::new(0)) }; 2];
+
+/// A test's hold on one of [`GPUS`], from its first call of [`gpu`] to its end.
+struct Hold(usize);
+
+impl Drop for Hold {
+    fn drop(&mut self) {
+        GPUS[self.0].1.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+thread_local! {
+    static HOLD: Hold = {
+        let freest = (0..GPUS.len()).min_by_key(|i| GPUS[*i].1.load(Ordering::Relaxed)).unwrap_or(0);
+        GPUS[freest].1.fetch_add(1, Ordering::Relaxed);
+        Hold(freest)
+    };
+}
+
+/// The device of this test; no adapter is a failure.
 pub fn gpu() -> &'static Gpu {
-    static GPU: OnceLock<Gpu> = OnceLock::new();
-    GPU.get_or_init(|| Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("tests need an adapter"))
+    let open = || Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("tests need an adapter");
+    HOLD.with(|hold| GPUS[hold.0].0.get_or_init(open))
 }
 
 pub fn diffuse(albedo: f32) -> Surface {
