@@ -47,21 +47,31 @@ impl BiasCheck {
         self.sums.iter_mut().zip(&other.sums).for_each(|(a, b)| *a += b);
     }
 
-    /// Estimates of the squared error of each number of a picture of the same passes, given its
-    /// radiance, with the index of its pixel: the squared distance to the mean of the closer
-    /// estimates, less the variance of that. `None` for one pass.
-    pub fn squares<'a>(
+    /// Of each checked pixel of a picture of the same passes, its index and its numbers, given the
+    /// picture's radiance. `None` for one pass.
+    pub fn numbers<'a>(
         &'a self,
         radiance: &'a [f32],
         whole: (u32, u32),
         window: Crop,
-    ) -> Option<impl Iterator<Item = (usize, [f64; 3])> + 'a> {
+    ) -> Option<impl Iterator<Item = (usize, [Checked; 3])> + 'a> {
         let passes = f64::from(self.passes);
-        let square = move |i: usize, place: usize, c: usize| {
-            let apart = f64::from(radiance[3 * place + c]) - f64::from(self.sums[3 * i + c]) / passes;
-            apart * apart - f64::from(self.deviations[3 * i + c]) / (passes - 1.0) / passes
+        let number = move |i: usize, place: usize, c: usize| {
+            let closer = f64::from(self.sums[3 * i + c]) / passes;
+            let apart = f64::from(radiance[3 * place + c]) - closer;
+            let variance = f64::from(self.deviations[3 * i + c]) / (passes - 1.0) / passes;
+            Checked { closer, square: apart * apart - variance }
         };
-        let of_pixel = move |(i, place)| (place, [0, 1, 2].map(|c| square(i, place, c)));
+        let of_pixel = move |(i, place)| (place, [0, 1, 2].map(|c| number(i, place, c)));
         (self.passes > 1).then(|| PixelGrid::of(whole).places(window).enumerate().map(of_pixel))
     }
+}
+
+/// A number of a picture that is checked.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Checked {
+    /// Mean of the closer estimates.
+    pub closer: f64,
+    /// Estimate of the squared error: the squared distance to that mean, less the variance of that.
+    pub square: f64,
 }

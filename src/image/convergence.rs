@@ -1,6 +1,6 @@
 //! Estimated error of a picture of several passes: noise and bias.
 
-use super::{film::Film, layers::layer_index};
+use super::{bias_check::Checked, film::Film, layers::layer_index};
 use crate::settings::Crop;
 
 /// Fraction of the mean radiance of all pixels that is added to each pixel's own, so that dark
@@ -8,6 +8,9 @@ use crate::settings::Crop;
 const FLOOR: f64 = 0.1;
 /// Fraction of the squared standard error that is noise at least, whatever closer estimates say.
 const LEAST_NOISE: f64 = 0.75;
+/// Fraction of a number of the picture that counts as right at least, whatever its noise and closer
+/// estimates say.
+const LEAST_RIGHT: f64 = 0.25;
 
 /// Relative errors of a picture, root mean squares over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,8 +39,12 @@ impl ErrorEstimate {
         let numbers =
             || frame.layer("radiance").iter().map(|x| f64::from(*x)).enumerate().filter(|(i, _)| is_in(i / 3));
         let floor = (FLOOR * numbers().map(|(_, x)| x).sum::<f64>() / count.max(1) as f64).powi(2);
+        // The right number's square, without bias: one sample that is far too bright does not hide
+        // itself.
+        let relative = |square: f64, right: f64| square / (right + floor).max(f64::MIN_POSITIVE);
         let mean_square = |of: &[f32]| {
-            let terms = numbers().map(|(i, x)| f64::from(of[i]).powi(2) / (x * x + floor).max(f64::MIN_POSITIVE));
+            let right = |i: usize, x: f64| (x * x - f64::from(errors[i]).powi(2)).max(LEAST_RIGHT * x * x);
+            let terms = numbers().map(|(i, x)| relative(f64::from(of[i]).powi(2), right(i, x)));
             terms.sum::<f64>() / count as f64
         };
         let noise = (count > 0).then(|| mean_square(&errors))?;
@@ -46,22 +53,20 @@ impl ErrorEstimate {
             (mean_square(&biases) - ratio * ratio * noise).max(0.0)
         };
         let radiance = frame.layer("radiance");
-        // Squared error beyond the noise, of one pixel.
-        let beyond = |(place, squares): (usize, [f64; 3])| {
+        // Squared error beyond the noise, of one pixel. The square of the right number is the
+        // product of two independent estimates of it, of which a closer one is the noisier.
+        let beyond = |(place, checked): (usize, [Checked; 3])| {
             let of_channel = |c: usize| {
-                let (x, error) = (f64::from(radiance[3 * place + c]), f64::from(errors[3 * place + c]));
-                (squares[c] - error * error) / (x * x + floor).max(f64::MIN_POSITIVE)
+                let (x, error) = (f64::from(radiance[3 * place + c]).max(0.0), f64::from(errors[3 * place + c]));
+                relative(checked[c].square - error * error, x * checked[c].closer.clamp(LEAST_RIGHT * x, x))
             };
             (0..3).map(of_channel).sum::<f64>() / 3.0
         };
-        let squares = film.check.as_ref().and_then(|check| check.squares(radiance, film.whole, film.window));
-        let checked = squares.and_then(|all| {
-            let all = all.filter(|(place, _)| is_in(*place)).map(beyond);
-            let (count, sum) = all.fold((0, 0.0), |(count, sum), term| (count + 1, sum + term));
-            (count > 0).then(|| sum / f64::from(count))
-        });
-        let more = checked.or_else(|| biases.map(unexplained)).unwrap_or(0.0);
-        let noise = (noise + more.min(0.0)).max(LEAST_NOISE * noise);
+        let checked = film.check.as_ref().and_then(|check| check.numbers(radiance, film.whole, film.window));
+        let checked = checked.and_then(|all| mean_and_error(all.filter(|(place, _)| is_in(*place)).map(beyond)));
+        let (more, error) = checked.unwrap_or_else(|| (biases.map_or(0.0, unexplained), 0.0));
+        // Less only where that is no chance.
+        let noise = (noise + (more + error).min(0.0)).max(LEAST_NOISE * noise);
         Some(Self { noise: noise.sqrt(), bias: more.max(0.0).sqrt() })
     }
 
@@ -70,6 +75,14 @@ impl ErrorEstimate {
     pub fn total(&self) -> f64 {
         self.noise.hypot(self.bias)
     }
+}
+
+/// Mean of the terms and its standard error; `None` if there are none.
+fn mean_and_error(terms: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let sums = |(n, sum, squares): (f64, f64, f64), term: f64| (n + 1.0, sum + term, squares + term * term);
+    let (n, sum, squares) = terms.fold((0.0, 0.0, 0.0), sums);
+    let mean = sum / n;
+    (n > 0.0).then(|| (mean, ((squares / n - mean * mean).max(0.0) / n).sqrt()))
 }
 
 impl Film {
@@ -112,8 +125,8 @@ mod tests {
     #[test]
     fn noise_is_relative_and_bias_is_what_follows_the_radius() {
         let noisy = ErrorEstimate::of(&film(&[(0.5, 1.0), (1.5, 1.0), (0.5, 1.0), (1.5, 1.0)]), None).expect("passes");
-        // Standard error (1/√3)/2 of one of two pixels, relative to 1 + 0.1².
-        let expected = (1.0 / 12.0 / 2.0 / 1.01_f64).sqrt();
+        // Standard error (1/√3)/2 of one of two pixels, relative to 1 less its square, and 0.1².
+        let expected = (1.0 / 12.0 / 2.0 / (11.0 / 12.0 + 0.01_f64)).sqrt();
         assert!((noisy.noise - expected).abs() < 1e-6 && noisy.bias == 0.0, "{noisy:?}");
         let biased = [(2.0, 1.0), (1.5, 0.5), (1.25, 0.25), (1.125, 0.125)];
         let estimate = ErrorEstimate::of(&film(&biased), None).expect("passes");
@@ -145,19 +158,23 @@ mod tests {
             films.for_each(|film| merged.merge(&film).expect("of one picture"));
             ErrorEstimate::of(&merged, None).expect("passes")
         };
-        let relative = |square: f64| (square / (1.3_f64.powi(2) * 1.01)).sqrt();
+        let relative = |square: f64, right: f64| (square / (right + 0.01 * 1.3 * 1.3)).sqrt();
         let is_near = |a: f64, b: f64| (a - b).abs() < 1e-5;
         // The mean of the closer ones is 1, its variance 0.02/(3 · 4).
         let (even, around) = ([1.3; 4], [0.9, 1.1, 1.0, 1.0]);
         let estimate = merged(even, around);
-        assert!(estimate.noise == 0.0 && is_near(estimate.bias, relative(0.09 - 0.02 / 12.0)), "{estimate:?}");
+        assert!(estimate.noise == 0.0 && is_near(estimate.bias, relative(0.09 - 0.02 / 12.0, 1.3)), "{estimate:?}");
         // Noise of the picture is a part of that error.
         let noisy = [1.1, 1.5, 1.3, 1.3];
-        let noise = merged(noisy, around);
-        assert!(is_near(noise.noise, relative(0.08 / 12.0)) && is_near(noise.total(), estimate.total()), "{noise:?}");
+        let (noise, variance) = (merged(noisy, around), 0.08 / 12.0);
+        assert!(is_near(noise.noise, relative(variance, 1.69 - variance)), "{noise:?}");
+        assert!(is_near(noise.bias, relative(0.09 - 0.02 / 12.0 - variance, 1.3)), "{noise:?}");
         // Passes that err oppositely: closer estimates say that their mean is right.
         let opposite = merged(noisy, [1.3; 4]);
-        assert!(opposite.bias == 0.0 && is_near(opposite.noise, relative(LEAST_NOISE * 0.08 / 12.0)), "{opposite:?}");
+        assert!(
+            opposite.bias == 0.0 && is_near(opposite.noise, relative(LEAST_NOISE * variance, 1.69 - variance)),
+            "{opposite:?}"
+        );
         assert_eq!(merged(even, [1.3; 4]).total(), 0.0, "control: no difference");
     }
 

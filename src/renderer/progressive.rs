@@ -21,7 +21,7 @@ use crate::{
 
 /// Standard deviations of a Poisson count by which a pass stays below the capacity of a map.
 const DEVIATIONS: f64 = 8.0;
-/// Rays of final gathering of each pixel of a grid, which has one sample.
+/// Rays of final gathering of each sample of a pixel of the grid.
 const CLOSER_RAYS: u32 = 4;
 /// Offset of the numbers that give the seeds of closer estimates (the golden ratio, as a fraction
 /// of 2^32).

@@ -33,6 +33,8 @@ use crate::{
     upload::SceneBuffers,
 };
 
+/// Samples of each pixel of a grid.
+const GRID_SAMPLES: u32 = 4;
 /// Rays of final gathering that the preview of a picture traces at most, in all and for each pixel
 /// of the picture.
 const PREVIEW_RAYS: f64 = (1 << 17) as f64;
@@ -229,7 +231,7 @@ impl<'a> Session<'a> {
         progress: &dyn Progress,
     ) -> Result<Film> {
         let mut gatherer = MapGatherer::new(self.gpu, &self.buffers, maps, estimate, None)?;
-        let picture = PictureSettings { layers: Vec::new(), spp: 1, max_spp: None, ..picture.clone() };
+        let picture = PictureSettings { layers: Vec::new(), spp: GRID_SAMPLES, max_spp: None, ..picture.clone() };
         let pass = self.pass(maps, estimate, &picture)?.at_grid();
         let mut own = Stats::default();
         let mut films = pass.render(&mut gatherer, Stage::Camera, &mut own, progress)?;

@@ -3,7 +3,7 @@
 use super::Crop;
 
 /// Pixels of a grid, about.
-const PIXELS: f64 = (1 << 14) as f64;
+const PIXELS: f64 = (1 << 12) as f64;
 /// Cells by which the pixel of the next one is shifted, as a fraction of a cell: 1 less the golden
 /// ratio, so that few cells in a row cover all places.
 const SHIFT: f64 = 0.381_966;
@@ -87,23 +87,23 @@ mod tests {
     #[test]
     fn grids_are_coarse_in_large_pictures() {
         let grid = |side| (PixelGrid::of((side, side)).every(), PixelGrid::of((side, side)).shift());
-        assert_eq!([grid(8), grid(128), grid(256), grid(1024)], [(1, 0), (1, 0), (2, 1), (8, 3)]);
-        assert_eq!(PixelGrid::of((65_535, 65_535)).every(), 512);
+        assert_eq!([grid(8), grid(64), grid(128), grid(512)], [(1, 0), (1, 0), (2, 1), (8, 3)]);
+        assert_eq!(PixelGrid::of((65_535, 65_535)).every(), 1024);
     }
 
     #[test]
     fn each_row_and_column_has_as_many_pixels() {
-        let whole = Crop { column: 0, row: 0, width: 1024, height: 1024 };
+        let whole = Crop { column: 0, row: 0, width: 512, height: 512 };
         let counts = |grid: PixelGrid, of: fn(usize) -> usize| {
-            let mut counts = [0; 1024];
+            let mut counts = [0; 512];
             grid.places(whole).for_each(|place| counts[of(place)] += 1);
             counts
         };
-        let grid = PixelGrid::of((1024, 1024));
-        assert_eq!(counts(grid, |place| place / 1024), [16; 1024]);
-        assert_eq!(counts(grid, |place| place % 1024), [16; 1024]);
-        let even = counts(PixelGrid { shift: 0, ..grid }, |place| place / 1024);
-        assert_eq!(even[..9], [128, 0, 0, 0, 0, 0, 0, 0, 128], "control: cells without a shift");
+        let grid = PixelGrid::of((512, 512));
+        assert_eq!(counts(grid, |place| place / 512), [8; 512]);
+        assert_eq!(counts(grid, |place| place % 512), [8; 512]);
+        let even = counts(PixelGrid { shift: 0, ..grid }, |place| place / 512);
+        assert_eq!(even[..9], [64, 0, 0, 0, 0, 0, 0, 0, 64], "control: cells without a shift");
     }
 
     #[test]
