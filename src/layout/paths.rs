@@ -73,13 +73,15 @@ pub struct Counters {
     pub shadow_rays: u32,
     /// Half of the queues that the current bounce reads: 0 or 1. It writes the other one.
     pub reads: u32,
+    /// Rays of the last bounce beyond the first of each path.
+    pub further_rays: u32,
 }
 
 impl Counters {
     /// Rays traced.
     #[must_use]
     pub fn all_rays(&self) -> u64 {
-        u64::from(self.rays) | (u64::from(self.rays_high) << 32)
+        (u64::from(self.rays) | (u64::from(self.rays_high) << 32)) + u64::from(self.further_rays)
     }
 
     /// Flux lost to the bounce limit, in the unit of [`Self::lost`].

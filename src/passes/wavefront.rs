@@ -14,7 +14,7 @@ use crate::{
 /// before it. After each, the host checks whether any path is left: mostly there is none after a
 /// few surfaces, and a dispatch costs something even if it finds nothing to do.
 const FIRST_SURFACES: u32 = 8;
-const SURFACES_PER_SUBMISSION: u32 = 32;
+const SURFACES_PER_SUBMISSION: u32 = 16;
 
 /// Living paths, two queues of their slots, and their counters.
 #[derive(Debug)]
