@@ -30,6 +30,8 @@ const _: () = assert!(PACKET == 4);
 /// the other blocks start from their radii.
 const STRIDES: [u32; 3] = [layout::FIRST_PILOT_STRIDE, layout::PILOT_STRIDE, 1];
 
+/// Lists of surveyed queries, each with a word for the number of its own.
+const SURVEY_LISTS: u64 = 2;
 /// Rays that measure the existing area of a partly covered disc.
 const SURVEY_SAMPLES: usize = 24;
 
@@ -89,6 +91,8 @@ struct Scratch {
     states: Buffer,
     sums: Buffer,
     open: Buffer,
+    /// Lists of the queries that the second and the third kernel of the survey go on with.
+    listed: Buffer,
 }
 
 impl<'s> Gather<'s> {
@@ -208,6 +212,7 @@ impl<'s> Gather<'s> {
             ("entries", entries),
             ("states", &scratch.states),
             ("open_count", &scratch.open),
+            ("listed", &scratch.listed),
             ("sums_left", &scratch.sums),
             ("radii", radii),
             ("radiance", radiance),
@@ -238,6 +243,7 @@ impl<'s> Gather<'s> {
                 let packets = packets.div_ceil(BLOCK).div_ceil(stride.into()) * BLOCK;
                 search.dispatch(&mut encoder, bindings, packets);
             }
+            encoder.clear_buffer(&scratch.listed, 0, Some(SURVEY_LISTS * size_of::<u32>() as u64));
             for (survey, bindings) in survey.iter().flatten() {
                 survey.dispatch(&mut encoder, bindings, waiting.into());
             }
@@ -270,6 +276,7 @@ impl Scratch {
             states: gpu.storage::<[u8; SEARCH_STATE_BYTES]>("search states", packets * u64::from(PACKET))?,
             sums: gpu.storage::<[u8; GATHER_STATE_BYTES]>("unfinished sums", packets)?,
             open: gpu.storage::<u32>("open packets", 1)?,
+            listed: gpu.storage::<u32>("surveyed queries", SURVEY_LISTS * (1 + u64::from(capacity)))?,
         })
     }
 }

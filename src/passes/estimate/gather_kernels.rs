@@ -1,5 +1,5 @@
 //! Kernels of the search and the sum, and what they are compiled for. Kernels: `search_radius`,
-//! `survey_surface`, `survey_narrow`, `gather`, `finish_gather`.
+//! `survey_surface`, `survey_area`, `survey_narrow`, `gather`, `finish_gather`.
 
 use crate::{
     density::Polynomial,
@@ -72,7 +72,7 @@ impl Variant {
 #[derive(Debug)]
 pub(super) struct Compiled {
     pub(super) search: Kernel,
-    pub(super) survey: Option<[Kernel; 2]>,
+    pub(super) survey: Option<[Kernel; 3]>,
     pub(super) sum: Kernel,
     pub(super) finish: Kernel,
 }
@@ -110,7 +110,7 @@ impl<'s> GatherKernels<'s> {
         let kernel = |stem| Kernel::new(gpu, stem, &overrides);
         let with_budget = [overrides.as_slice(), &[("TRACE_BUDGET", SURVEY_TRACE_BUDGET.into())]].concat();
         let survey = |scene: &SceneBuffers| {
-            ["survey_surface", "survey_narrow"].map(|stem| scene.kernel_with(gpu, stem, &with_budget))
+            ["survey_surface", "survey_area", "survey_narrow"].map(|stem| scene.kernel_with(gpu, stem, &with_budget))
         };
         let compiled = Compiled {
             search: kernel("search_radius"),
