@@ -145,19 +145,19 @@ impl LightNode {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DirectLight {
     pub light: u32,
-    pub points: u32,
     pub pad0: u32,
     pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// Arguments of `sample_emitters`: one sample of each point.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct EmitterSample {
-    pub points: u32,
     /// Index of the sample, and number of samples per point.
     pub sample: u32,
     pub samples: u32,
     /// Number of trees of lights that are sampled.
     pub roots: u32,
+    pub pad: u32,
 }

@@ -1,11 +1,11 @@
 //! The wavefront: one dispatch advances every living path by one surface, and the queue of living
 //! paths is compacted between dispatches. It traces photons, camera paths and rays of final
-//! gathering. Kernel: `advance_queue`.
+//! gathering, and lights points. Kernels: `advance_queue`, `queue_points`.
 
 use super::lists::Lists;
 use crate::{
     error::Result,
-    gpu::{Buffer, Gpu, Kernel},
+    gpu::{Bindings, Buffer, Commands, Gpu, Kernel},
     layout::{Counters, Path},
     upload::SceneBuffers,
 };
@@ -15,10 +15,13 @@ use crate::{
 /// few surfaces, and a dispatch costs something even if it finds nothing to do.
 const FIRST_SURFACES: u32 = 8;
 const SURFACES_PER_SUBMISSION: u32 = 16;
+/// Entries that a queue has room for at least.
+pub const LEAST_QUEUE: u64 = 1 << 16;
 
 /// Living paths, two queues of their slots, and their counters.
 #[derive(Debug)]
 pub struct Wavefront {
+    queue_points: Kernel,
     advance: Kernel,
     /// [`Path`] per slot.
     pub paths: Buffer,
@@ -46,9 +49,10 @@ impl Wavefront {
     /// Limits of the adapter.
     pub fn new(gpu: &Gpu, scene: &SceneBuffers, name: &str, (slots, pixels): (u64, u64), keys: u64) -> Result<Self> {
         Ok(Self {
+            queue_points: Kernel::new(gpu, "queue_points", &[]),
             advance: Kernel::new(gpu, "advance_queue", &[]),
             paths: gpu.storage::<Path>(&format!("{name} paths"), slots)?,
-            queues: gpu.storage::<u32>(&format!("{name} queues"), 2 * slots)?,
+            queues: gpu.storage::<u32>(&format!("{name} queues"), 2 * slots.max(LEAST_QUEUE))?,
             counters: gpu.storage::<Counters>(&format!("{name} counters"), 1)?,
             dispatch_arguments: gpu.storage::<[u32; 3]>(&format!("{name} dispatch arguments"), 1)?,
             lists: Lists::new(gpu, scene, slots, (pixels, keys))?,
@@ -84,7 +88,7 @@ impl Wavefront {
             for _ in 0..most.min(until - surfaces) {
                 self.advance.dispatch(&mut encoder, &advance, 1);
                 for (kernel, bindings) in &bound {
-                    kernel.dispatch_indirect(&mut encoder, bindings, &self.dispatch_arguments, most_paths);
+                    self.dispatch(&mut encoder, (kernel, bindings), most_paths);
                 }
                 surfaces += 1;
             }
@@ -102,6 +106,28 @@ impl Wavefront {
             }
             encoder = gpu.encoder();
         }
+    }
+
+    /// Makes the visible points of the first `count` slots of a buffer the queue that
+    /// [`Self::dispatch`] reads, and clears the counters.
+    pub fn queue_points(&self, gpu: &Gpu, commands: &mut Commands, points: &Buffer, count: u32) {
+        let span = gpu.uniform("points to queue", &[count, 0, 0, 0]);
+        let buffers = [("span", &span), ("points", points), ("queues", &self.queues), ("counters", &self.counters)];
+        commands.clear_buffer(&self.counters, 0, None);
+        self.queue_points.dispatch(commands, &self.queue_points.bind(gpu, &buffers), count.into());
+        let advanced = [("counters", &self.counters), ("dispatch_arguments", &self.dispatch_arguments)];
+        self.advance.dispatch(commands, &self.advance.bind(gpu, &advanced), 1);
+    }
+
+    /// Runs a kernel for each entry of the queue, of which there are at most `most`.
+    pub fn dispatch(&self, commands: &mut Commands, (kernel, bindings): (&Kernel, &Bindings), most: u64) {
+        kernel.dispatch_indirect(commands, bindings, &self.dispatch_arguments, most);
+    }
+
+    /// The binding of kernels that read the queue.
+    #[must_use]
+    pub fn queues(&self) -> (&str, &Buffer) {
+        ("queues", &self.queues)
     }
 
     /// Buffers by name.

@@ -5,13 +5,13 @@ use super::{tally, tiles::CameraPass};
 use crate::{
     error::Result,
     layout::VisiblePoint,
-    passes::{BrightPlaces, IrradianceCache, RayEnd, StepCount},
+    passes::{BrightPlaces, IrradianceCache, RayEnd, StepCount, wavefront::LEAST_QUEUE},
     progress::{Progress, Stage},
     stats::{Stats, timed},
 };
 
 /// Ends of the preview's rays at most by whose light bright places are found.
-const LIT_ENDS: usize = 1 << 16;
+const LIT_ENDS: usize = LEAST_QUEUE as usize;
 
 /// A point whose radiance is its irradiance.
 pub fn bare(point: &VisiblePoint) -> VisiblePoint {

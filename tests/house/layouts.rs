@@ -69,8 +69,8 @@ fn twins() -> Vec<Twin> {
         RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, footprint }
         IrradianceCell { coordinates, level, position, split, normal, pad0, irradiance, pad1 }
         FirstHit { normal, depth, albedo, alpha, position, id, uv, instance, material }
-        DirectLight { light, points, pad0, pad1 }
-        EmitterSample { points, sample, samples, roots }
+        DirectLight { light, pad0, pad1, pad2 }
+        EmitterSample { sample, samples, roots, pad }
         Cell { lo, wi_lo, hi, wi_hi }
         PhotonPosition { position, wi }
         PhotonFlux { flux, normal }

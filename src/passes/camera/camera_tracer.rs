@@ -314,27 +314,30 @@ impl CameraTracer {
     ) -> Result<StepCount> {
         let uniform = gpu.uniform("camera tile", view);
         let (counters, lists) = (("counters", &self.wavefront.counters), &self.wavefront.lists);
-        let buffers = [("tile", &uniform), ("points", points), ("radiance", radiance), counters, lists.binding()];
-        let (steps, points) = (direct.steps(scene), count);
-        let mut count = StepCount::default();
+        let queues = self.wavefront.queues();
+        let buffers =
+            [("tile", &uniform), ("points", points), ("radiance", radiance), counters, queues, lists.binding()];
+        let steps = direct.steps(scene);
+        let mut done = StepCount::default();
         let at_once = if scene.has_late_rays(gpu) { 1 } else { DIRECT_STEPS_PER_READ };
         for first in (0..steps).step_by(at_once as usize) {
             let mut encoder = gpu.encoder();
-            encoder.clear_buffer(&self.wavefront.counters, 0, None);
+            self.wavefront.queue_points(gpu, &mut encoder, points, count);
             for step in first..steps.min(first + at_once) {
-                direct.add(gpu, scene, &mut encoder, (step, points), &buffers);
+                let (kernel, bindings) = direct.step(gpu, scene, step, &buffers);
+                self.wavefront.dispatch(&mut encoder, (kernel, &bindings), count.into());
             }
             gpu.submit(encoder);
             let mut counters: Counters = gpu.read(&self.wavefront.counters, 0, 1)?[0];
             if counters.unfinished > 0 {
-                let kernel = direct.late(gpu, scene, (first, points), &buffers);
+                let kernel = direct.late(gpu, scene, first, &buffers);
                 let given_up = lists.finish(gpu, &self.wavefront.counters, counters.unfinished, &[kernel])?;
                 counters = gpu.read(&self.wavefront.counters, 0, 1)?[0];
                 counters.unfinished = given_up;
             }
-            count += StepCount { rays: u64::from(counters.shadow_rays), ..StepCount::from(counters) };
+            done += StepCount { rays: u64::from(counters.shadow_rays), ..StepCount::from(counters) };
         }
-        Ok(count)
+        Ok(done)
     }
 
     /// Sums over the tile's samples, for each of its pixels.

@@ -2,7 +2,7 @@
 //! other lights.
 
 use crate::{
-    gpu::{Bindings, Buffer, Commands, Gpu, Kernel},
+    gpu::{Bindings, Buffer, Gpu, Kernel},
     layout::{DirectLight, EmitterSample},
     passes::lists::Lists,
     settings::Sampler,
@@ -32,45 +32,31 @@ impl DirectLighting {
         scene.lights.table.summed.len() as u32 + self.sampled.as_ref().map_or(0, |(_, samples)| *samples)
     }
 
-    /// Adds the direct light of one step to the radiance of the points. `buffers` are `tile`,
-    /// `points`, `radiance`, `counters` and `lists`.
-    pub fn add(
-        &self,
-        gpu: &Gpu,
-        scene: &SceneBuffers,
-        commands: &mut Commands,
-        (step, points): (u32, u32),
-        buffers: &[(&str, &Buffer)],
-    ) {
-        let (kernel, uniform) = self.step(gpu, scene, (step, points));
-        let bindings = kernel.bind(gpu, &[&scene.with(buffers)[..], &[(uniform.0, &uniform.1)]].concat());
-        kernel.dispatch(commands, &bindings, u64::from(points));
+    /// The kernel of a step, which adds direct light to the radiance of the points in the queue.
+    /// `buffers` are `tile`, `points`, `radiance`, `counters`, `queues` and `lists`.
+    pub fn step(&self, gpu: &Gpu, scene: &SceneBuffers, step: u32, buffers: &[(&str, &Buffer)]) -> (&Kernel, Bindings) {
+        let (kernel, uniform) = self.kernel(gpu, scene, step);
+        (kernel, kernel.bind(gpu, &[&scene.with(buffers)[..], &[(uniform.0, &uniform.1)]].concat()))
     }
 
     /// The kernel of a step that goes on with late rays.
-    pub fn late(
-        &self,
-        gpu: &Gpu,
-        scene: &SceneBuffers,
-        (step, points): (u32, u32),
-        buffers: &[(&str, &Buffer)],
-    ) -> (Kernel, Bindings) {
-        let (kernel, uniform) = self.step(gpu, scene, (step, points));
+    pub fn late(&self, gpu: &Gpu, scene: &SceneBuffers, step: u32, buffers: &[(&str, &Buffer)]) -> (Kernel, Bindings) {
+        let (kernel, uniform) = self.kernel(gpu, scene, step);
         Lists::kernel(gpu, kernel, &[&scene.with(buffers)[..], &[(uniform.0, &uniform.1)]].concat())
     }
 
     /// The kernel of a step, and its uniform by name.
-    fn step(&self, gpu: &Gpu, scene: &SceneBuffers, (step, points): (u32, u32)) -> (&Kernel, (&'static str, Buffer)) {
+    fn kernel(&self, gpu: &Gpu, scene: &SceneBuffers, step: u32) -> (&Kernel, (&'static str, Buffer)) {
         let table = &scene.lights.table;
         match (table.summed.get(step as usize), &self.sampled) {
             (None, Some((kernel, samples))) => {
                 let (sample, samples, roots) = (step - table.summed.len() as u32, *samples, table.sampled_roots);
-                let sampling = EmitterSample { points, sample, samples, roots };
+                let sampling = EmitterSample { sample, samples, roots, pad: 0 };
                 (kernel, ("sampling", gpu.uniform("emitter sample", &sampling)))
             }
             (light, _) => {
                 let light = *light.expect("one of the steps");
-                let direct = DirectLight { light, points, ..Default::default() };
+                let direct = DirectLight { light, ..Default::default() };
                 (&self.punctual, ("direct", gpu.uniform("direct light", &direct)))
             }
         }
