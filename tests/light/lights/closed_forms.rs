@@ -7,6 +7,7 @@
 //! | uniform sky | E = π L on an open floor | 2 % stronger |
 //! | square emitter | Lambert's formula for polygons, facing and askew | the back side; an emitter 5 cm higher |
 //! | spherical emitter | E = π L (r/d)² cos θ | 2 % larger |
+//! | small lamp | the same far from a small lamp amid a wide scene, of each shape | a lamp 2 % stronger |
 //! | furnace | closed objects of albedo 1 in radiance L look L | albedo 0.9 |
 //! | bright pixel | E = the sum over the map; the camera sees it in its direction | the map rotated by 20° |
 
@@ -218,6 +219,48 @@ fn a_spherical_emitter_gives_what_its_solid_angle_says() {
     let right = PI * 2.0 * 4.0 * PI * 0.64;
     assert!(within(flux(0.8), right, 1e-3), "photons: {} W instead of {right} W", flux(0.8));
     assert!(!within(flux(0.801), right, 1e-3), "control: photons of a bulb 1 mm larger pass");
+}
+
+/// A lamp of 6 cm at the origin, in the middle of the scene: 1 m above a ground of 200 m, below a roof
+/// at the height of the lamp's mirror image.
+fn small_lamp(add: impl Fn(&mut Scene), radiance: f32) -> Scene {
+    let mut scene = floor(100.0);
+    for triangle in &mut scene.triangles {
+        triangle.positions = triangle.positions.map(|corner| corner - Vec3::Y);
+    }
+    scene.materials.push(emissive("lamp", 0.0, radiance, false));
+    add(&mut scene);
+    add_quad(&mut scene, vec3(99.0, 1.0, -99.0), Vec3::X, Vec3::Z, 0);
+    scene
+}
+
+#[test]
+fn small_lamps_amid_wide_scenes_light_what_is_far() {
+    let ball = |scene: &mut Scene| scene.spheres.push(sphere(Vec3::ZERO, 0.03, 1));
+    let square =
+        |scene: &mut Scene| add_quad(scene, vec3(-0.03, 0.0, -0.03), vec3(0.06, 0.0, 0.0), vec3(0.0, 0.0, 0.06), 1);
+    let upright =
+        |scene: &mut Scene| add_quad(scene, vec3(0.0, -0.03, 0.03), vec3(0.0, 0.0, -0.06), vec3(0.0, 0.06, 0.0), 1);
+    let cube = |scene: &mut Scene| add_box(scene, Vec3::splat(-0.03), Vec3::splat(0.03), 1);
+    for x in [10.0_f32, 80.0] {
+        let (point, d) = (vec3(x, -1.0, 0.0), f64::from(x * x + 1.0).sqrt());
+        // Cosines at the ground and at the faces that look down and sideways.
+        let (down, aside) = (1.0 / d, f64::from(x) / d);
+        let face = 0.0036 / (d * d);
+        let lamps: [(&str, &dyn Fn(&mut Scene), f64); 4] = [
+            ("ball", &ball, PI * 0.0009 / (d * d) * down),
+            ("square", &square, face * down * down),
+            ("upright square", &upright, face * aside * down),
+            ("cube", &cube, face * (down + aside) * down),
+        ];
+        for (name, add, right) in lamps {
+            let measured =
+                |radiance| irradiance_at(&small_lamp(add, radiance), point + vec3(0.0, 0.5, 0.001), point, 16);
+            let found = measured(1.0);
+            assert!(within(found, right, 0.005), "{name} at {x} m: {found} instead of {right}");
+            assert!(!within(measured(1.02), right, 0.005), "control: a {name} 2 % stronger passes at {x} m");
+        }
+    }
 }
 
 #[test]
