@@ -221,8 +221,8 @@ fn a_spherical_emitter_gives_what_its_solid_angle_says() {
     assert!(!within(flux(0.801), right, 1e-3), "control: photons of a bulb 1 mm larger pass");
 }
 
-/// A lamp of 6 cm at the origin, in the middle of the scene: 1 m above a ground of 200 m, below a roof
-/// at the height of the lamp's mirror image.
+/// A lamp of 6 cm at the origin, in the middle of the scene: 1 m above a ground of 200 m, below a
+/// roof at the height of the lamp's mirror image.
 fn small_lamp(add: impl Fn(&mut Scene), radiance: f32) -> Scene {
     let mut scene = floor(100.0);
     for triangle in &mut scene.triangles {
