@@ -208,13 +208,15 @@ pub struct BrightPatch {
     pub power: f32,
 }
 
-/// Sums over the rays of final gathering of a point, by the directions from which light arrives.
+/// Sums over the rays of final gathering of a point, by the directions from which light of each
+/// colour arrives.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ArrivingLight {
     /// Directions weighted by radiance, and 1 by irradiance.
-    pub direction: [f32; 3],
-    pub light: f32,
+    pub red: [f32; 4],
+    pub green: [f32; 4],
+    pub blue: [f32; 4],
     /// Inverse distances to what was hit, 1/m.
     pub nearness: f32,
     pub pad0: f32,

@@ -29,10 +29,14 @@ pub struct IrradianceRecord {
     pub ng: u32,
     /// By that normal, W/m²; negative: no point.
     pub irradiance: [f32; 3],
-    /// Eight bits each, signed and normalised: the vector ∫ L ω dω along the surface, over twice
-    /// the irradiance; and the fraction of the filter's radius up to which the record is taken.
-    pub direction_and_reach: u32,
+    /// Eight bits each, signed and normalised: the vector ∫ L ω dω of red along the surface, over
+    /// twice the irradiance; and the fraction of the filter's radius up to which the record is
+    /// taken.
+    pub red_and_reach: u32,
 }
+
+/// The vectors of an [`IrradianceRecord`] for green and blue.
+pub type GreenAndBlue = [u32; 2];
 
 /// Arguments of `filter_irradiance`: records by rows of a grid that is coarser than the picture,
 /// each pixel of it with as many slots as a camera sample has branches.

@@ -8,6 +8,7 @@
 //! | passes from the second on: a contact shadow | the same | the reach of the first pass |
 //! | a part of a picture of 4096 x 4096 | the same | the same |
 //! | a floor whose interpolated normals lean | the same | the floor without them |
+//! | a floor whose normals lean towards a red wall, opposite a blue one | the same, red over blue | the floor without them |
 //! | a wall of rough metal | estimates at all that it shows, in place of cells | smooth metal has the same bits without cells |
 //! | a crop | the bits of the whole | another seed |
 
@@ -280,6 +281,37 @@ fn leaning_normals_take_light_from_their_side() {
         let (right, found) = (of(&floor(lean), &converged(128)), of(&floor(lean), &gathering(32, 2)));
         assert!(within(found, right, 0.06), "{lean}: {found} instead of {right}");
         assert!(!matters || !within(flat, right, 0.15), "control: {flat} without them instead of {right}");
+    }
+}
+
+#[test]
+fn each_color_comes_from_its_own_side() {
+    let floor = |lean: f32| {
+        with(|s| {
+            s.cameras = vec![camera(vec3(0.0, 0.6, 0.001), vec3(0.0, -1.0, 0.0), 50.0)];
+            s.lights[0].position = vec3(0.0, 0.7, 0.0);
+            for (side, albedo) in [(-1.0_f32, vec3(0.8, 0.1, 0.1)), (1.0, vec3(0.1, 0.1, 0.8))] {
+                s.materials.push(Material::new("wall", Surface::Diffuse { albedo }));
+                let wall = s.materials.len() as u32 - 1;
+                add_quad(s, vec3(0.98 * side, -1.0, side), -2.0 * side * Vec3::Z, 2.0 * Vec3::Y, wall);
+            }
+            let first = s.triangles.len();
+            add_quad(s, vec3(-0.8, -0.95, 0.9), vec3(1.6, 0.0, 0.0), vec3(0.0, 0.0, -1.8), MATT);
+            let normal = vec3(lean, 1.0, 0.0).normalize();
+            s.triangles[first..].iter_mut().for_each(|t| t.normals = [normal; 3]);
+        })
+    };
+    let red_over_blue = |lean: f32, settings: &Settings| {
+        let picture = render_scene(&floor(lean), settings);
+        let sum = |channel: usize| picture.frame.radiance().iter().map(|p| f64::from(p[channel])).sum::<f64>();
+        sum(0) / sum(2)
+    };
+    let flat = red_over_blue(0.0, &gathering(32, 2));
+    for lean in [-0.6, 0.6] {
+        let right = red_over_blue(lean, &converged(128));
+        let found = red_over_blue(lean, &gathering(32, 2));
+        assert!(within(found, right, 0.02), "{lean}: {found} instead of {right}");
+        assert!(!within(flat, right, 0.06), "control: {flat} without them instead of {right}");
     }
 }
 

@@ -6,7 +6,7 @@ use glam::Vec3;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{ArrivingLight, CameraTile, IrradianceRecord, RecordGrid, VisiblePoint, octahedral},
+    layout::{ArrivingLight, CameraTile, GreenAndBlue, IrradianceRecord, RecordGrid, VisiblePoint, octahedral},
 };
 
 /// Pixels of the record grid on each side of a point among which the filter looks for records at
@@ -22,7 +22,7 @@ pub fn filter_footprint(radius: f32, spacing: u32) -> u32 {
 
 /// A slot without a point.
 const NO_RECORD: IrradianceRecord =
-    IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], direction_and_reach: 0 };
+    IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], red_and_reach: 0 };
 
 /// Slots of records of a picture at most: 128 MiB, which all adapters bind.
 const MAX_RECORDS: u64 = 1 << 22;
@@ -45,6 +45,7 @@ pub struct Records {
     columns: usize,
     branches: usize,
     records: Vec<IrradianceRecord>,
+    green_and_blue: Vec<GreenAndBlue>,
     /// Harmonic mean distance of each point to what is around it, metres.
     distances: Vec<f32>,
 }
@@ -55,7 +56,13 @@ impl Records {
     pub fn new((columns, rows): (u32, u32), branches: u32) -> Self {
         let slots = columns as usize * rows as usize * branches as usize;
         let (columns, branches) = (columns as usize, branches as usize);
-        Self { columns, branches, records: vec![NO_RECORD; slots], distances: vec![f32::INFINITY; slots] }
+        Self {
+            columns,
+            branches,
+            records: vec![NO_RECORD; slots],
+            green_and_blue: vec![[0; 2]; slots],
+            distances: vec![f32::INFINITY; slots],
+        }
     }
 
     /// Takes the light that `rays` brought to a point, for a pixel of the grid and a branch of its
@@ -70,31 +77,36 @@ impl Records {
         rays: u32,
     ) {
         let slot = (row as usize * self.columns + column as usize) * self.branches + branch;
-        let (all, normal) = (Vec3::from(arriving.direction), Vec3::from(point.ng));
-        let along = (all - normal * all.dot(normal)) / (2.0 * arriving.light.max(f32::MIN_POSITIVE));
-        let along = along.clamp_length_max(1.0).to_array();
+        let normal = Vec3::from(point.ng);
+        let along = |[x, y, z, light]: [f32; 4]| {
+            let all = Vec3::new(x, y, z);
+            let along = (all - normal * all.dot(normal)) / (2.0 * light.max(f32::MIN_POSITIVE));
+            along.clamp_length_max(1.0).to_array().iter().rev().fold(0, |word, x| word << 8 | snorm8(*x))
+        };
         self.records[slot] = IrradianceRecord {
             position: point.position,
             ng: octahedral(point.ng.into()),
             irradiance: [light[0], light[1], light[2]],
-            direction_and_reach: along.iter().rev().fold(0, |word, x| word << 8 | snorm8(*x)),
+            red_and_reach: along(arriving.red),
         };
+        self.green_and_blue[slot] = [along(arriving.green), along(arriving.blue)];
         self.distances[slot] = rays as f32 / arriving.nearness;
     }
 
     /// All records, with their reach: that fraction of the distance to what is around each.
     /// `radius`: that of the filter at a position, metres.
     #[must_use]
-    pub fn finish(mut self, fraction: f32, radius: impl Fn(Vec3) -> f32) -> Vec<IrradianceRecord> {
+    pub fn finish(mut self, fraction: f32, radius: impl Fn(Vec3) -> f32) -> (Vec<IrradianceRecord>, Vec<GreenAndBlue>) {
         for slot in 0..self.records.len() {
             let distance = self.distance(slot);
             let record = &mut self.records[slot];
             let reach = fraction * distance / radius(record.position.into());
-            record.direction_and_reach |= snorm8(reach.clamp(1.0 / 127.0, 1.0)) << 24;
+            record.red_and_reach |= snorm8(reach.clamp(1.0 / 127.0, 1.0)) << 24;
         }
         // All that lies beyond the grid has the slot behind all others.
         self.records.push(NO_RECORD);
-        self.records
+        self.green_and_blue.push([0; 2]);
+        (self.records, self.green_and_blue)
     }
 
     /// Distance to what is around a record. It is no farther away than from a neighbour by way of
@@ -125,6 +137,7 @@ fn snorm8(x: f32) -> u32 {
 pub struct IrradianceRecords {
     kernel: Kernel,
     records: Buffer,
+    green_and_blue: Buffer,
     grid: RecordGrid,
 }
 
@@ -133,9 +146,14 @@ impl IrradianceRecords {
     ///
     /// # Errors
     /// Limits of the adapter.
-    pub fn new(gpu: &Gpu, records: &[IrradianceRecord], grid: RecordGrid) -> Result<Self> {
+    pub fn new(
+        gpu: &Gpu,
+        (records, green_and_blue): &(Vec<IrradianceRecord>, Vec<GreenAndBlue>),
+        grid: RecordGrid,
+    ) -> Result<Self> {
         let records = gpu.storage_with("irradiance records", records)?;
-        Ok(Self { kernel: Kernel::new(gpu, "filter_irradiance", &[]), records, grid })
+        let green_and_blue = gpu.storage_with("directions of irradiance records", green_and_blue)?;
+        Ok(Self { kernel: Kernel::new(gpu, "filter_irradiance", &[]), records, green_and_blue, grid })
     }
 
     /// Has the kernel compiled ahead of its use.
@@ -153,6 +171,7 @@ impl IrradianceRecords {
             ("tile", &tile),
             ("record_grid", &grid),
             ("records", &self.records),
+            ("green_and_blue", &self.green_and_blue),
             ("points", points),
             ("radiance", radiance),
             ("lists", lists),
@@ -171,13 +190,13 @@ mod tests {
     fn neighbours_are_in_the_next_column() {
         let reach = |near: (u32, u32)| {
             let mut records = Records::new((4, 2), 1);
-            let light = |nearness: f32| ArrivingLight { light: 1.0, nearness, ..Default::default() };
+            let light = |nearness: f32| ArrivingLight { nearness, ..Default::default() };
             for (place, nearness) in [((0, 1), 1.0), (near, 100.0)] {
                 let point = VisiblePoint { ng: [0.0, 1.0, 0.0], ..Default::default() };
                 records.put(place, 0, &point, [1.0; 4], &light(nearness), 1);
             }
             // What is near at one limits the other: the distance is 1.5 units, or a hundredth.
-            records.finish(1.5, |_| 3.0)[4].direction_and_reach >> 24
+            records.finish(1.5, |_| 3.0).0[4].red_and_reach >> 24
         };
         assert_eq!(reach((1, 0)), snorm8(0.01), "above and beside it");
         assert_eq!(reach((3, 0)), snorm8(0.5), "control: the end of the row before");
