@@ -28,6 +28,9 @@ use crate::{
     settings::{LightSampling, LightSettings, LightUnit},
 };
 
+/// Mean of what a clear coat takes of emission, by the cosine: Schlick's formula from 0.04 on.
+const MEAN_CLEARCOAT: f64 = 0.04 + 0.96 / 21.0;
+
 /// Least fraction that paths take of what a subtriangle would emit if nothing darkened it: its
 /// mean may miss what is bright between the points by which it is taken.
 const MIN_FRACTION: f64 = 1.0 / 64.0;
@@ -274,6 +277,7 @@ impl LightTable {
             self.start_named(&material.name, "surface");
             let emission = emission_in(material.emission, unit);
             let solid_angle = if material.double_sided { TAU } else { PI };
+            let clearcoat = if material.unlit { 0.0 } else { material.clearcoat };
             let first = self.lights.len();
             for primitive in primitives {
                 let own = self.lights.len() as u32;
@@ -282,8 +286,9 @@ impl LightTable {
                 let sent = if hidden.get(primitive) == Some(&true) { 0.5 } else { 1.0 };
                 let sent_angle = sent * solid_angle;
                 for SurfaceLight { light, emitted } in surfaces.of(primitive) {
-                    let power = emission.as_dvec3() * f64::from(light.area) * solid_angle;
-                    let light = layout::Light { emission: emission.to_array(), ..light };
+                    let kept = 1.0 - f64::from(clearcoat) * MEAN_CLEARCOAT;
+                    let power = emission.as_dvec3() * f64::from(light.area) * solid_angle * kept;
+                    let light = layout::Light { emission: emission.to_array(), clearcoat, ..light };
                     self.add(layout::Light { solid_angle: sent_angle as f32, ..light }, power * emitted.mean);
                     let own_power = self.powers.last_mut();
                     own_power.into_iter().for_each(|power| *power *= sent);

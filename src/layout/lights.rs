@@ -60,8 +60,9 @@ pub struct Light {
     /// Index of its leaf among the [`LightNode`]s, or [`NO_LEAF`], and of the root of its tree.
     pub leaf: u32,
     pub root: u32,
-    pub pad0: u32,
-    pub pad1: u32,
+    /// Strength of the clear coat on a surface, which takes a part of its emission.
+    pub clearcoat: f32,
+    pub pad: u32,
 }
 
 /// Set in [`Light::subtriangle`] for one that is turned by half a turn against its triangle.

@@ -47,7 +47,7 @@ fn twins() -> Vec<Twin> {
         TextureRecord { first, size, flags, levels, transform }
         Attributes { uvs, colors, tangents, pad }
         Medium { tint, ior, absorption, dispersion }
-        Light { position, kind, e1, named, e2, solid_angle, emission, area, media, back_media, material, attributes, subtriangle, side, leaf, root, pad0, pad1 }
+        Light { position, kind, e1, named, e2, solid_angle, emission, area, media, back_media, material, attributes, subtriangle, side, leaf, root, clearcoat, pad }
         LightNode { center, half, shine }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }

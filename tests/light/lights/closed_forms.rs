@@ -8,13 +8,14 @@
 //! | square emitter | Lambert's formula for polygons, facing and askew | the back side; an emitter 5 cm higher |
 //! | spherical emitter | E = π L (r/d)² cos θ | 2 % larger |
 //! | small lamp | the same far from a small lamp amid a wide scene, of each shape | a lamp 2 % stronger |
+//! | lamp under a clear coat | what its camera, its rays and its photons have is less by the coat's reflectance | half the coat |
 //! | furnace | closed objects of albedo 1 in radiance L look L | albedo 0.9 |
 //! | bright pixel | E = the sum over the map; the camera sees it in its direction | the map rotated by 20° |
 
 use std::f64::consts::PI;
 
 use caustica::{
-    scene::{Environment, Light, LightKind, Scene, Surface},
+    scene::{Environment, Light, LightKind, Material, Scene, Surface},
     settings::Mode,
 };
 use glam::{Vec3, vec3};
@@ -260,6 +261,51 @@ fn small_lamps_amid_wide_scenes_light_what_is_far() {
             assert!(within(found, right, 0.005), "{name} at {x} m: {found} instead of {right}");
             assert!(!within(measured(1.02), right, 0.005), "control: a {name} 2 % stronger passes at {x} m");
         }
+    }
+}
+
+#[test]
+fn a_clear_coat_takes_its_reflectance_from_emission() {
+    let fresnel = |cosine: f64| 0.04 + 0.96 * (1.0 - cosine).powi(5);
+    let lamp = |clearcoat: f32, add: &dyn Fn(&mut Scene)| {
+        let mut scene = floor(30.0);
+        scene.materials.push(Material { clearcoat, ..emissive("lamp", 0.0, 1.0, false) });
+        add(&mut scene);
+        scene
+    };
+    let ball = |scene: &mut Scene| scene.spheres.push(sphere(Vec3::Y, 0.02, 1));
+    let square =
+        |scene: &mut Scene| add_quad(scene, vec3(-0.01, 1.0, -0.01), vec3(0.02, 0.0, 0.0), vec3(0.0, 0.0, 0.02), 1);
+    for x in [0.5_f32, 2.0, 4.0] {
+        let (point, d2) = (vec3(x, 0.0, 0.0), f64::from(x * x + 1.0));
+        let cosine = 1.0 / d2.sqrt();
+        let seen = |clearcoat: f32| {
+            let mut scene = lamp(clearcoat, &square);
+            scene.cameras = vec![camera(point, Vec3::Y + vec3(0.001, 0.0, 0.0), 0.02)];
+            mean(&render_scene(&scene, &settings(Mode::DirectRays, 1, 4)))
+        };
+        let lit = |clearcoat: f32| irradiance_at(&lamp(clearcoat, &square), point + vec3(0.0, 0.5, 0.001), point, 64);
+        let forms = [("seen", seen(1.0), seen(0.5), 1.0), ("lit", lit(1.0), lit(0.5), 0.0004 * cosine * cosine / d2)];
+        for (what, found, control, bare) in forms {
+            let right = bare * (1.0 - fresnel(cosine));
+            assert!(within(found, right, 0.003), "{what} from {x} m: {found} instead of {right}");
+            assert!(!within(control, right, 0.01), "control: {what} under half the coat, {control}");
+        }
+    }
+    // The mean of the reflectance over the hemisphere, by the cosine: for photons, and for a ball
+    // at some distance.
+    let left = 1.0 - (0.04 + 0.96 / 21.0);
+    let far = |clearcoat: f32| irradiance_at(&lamp(clearcoat, &ball), vec3(0.0, 0.5, 0.001), Vec3::ZERO, 256);
+    let flux = |clearcoat: f32| {
+        let mut scene = lamp(clearcoat, &ball);
+        scene.spheres.push(sphere(Vec3::ZERO, 50.0, 0));
+        direct_flux(&scene, 40_000)
+    };
+    let forms =
+        [("a ball", far(1.0), far(0.5), PI * 0.0004), ("photons", flux(1.0), flux(0.5), PI * 4.0 * PI * 0.0004)];
+    for (what, found, control, bare) in forms {
+        assert!(within(found, bare * left, 0.003), "{what}: {found} instead of {}", bare * left);
+        assert!(!within(control, bare * left, 0.01), "control: {what} under half the coat, {control}");
     }
 }
 
