@@ -17,7 +17,7 @@ use super::{
     cumulative::{MAX_CHOICES, cumulative, probabilities},
     environment_map::EnvironmentMap,
     light_bounds::{LightBounds, strength},
-    light_tree::{DIRECTIONAL_ROOT, EMITTER_ROOT, EMITTER_ROOTS, LightTrees, PUNCTUAL_ROOT},
+    light_tree::{DIRECTIONAL_ROOT, EMITTER_ROOTS, LightTrees, PUNCTUAL_ROOT},
     surface_lights::{SurfaceLight, SurfaceLights},
     targets::{Target, aimed_fraction},
 };
@@ -119,7 +119,7 @@ impl LightTable {
             layout::POINT_LIGHT | layout::SPOT_LIGHT if sums_punctual => PUNCTUAL_ROOT,
             layout::DIRECTIONAL_LIGHT => DIRECTIONAL_ROOT,
             layout::ENVIRONMENT_LIGHT => layout::ENVIRONMENT_ROOT,
-            _ => EMITTER_ROOT,
+            _ => layout::EMITTER_ROOT,
         };
         self.sampled_roots = EMITTER_ROOTS + u32::from(!sums_directions);
         let is_summed = |light: &layout::Light| root(light) >= self.sampled_roots;

@@ -11,9 +11,7 @@ use crate::{
     scene::Bounds,
 };
 
-/// Roots besides that of the environment: of surfaces, with points and spots where these are many;
-/// of directional lights; of few points and spots.
-pub const EMITTER_ROOT: u32 = 1;
+/// Roots of directional lights, and of few points and spots.
 pub const DIRECTIONAL_ROOT: u32 = SUMMED_ROOT;
 pub const PUNCTUAL_ROOT: u32 = SUMMED_ROOT + 1;
 /// Number of trees from which visible points always choose, the first ones.
@@ -171,7 +169,7 @@ mod tests {
     use glam::vec3;
 
     use super::*;
-    use crate::layout::{Light, POINT_LIGHT, TRIANGLE_LIGHT};
+    use crate::layout::{EMITTER_ROOT, Light, POINT_LIGHT, TRIANGLE_LIGHT};
 
     fn light(position: Vec3, kind: u32) -> Light {
         let edges = [[0.01, 0.0, 0.02], [0.0, 0.03, 0.0]];

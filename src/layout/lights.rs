@@ -86,10 +86,12 @@ pub struct LightChoice {
     pub probability: f32,
 }
 
-/// Number of trees of lights, whose roots are the first [`LightNode`]s, and that of the environment
-/// among them; see `src/emitters/light_tree.rs`.
+/// Number of trees of lights, whose roots are the first [`LightNode`]s, and among them that of the
+/// environment and that of surfaces, with points and spots where these are many; see
+/// `src/emitters/light_tree.rs`.
 pub const LIGHT_ROOTS: u32 = 4;
 pub const ENVIRONMENT_ROOT: u32 = 0;
+pub const EMITTER_ROOT: u32 = 1;
 /// First root of the trees of lights that visible points sum where they are few: directional ones,
 /// then points and spots.
 pub const SUMMED_ROOT: u32 = 2;

@@ -172,6 +172,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         LIGHT_ROOTS,
         SUMMED_ROOT,
         ENVIRONMENT_ROOT,
+        EMITTER_ROOT,
         NO_LEAF,
         LEAF_BIT,
         IMPORTANCE_CHILDREN,
