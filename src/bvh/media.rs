@@ -8,25 +8,23 @@
 //! for both triangles of an edge. A path through edges or corners of a closed mesh therefore enters
 //! it as often as it leaves it.
 //!
-//! A cover, as the water of a pool, is a sheet and encloses nothing. What sees it from behind is in
-//! the water.
+//! A cover, as the water of a pool, is a sheet and encloses nothing. What sees its back before its
+//! front is in the water.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{Bvh, BvhChild, FILLER};
 use crate::{
     layout::{MEDIA_WORDS, Primitive},
-    scene::{Bounds, NO_SLOT, Scene, Solids, Triangle},
+    scene::{Bounds, NO_SLOT, Scene, Solids, Surfaces, Triangle},
 };
 
 /// Relative widening of boxes, which covers the rounding of their corners.
 const BOX_SLACK: f64 = 1e-6;
 
-/// Triangles of a cover that a point is tried to see, and surfaces that let light through in
-/// between at most.
-const VIEWS: usize = 32;
+/// Surfaces that let light through between a point and a cover at most.
 const MOST_BETWEEN: usize = 32;
 
 /// Set of the slots of [`Solids`] that contain a point: bit `i % 32` of word `i / 32` for slot `i`.
@@ -40,8 +38,8 @@ pub struct MediaProbe<'a> {
     solids: &'a Solids,
     /// Box around all solids but covers, metres.
     bounds: Bounds,
-    /// Slots of covers, and some of their triangles by their indices in the scene.
-    covers: Vec<(u32, Vec<usize>)>,
+    /// Slots of covers, and their surfaces.
+    covers: Vec<(u32, Surfaces<'a>)>,
 }
 
 /// Intersection of a line along an axis with the surface of a solid.
@@ -75,25 +73,20 @@ impl<'a> MediaProbe<'a> {
     #[must_use]
     pub fn at(&self, point: DVec3) -> Media {
         let mut media = self.around(point);
-        for (slot, triangles) in &self.covers {
-            let sees_it = triangles.iter().any(|triangle| self.sees_back(point, &self.scene.triangles[*triangle]));
-            media[*slot as usize / 32] |= u32::from(sees_it) << (slot % 32);
+        let point = point.as_vec3();
+        for (slot, sheet) in &self.covers {
+            let is_behind = sheet.side(point, |along, most| self.is_free(point, along, most)) > 0;
+            media[*slot as usize / 32] |= u32::from(is_behind) << (slot % 32);
         }
         media
     }
 
-    /// Whether a point sees the middle of a triangle from behind, through whatever lets light
-    /// through.
-    fn sees_back(&self, point: DVec3, triangle: &Triangle) -> bool {
-        let [a, b, c] = triangle.positions.map(Vec3::as_dvec3);
-        let to = (a + b + c) / 3.0 - point;
-        if to.dot((b - a).cross(c - a)) <= 0.0 {
-            return false;
-        }
-        let (mut from, along, length) = (point.as_vec3(), to.normalize().as_vec3(), to.length() as f32);
+    /// Whether light goes from a point up to a distance, through whatever lets it through.
+    fn is_free(&self, point: Vec3, along: Vec3, most: f32) -> bool {
+        let mut from = point;
         for _ in 0..MOST_BETWEEN {
             let Some(hit) = self.bvh.nearest_hit(from, along) else { return true };
-            if hit.position.as_dvec3().distance(point) as f32 >= length * (1.0 - 1e-4) {
+            if hit.position.distance(point) >= most {
                 return true;
             }
             if !self.scene.materials[hit.material as usize].surface.transmits() {
@@ -172,21 +165,14 @@ impl<'a> MediaProbe<'a> {
     }
 }
 
-/// The slots of covers, and triangles spread over each.
-fn covers(scene: &Scene, solids: &Solids) -> Vec<(u32, Vec<usize>)> {
-    let mut found: Vec<(u32, Vec<usize>)> = Vec::new();
-    let slots = (0..scene.triangles.len()).map(|i| (i, solids.slot(i as u32)));
-    for (i, slot) in slots.filter(|(_, slot)| solids.is_cover(*slot)) {
-        match found.iter_mut().find(|(known, _)| *known == slot) {
-            Some((_, triangles)) => triangles.push(i),
-            None => found.push((slot, vec![i])),
-        }
+/// The slots of covers, and the surfaces of each.
+fn covers<'a>(scene: &Scene, solids: &Solids) -> Vec<(u32, Surfaces<'a>)> {
+    let mut found: BTreeMap<u32, Vec<Triangle>> = BTreeMap::new();
+    let slots = scene.triangles.iter().zip(0..).map(|(triangle, i)| (triangle, solids.slot(i)));
+    for (triangle, slot) in slots.filter(|(_, slot)| solids.is_cover(*slot)) {
+        found.entry(slot).or_default().push(*triangle);
     }
-    let some = |triangles: Vec<usize>| {
-        let step = triangles.len().div_ceil(VIEWS).max(1);
-        triangles.into_iter().step_by(step).collect()
-    };
-    found.into_iter().map(|(slot, triangles)| (slot, some(triangles))).collect()
+    found.into_iter().map(|(slot, triangles)| (slot, Surfaces::new(triangles))).collect()
 }
 
 /// Media that a path along the axis, from infinity ahead or behind, has entered more often than

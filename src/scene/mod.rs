@@ -35,6 +35,6 @@ pub use light::{LUMENS_PER_WATT, Light, LightKind};
 pub use material::{Alpha, Material, Medium, SHARP_ROUGHNESS, Surface, Textures};
 pub(crate) use shape::vertex_bits;
 pub use shape::{Bounds, Sphere, Triangle};
-pub(crate) use solids::hidden_backs;
 pub use solids::{NO_SLOT, Solids};
+pub(crate) use solids::{Surfaces, hidden_backs};
 pub use texture::{Attributes, Image, Texture, UV_SETS, Wrap};

@@ -110,6 +110,11 @@ impl Bounds {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
+    /// Distance of a point from the box; 0 within.
+    pub(crate) fn distance(&self, point: Vec3) -> f32 {
+        point.distance(point.max(self.min).min(self.max))
+    }
+
     /// Distance at which a ray enters the box, if it meets it within reach; `direction` is a unit
     /// vector.
     pub(crate) fn entry(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<f32> {

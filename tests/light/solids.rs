@@ -5,7 +5,8 @@
 //! | furnaces | nothing absorbs: in radiance 1 from all around every pixel is 1 | glass that absorbs, a path limit |
 //! | plate on water, photons | three interfaces with all reflections between them | without the water |
 //! | blocks | two blocks that share a face are one block | a gap between them |
-//! | bubble | an ior-1 ball in glass is a cavity | solid |
+//! | bubble | an ior-1 ball in glass is a cavity, in an exact sphere too | solid |
+//! | film | thinner than rounding it reflects as a slab | two of them |
 //! | turned, doubled | the picture of the clean ball | another index |
 //! | chains | a cut diamond loses nothing | |
 //! | far away | thin glass far from the origin lets all light through | |
@@ -105,6 +106,8 @@ fn meshes_that_are_no_clean_solids_are_named_and_never_too_bright() {
     // A lathe whose outline runs through itself.
     let outline = [(0.0, -0.8), (1.0, -0.8), (0.3, 0.5), (0.9, 0.5), (0.4, -0.6), (0.0, 0.6)];
     let bow_tie = Mesh::lathe(Vec3::ZERO, &outline, 12);
+    let rimmed =
+        [(0.0, -0.5), (0.5, -0.5), (0.5, -2e-7), (1.2, -2e-7), (1.2, 2e-7), (0.5, 2e-7), (0.5, 0.5), (0.0, 0.5)];
     for (name, mesh, said) in [
         ("open bowl", Mesh::lathe(Vec3::ZERO, &bowl, 24), "is an open sheet, taken for a thin pane"),
         ("doubled", ball.clone().with(&ball.clone().turned()), "has doubled faces, which count once"),
@@ -114,6 +117,13 @@ fn meshes_that_are_no_clean_solids_are_named_and_never_too_bright() {
         ("crossing itself", bow_tie, "crosses itself"),
         ("hollow", ball.clone().with(&Mesh::ball(Vec3::ZERO, 0.6, 24).turned()), ""),
         ("clean", ball.clone(), ""),
+        ("thin", Mesh::block(vec3(-1.0, -1.0, -1e-4), vec3(1.0, 1.0, 1e-4)), ""),
+        (
+            "thinner than rounding",
+            Mesh::block(vec3(-1.0, -1.0, -2e-7), vec3(1.0, 1.0, 2e-7)),
+            "is thinner than rounding",
+        ),
+        ("with a rim thinner than rounding", Mesh::lathe(Vec3::ZERO, &rimmed, 12), ""),
     ] {
         let scene = assert_white(name, &[(mesh, 0)], &glasses);
         let about: Vec<_> = scene.warnings.iter().filter(|line| line.contains("its glass")).collect();
@@ -147,11 +157,54 @@ fn unclean_solids_look_as_the_clean_one() {
     let bubble = of(&[(ball.clone(), 0), (small.clone(), 1)]);
     assert!(difference(&clean, &bubble) > 0.1, "control: a bubble is seen");
     let cavity = of(&[(ball.clone().with(&small.clone().turned()), 0)]);
-    let apart = of(&[(ball.clone(), 0), (small.turned(), 2)]);
+    let apart = of(&[(ball.clone(), 0), (small.clone().turned(), 2)]);
     for (name, other) in [("cavity of the mesh", &cavity), ("cavity as a mesh of its own", &apart)] {
         assert!(difference(&bubble, other) < 1e-3, "{name}");
     }
+    // The same in an exact sphere.
+    let in_sphere = |mesh: Mesh, material: usize| {
+        let mut file = file_of(&[(mesh, material)], &glasses);
+        let shapes = json!({ "shapes": [{ "type": "sphere", "sphere": { "radius": 1.0 } }] });
+        file["extensions"] = json!({ "KHR_implicit_shapes": shapes });
+        file["extensionsUsed"].as_array_mut().expect("a list").push(json!("KHR_implicit_shapes"));
+        let shape = json!({ "KHR_implicit_shapes": { "shape": 0 } });
+        file["nodes"].as_array_mut().expect("a list").push(json!({ "extensions": shape, "extras": { "material": 0 } }));
+        file["scenes"][0]["nodes"] = json!([0, 1]);
+        gltf::loaded(&file)
+    };
+    let bubble = in_sphere(small.clone(), 1);
+    assert!(difference(&bubble, &in_sphere(small.clone().turned(), 0)) < 1e-3, "cavity of a sphere");
+    assert!(difference(&bubble, &in_sphere(small.clone(), 0)) > 0.1, "control: the same glass in a sphere");
     assert!(difference(&clean, &of(&[(ball, 2)])) > 0.05, "control: another index");
+}
+
+#[test]
+fn films_reflect_as_slabs() {
+    let lamp = json!({
+        "pbrMetallicRoughness": { "baseColorFactor": [0, 0, 0, 1], "roughnessFactor": 1, "metallicFactor": 0 },
+        "emissiveFactor": [1, 1, 1],
+    });
+    let behind = Mesh {
+        positions: vec![vec3(-2.0, -2.0, -1.0), vec3(2.0, -2.0, -1.0), vec3(2.0, 2.0, -1.0), vec3(-2.0, 2.0, -1.0)],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let slab = |z: f32, half: f32| Mesh::block(vec3(-2.0, -2.0, z - half), vec3(2.0, 2.0, z + half));
+    let seen = |glass: &[Mesh]| {
+        let mut meshes = vec![(behind.clone(), 0)];
+        meshes.extend(glass.iter().map(|mesh| (mesh.clone(), 1)));
+        let mut scene = scene_of(&meshes, &[lamp.clone(), glass_of(1.5)]);
+        let at = |z: f32| vec3(0.0, 0.0, z) - scene.center.as_vec3();
+        scene.cameras = vec![camera(at(3.0), at(0.0), 5.0)];
+        mean(&render_scene(&scene, &quick().with(|s| s.picture.spp = 64)))
+    };
+    // With all reflections between both faces.
+    let right = transmittance(&[1.0, 1.5, 1.0], 1.0);
+    for half in [2e-3, 1e-6, 5e-7, 1e-7] {
+        let found = seen(&[slab(0.0, half)]);
+        assert!(within(found, right, 0.01), "{half}: {found} instead of {right}");
+    }
+    let two = seen(&[slab(0.0, 1e-7), slab(0.5, 1e-7)]);
+    assert!(!within(two, right, 0.05), "control: two films: {two}");
 }
 
 /// Transmittance of a stack of plane interfaces with all reflections between them, for intensities,

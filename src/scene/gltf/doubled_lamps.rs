@@ -14,10 +14,9 @@ const TOLERANCE: f32 = 2.0 * crate::layout::OFFSET_SCALE;
 /// Others that a lamp is compared with at most.
 const MOST_COMPARED: usize = 1 << 10;
 
-/// Leaves out emissive triangles and spheres that lie where another one does, up to rounding, and
-/// shine the same way: a ray meets one of them, and photons and direct light must not come from
-/// both.
-pub(super) fn remove(scene: &mut Scene, notes: &mut Notes) {
+/// Leaves out emissive triangles that lie where another one does, up to rounding, and shine the
+/// same way: a ray meets one of them, and photons and direct light must not come from both.
+pub(super) fn remove_triangles(scene: &mut Scene, notes: &mut Notes) {
     let materials = &scene.materials;
     let shines = |material: u32| materials[material as usize].emission != Vec3::ZERO;
     let mut known = HashSet::new();
@@ -33,24 +32,31 @@ pub(super) fn remove(scene: &mut Scene, notes: &mut Notes) {
     for (lamp, is_kept) in lamps.iter().zip(apart(&scene.triangles, &lamps, materials)) {
         kept[*lamp] = is_kept;
     }
-    let mut spheres = HashSet::new();
-    let count = scene.spheres.len();
-    scene.spheres.retain(|sphere| {
-        let key = (vertex_bits(sphere.center), sphere.radius.to_bits());
-        !shines(sphere.material) || spheres.insert(key)
-    });
     let twice = kept.iter().filter(|kept| !**kept).count();
-    for (doubled, what) in [(twice, "triangles"), (count - scene.spheres.len(), "spheres")] {
-        if doubled > 0 {
-            notes.add(format!("{doubled} emissive {what} lie in others; the first ones shine"));
-        }
-    }
     if twice > 0 {
+        notes.add(said(twice, "triangles"));
         let mut flags = kept.iter();
         scene.triangles.retain(|_| flags.next() == Some(&true));
         let mut flags = kept.iter();
         scene.shells.retain(|_| flags.next() == Some(&true));
     }
+}
+
+/// The same for emissive spheres. Solids refer to spheres by index, and are found afterwards.
+pub(super) fn remove_spheres(scene: &mut Scene, notes: &mut Notes) {
+    let (materials, mut known) = (&scene.materials, HashSet::new());
+    let count = scene.spheres.len();
+    scene.spheres.retain(|sphere| {
+        let key = (vertex_bits(sphere.center), sphere.radius.to_bits());
+        materials[sphere.material as usize].emission == Vec3::ZERO || known.insert(key)
+    });
+    if scene.spheres.len() < count {
+        notes.add(said(count - scene.spheres.len(), "spheres"));
+    }
+}
+
+fn said(doubled: usize, what: &str) -> String {
+    format!("{doubled} emissive {what} lie in others; the first ones shine")
 }
 
 /// Which lamps, by their indices, lie in none before them.

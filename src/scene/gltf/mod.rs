@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::{
     Attributes, Bounds, Camera, Light, LoadOptions, Scene, Sphere,
-    solids::{self, MeshRange},
+    solids::{self, MeshRange, Surroundings},
 };
 use crate::{Error, Result};
 
@@ -162,13 +162,16 @@ fn assemble(
     scene.materials = materials.materials;
     let ranges: Vec<MeshRange> = meshes.into_iter().map(|placed| mesh_range(root, placed)).collect();
     let eyes: Vec<Vec3> = eyes.into_iter().map(|at| (at - center).as_vec3()).collect();
-    let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges, &eyes);
+    doubled_lamps::remove_spheres(&mut scene, &mut notes);
+    let around =
+        Surroundings { shared: &shared.meshes, instances: &shared.instances, spheres: &scene.spheres, eyes: &eyes };
+    let (shells, warnings) = solids::repair(&mut triangles, &mut scene.materials, &ranges, &around);
     warnings.into_iter().for_each(|warning| notes.add(warning));
     (scene.triangles, scene.attributes, scene.shells) = (triangles, attributes, shells);
     (scene.meshes, scene.instances) = (shared.meshes, shared.instances);
     sharing::check_heights(&scene)?;
     name_objects(root, &mut scene);
-    doubled_lamps::remove(&mut scene, &mut notes);
+    doubled_lamps::remove_triangles(&mut scene, &mut notes);
     placing::turn_tangents(&scene.triangles, &mut scene.attributes);
     placing::keep_attributes_in_use(&mut scene.triangles, &mut scene.attributes);
     add_attributes_of_meshes(shared.attributes, &mut scene);

@@ -6,15 +6,18 @@
 //! larger one, or to displace it. The set is a bit mask, in which solids that never meet share a
 //! bit, a slot.
 
+mod cavities;
 mod closed_lamps;
 mod covers;
 mod rank;
 mod repair;
 mod shells;
 mod solid;
+mod surfaces;
 mod table;
 
 pub(crate) use closed_lamps::hidden_backs;
-pub(crate) use repair::{MeshRange, repair};
+pub(crate) use repair::{MeshRange, Surroundings, repair};
 pub use solid::NO_SLOT;
+pub(crate) use surfaces::Surfaces;
 pub use table::Solids;

@@ -6,19 +6,25 @@ use std::{
 };
 
 use super::{
-    covers::{Surfaces, Surroundings, cover},
+    cavities::spheres_of_glass,
+    covers::cover,
     shells::{Shell, Shells},
-    solid::{NONE, glass},
+    solid::{COVER_BIT, NONE, SPHERE_BIT, glass},
+    surfaces::Opaque,
 };
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::scene::{Material, Surface, Triangle, vertex_bits};
+use crate::scene::{Bounds, Instance, Material, SharedMesh, Sphere, Surface, Triangle, vertex_bits};
 
 /// Fraction of the surface below which a hole of few edges counts as a missing triangle.
 const SMALL_HOLE: f64 = 0.05;
 /// Edges of the largest hole that counts as missing triangles.
 const HOLE_EDGES: usize = 6;
+
+/// Mean thickness below which a solid is a film, over its largest coordinate or size: 2^-21, as of
+/// surfaces in contact.
+const FILM: f64 = 1.0 / (1 << 21) as f64;
 
 /// The triangles of one copy of a mesh, as a node shows it.
 #[derive(Clone, Debug)]
@@ -28,11 +34,23 @@ pub(crate) struct MeshRange {
     pub name: String,
 }
 
+/// What stands around meshes with triangles of their own.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Surroundings<'a> {
+    /// Meshes that are opaque, and their places.
+    pub shared: &'a [SharedMesh],
+    pub instances: &'a [Instance],
+    pub spheres: &'a [Sphere],
+    /// Where cameras are.
+    pub eyes: &'a [Vec3],
+}
+
 /// Faults found in the shells of a mesh, each with the number of shells or triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct Faults {
     doubled: usize,
     open: usize,
+    films: usize,
     covers: usize,
     turned: usize,
     turned_covers: usize,
@@ -42,14 +60,13 @@ struct Faults {
 }
 
 /// Repairs the glass of a scene: doubled faces count once, open sheets become thin panes, and
-/// outermost shells with faces inwards are turned. `eyes` are the places of cameras. Returns the
-/// solid of each triangle, as [`Scene::shells`](crate::scene::Scene::shells), and one warning for
-/// each mesh that is not clean.
+/// outermost shells with faces inwards are turned. Returns the solid of each triangle, as
+/// [`Scene::shells`](crate::scene::Scene::shells), and one warning for each mesh that is not clean.
 pub(crate) fn repair(
     triangles: &mut Vec<Triangle>,
     materials: &mut Vec<Material>,
     meshes: &[MeshRange],
-    eyes: &[Vec3],
+    around: &Surroundings<'_>,
 ) -> (Vec<u32>, Vec<String>) {
     let is_glass = glass(materials);
     if !triangles.iter().any(|triangle| is_glass[triangle.material as usize]) {
@@ -72,11 +89,14 @@ pub(crate) fn repair(
     found.join(triangles, |a, b| a == b);
     found.join(triangles, |_, _| true);
     let mesh = |shell: &Shell| mesh_of[shell.triangles[0] as usize];
-    let (sheets, solids): (Vec<Shell>, Vec<Shell>) = found.shells.into_iter().partition(is_sheet);
-    let opaque = Surfaces::opaque(if sheets.is_empty() { &[] } else { triangles }, materials);
-    let around = Surroundings { opaque, eyes };
+    let (sheets, solids): (Vec<Shell>, Vec<Shell>) =
+        found.shells.into_iter().partition(|shell| is_sheet(shell) || is_film(shell, triangles));
+    let opaque = match sheets.is_empty() {
+        true => Opaque::none(),
+        false => Opaque::new(triangles, materials, around.shared, around.instances),
+    };
     let of_sheets: Vec<Option<bool>> =
-        sheets.par_iter().map(|shell| cover(shell, triangles, materials, &around)).collect();
+        sheets.par_iter().map(|shell| cover(shell, triangles, materials, &opaque, around.eyes)).collect();
     let (mut covers, mut panes) = (Vec::new(), Vec::new());
     for (shell, cover) in sheets.into_iter().zip(of_sheets) {
         if cover == Some(true) {
@@ -89,14 +109,14 @@ pub(crate) fn repair(
     let sheets = panes;
     found.shells = solids.into_iter().chain(covers).collect();
     for shell in &sheets {
-        faults[mesh(shell)].open += 1;
+        let fault = &mut faults[mesh(shell)];
+        fault.open += usize::from(is_sheet(shell));
+        fault.films += usize::from(!is_sheet(shell));
         let solid = triangles[shell.triangles[0] as usize].material;
         let pane = pane_of(materials, solid);
         shell.triangles.iter().for_each(|i| triangles[*i as usize].material = pane);
     }
-    let boxes = found.boxes();
-    for (i, crosses_itself) in found.crossing(triangles).into_iter().enumerate() {
-        let shell = &found.shells[i];
+    for (shell, crosses_itself) in found.shells.iter().zip(found.crossing(triangles)) {
         if shell.is_cover {
             continue;
         }
@@ -104,28 +124,34 @@ pub(crate) fn repair(
         fault.holes += usize::from(!shell.is_closed());
         fault.t_junctions += usize::from(shell.has_t_junctions);
         fault.crossings += usize::from(crosses_itself);
-        if shell.volume < 0.0 {
-            match found.around(triangles, shell, &boxes) {
-                // A bubble is of the glass around it, whatever its own material.
-                Some(outer) => {
-                    let glass = triangles[found.shells[outer].triangles[0] as usize].material;
-                    shell.triangles.iter().for_each(|i| triangles[*i as usize].material = glass);
-                }
-                None => {
-                    fault.turned += 1;
-                    shell.triangles.iter().for_each(|i| turn(&mut triangles[*i as usize]));
-                    found.shells[i].volume *= -1.0;
-                }
-            }
-        }
+    }
+    for i in found.find_cavities(triangles, &spheres_of_glass(around.spheres, &is_glass), &opaque) {
+        faults[mesh(&found.shells[i])].turned += 1;
+        found.shells[i].triangles.iter().for_each(|i| turn(&mut triangles[*i as usize]));
+    }
+    // A bubble is of the glass around it, whatever its own material.
+    for (shell, solid) in found.shells.iter().filter_map(|shell| Some((shell, shell.cavity_of?))) {
+        let glass = match solid & SPHERE_BIT != 0 {
+            true => around.spheres[(solid & !SPHERE_BIT) as usize].material,
+            false => triangles[found.shells[(solid & !COVER_BIT) as usize].triangles[0] as usize].material,
+        };
+        shell.triangles.iter().for_each(|i| triangles[*i as usize].material = glass);
     }
     let warnings = meshes.iter().zip(&faults).filter_map(|(mesh, faults)| warning(&mesh.name, faults));
-    (found.solids(triangles), merged(warnings.collect()))
+    (found.solids(), merged(warnings.collect()))
 }
 
 /// A sheet encloses nothing: light goes through it as through a thin pane.
 fn is_sheet(shell: &Shell) -> bool {
     !(shell.is_closed() || shell.openness < SMALL_HOLE && shell.hole_edges <= HOLE_EDGES)
+}
+
+/// Whether a closed shell is thinner than rounding: to a ray, both of its faces are one.
+fn is_film(shell: &Shell, triangles: &[Triangle]) -> bool {
+    let area: f64 = shell.triangles.iter().map(|i| triangles[*i as usize].area()).sum();
+    let Bounds { min, max } = shell.bounds;
+    let reach = min.abs().max(max.abs()).max(max - min).max_element();
+    2.0 * shell.volume.abs() < FILM * f64::from(reach) * area
 }
 
 /// Triangles to keep: of glass that lies in one place several times the first, whichever way
@@ -203,6 +229,7 @@ fn warning(name: &str, faults: &Faults) -> Option<String> {
     let parts = [
         (faults.doubled > 0, "has doubled faces, which count once"),
         (faults.open > 0, "is an open sheet, taken for a thin pane (a solid has to be closed)"),
+        (faults.films > 0, "is thinner than rounding, taken for a thin pane"),
         (
             faults.covers > 0,
             "is an open sheet that ends at opaque surfaces, taken for the face of a solid that fills what lies behind",

@@ -5,8 +5,12 @@ use std::{collections::HashMap, mem};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::solid::{COVER_BIT, NONE};
-use crate::scene::{Bounds, CompleteTree, Triangle, vertex_bits};
+use super::{
+    cavities::spheres_of_glass,
+    solid::{COVER_BIT, NONE},
+    surfaces::{Opaque, distance_along},
+};
+use crate::scene::{Bounds, Sphere, Triangle, vertex_bits};
 
 /// A connected part of a mesh: its triangles share vertices.
 #[derive(Clone, Debug)]
@@ -26,6 +30,8 @@ pub(super) struct Shell {
     pub rim: Vec<Vec3>,
     /// An open sheet that ends at opaque surfaces, and stands for a solid behind it.
     pub is_cover: bool,
+    /// The solid that it is a cavity of, as in [`Scene::shells`](crate::scene::Scene::shells).
+    pub cavity_of: Option<u32>,
 }
 
 /// The shells of several meshes.
@@ -39,7 +45,7 @@ pub(super) struct Shells {
 const CLOSED: f64 = 1e-4;
 
 /// Points at which a shell is probed at most, triangles visited for those of all shells, and their
-/// depth below a face over its size.
+/// largest depth below a face over its size.
 const MAX_PROBES: usize = 256;
 const PROBE_COST: usize = 20_000_000;
 const PROBE_DEPTH: f64 = 1e-3;
@@ -80,13 +86,16 @@ impl Shells {
         }
     }
 
-    /// The shells of scenes that no file describes: a group for each material of glass.
-    pub(super) fn of_materials(triangles: &[Triangle], is_glass: &[bool]) -> Self {
+    /// The shells of scenes that no file describes, with their cavities: a group for each material
+    /// of glass.
+    pub(super) fn of_materials(triangles: &[Triangle], spheres: &[Sphere], is_glass: &[bool]) -> Self {
         let mut groups = vec![Vec::new(); is_glass.len()];
         for (triangle, i) in triangles.iter().zip(0..).filter(|(t, _)| is_glass[t.material as usize]) {
             groups[triangle.material as usize].push(i);
         }
-        Self::new(triangles, &groups)
+        let mut found = Self::new(triangles, &groups);
+        found.find_cavities(triangles, &spheres_of_glass(spheres, is_glass), &Opaque::none());
+        found
     }
 
     /// For each shell, whether it is closed and crosses itself.
@@ -100,46 +109,14 @@ impl Shells {
     }
 
     /// The solid of each triangle: a shell with faces outwards and the cavities in it.
-    pub(super) fn solids(&self, triangles: &[Triangle]) -> Vec<u32> {
-        let (mut of, boxes) = (vec![NONE; self.triangles], self.boxes());
-        for (i, shell) in self.shells.iter().enumerate() {
-            let solid = match shell.is_cover {
-                true => i as u32 | COVER_BIT,
-                false if shell.volume < 0.0 => self.around(triangles, shell, &boxes).unwrap_or(i) as u32,
-                false => i as u32,
-            };
+    pub(super) fn solids(&self) -> Vec<u32> {
+        let mut of = vec![NONE; self.triangles];
+        for (shell, i) in self.shells.iter().zip(0..) {
+            let own = if shell.is_cover { i | COVER_BIT } else { i };
+            let solid = shell.cavity_of.unwrap_or(own);
             shell.triangles.iter().for_each(|triangle| of[*triangle as usize] = solid);
         }
         of
-    }
-
-    /// A tree over the boxes of all shells, if any of them has faces inwards.
-    pub(super) fn boxes(&self) -> CompleteTree<Bounds> {
-        let any_inwards = self.shells.iter().any(|shell| !shell.is_cover && shell.volume < 0.0);
-        let boxes = self.shells.iter().filter(|_| any_inwards).map(|shell| shell.bounds);
-        CompleteTree::of_boxes(&boxes.collect::<Vec<_>>())
-    }
-
-    /// The smallest shell with faces outwards that a shell lies in; `boxes` are those of all.
-    pub(super) fn around(&self, triangles: &[Triangle], inner: &Shell, boxes: &CompleteTree<Bounds>) -> Option<usize> {
-        let corner = triangles[inner.triangles[0] as usize].positions[0];
-        let mut found: Option<usize> = None;
-        boxes.near(&Bounds { min: corner, max: corner }, |i| {
-            let shell = &self.shells[i];
-            let is_smaller = found
-                .is_none_or(|other| shell.volume.total_cmp(&self.shells[other].volume).then(i.cmp(&other)).is_lt());
-            if !shell.is_cover
-                && is_smaller
-                && shell.volume > inner.volume.abs()
-                && shell.bounds.min.cmple(corner).all()
-                && shell.bounds.max.cmpge(corner).all()
-                && winding(triangles, shell, corner.as_dvec3()) > 0.5
-            {
-                found = Some(i);
-            }
-            true
-        });
-        found
     }
 }
 
@@ -151,10 +128,14 @@ impl Shell {
         self.triangles.iter().skip(number % step).step_by(step).any(|i| {
             let triangle = &triangles[*i as usize];
             let [a, b, c] = triangle.positions.map(Vec3::as_dvec3);
-            let below = PROBE_DEPTH * triangle.area().sqrt() * triangle.geometric_normal().as_dvec3();
+            let (middle, inwards) = ((a + b + c) / 3.0, -triangle.geometric_normal().as_dvec3());
+            // Glass may be thinner than that: its other face is not passed.
+            let others = self.triangles.iter().filter(|other| *other != i).map(|other| &triangles[*other as usize]);
+            let next = others.filter_map(|other| distance_along(other, middle, inwards)).fold(f64::INFINITY, f64::min);
+            let below = middle + (PROBE_DEPTH * triangle.area().sqrt()).min(0.5 * next) * inwards;
             // Below the faces of a hollow lies the glass around it, which is outside of this shell.
             let expected = self.volume.signum().max(0.0);
-            (winding(triangles, self, (a + b + c) / 3.0 - below) - expected).abs() > 0.5
+            (winding(triangles, self, below) - expected).abs() > 0.5
         })
     }
 
@@ -166,7 +147,7 @@ impl Shell {
 
 /// Winding number of a shell around a point: the solid angle over 4π (van Oosterom and Strackee
 /// 1983).
-fn winding(triangles: &[Triangle], shell: &Shell, point: DVec3) -> f64 {
+pub(super) fn winding(triangles: &[Triangle], shell: &Shell, point: DVec3) -> f64 {
     let angle = |i: &u32| {
         let [a, b, c] = triangles[*i as usize].positions.map(|p| p.as_dvec3() - point);
         let (la, lb, lc) = (a.length(), b.length(), c.length());
@@ -263,6 +244,7 @@ fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
         has_t_junctions: !open.is_empty() && loops.iter().any(|(v, _)| v.length() <= CLOSED * area),
         rim,
         is_cover: false,
+        cavity_of: None,
     }
 }
 

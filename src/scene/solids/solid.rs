@@ -20,6 +20,9 @@ pub(super) struct Solid {
 /// behind that face, however far.
 pub(super) const COVER_BIT: u32 = 0x8000_0000;
 
+/// Set in the index of a sphere of the scene, as the solid of a cavity in it.
+pub(super) const SPHERE_BIT: u32 = 0x4000_0000;
+
 /// No solid.
 pub(super) const NONE: u32 = u32::MAX;
 

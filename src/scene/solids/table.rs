@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{
     rank::{self, BoundingVolume},
     shells::Shells,
-    solid::{COVER_BIT, NO_SLOT, NONE, Solid, glass},
+    solid::{COVER_BIT, NO_SLOT, NONE, SPHERE_BIT, Solid, glass},
 };
 use crate::scene::{Bounds, Medium, Scene};
 
@@ -29,11 +29,12 @@ impl Solids {
         let is_glass = glass(&scene.materials);
         let mut of_surface = match scene.shells.len() == scene.triangles.len() {
             true => scene.shells.clone(),
-            false => Shells::of_materials(&scene.triangles, &is_glass).solids(&scene.triangles),
+            false => Shells::of_materials(&scene.triangles, &scene.spheres, &is_glass).solids(),
         };
         let mut found: Vec<Solid> = Vec::new();
         let mut volumes: Vec<BoundingVolume> = Vec::new();
-        for (triangle, solid) in scene.triangles.iter().zip(&of_surface).filter(|(_, solid)| **solid != NONE) {
+        let is_own = |solid: u32| solid != NONE && solid & SPHERE_BIT == 0;
+        for (triangle, solid) in scene.triangles.iter().zip(&of_surface).filter(|(_, solid)| is_own(**solid)) {
             let index = (*solid & !COVER_BIT) as usize;
             while found.len() <= index {
                 found.push(Solid { material: NONE, priority: 0, volume: 0.0, bounds: Bounds::EMPTY, is_cover: false });
@@ -65,6 +66,12 @@ impl Solids {
                     bounds: Bounds::from(sphere),
                     is_cover: false,
                 });
+            }
+        }
+        // Cavities in spheres.
+        for i in 0..scene.triangles.len() {
+            if of_surface[i] != NONE && !is_own(of_surface[i]) {
+                of_surface[i] = of_surface[scene.triangles.len() + (of_surface[i] & !SPHERE_BIT) as usize];
             }
         }
         if found.is_empty() {
