@@ -15,6 +15,18 @@ pub(super) fn spheres_of_glass<'a>(spheres: &'a [Sphere], is_glass: &[bool]) -> 
 }
 
 impl Shells {
+    /// The shells of scenes that no file describes, with their cavities: a group for each material
+    /// of glass.
+    pub(super) fn of_materials(triangles: &[Triangle], spheres: &[Sphere], is_glass: &[bool]) -> Self {
+        let mut groups = vec![Vec::new(); is_glass.len()];
+        for (triangle, i) in triangles.iter().zip(0..).filter(|(t, _)| is_glass[t.material as usize]) {
+            groups[triangle.material as usize].push(i);
+        }
+        let mut found = Self::new(triangles, &groups);
+        found.find_cavities(triangles, &spheres_of_glass(spheres, is_glass), &Opaque::none());
+        found
+    }
+
     /// Notes for each shell with faces inwards the solid that it lies in: the smallest closed one
     /// or sphere, else the nearest cover. Those that lie in none are taken to face outwards, and
     /// are returned.

@@ -6,11 +6,10 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    cavities::spheres_of_glass,
     solid::{COVER_BIT, NONE},
-    surfaces::{Opaque, distance_along},
+    surfaces::distance_along,
 };
-use crate::scene::{Bounds, Sphere, Triangle, vertex_bits};
+use crate::scene::{Bounds, Triangle, vertex_bits};
 
 /// A connected part of a mesh: its triangles share vertices.
 #[derive(Clone, Debug)]
@@ -84,18 +83,6 @@ impl Shells {
                 }
             }
         }
-    }
-
-    /// The shells of scenes that no file describes, with their cavities: a group for each material
-    /// of glass.
-    pub(super) fn of_materials(triangles: &[Triangle], spheres: &[Sphere], is_glass: &[bool]) -> Self {
-        let mut groups = vec![Vec::new(); is_glass.len()];
-        for (triangle, i) in triangles.iter().zip(0..).filter(|(t, _)| is_glass[t.material as usize]) {
-            groups[triangle.material as usize].push(i);
-        }
-        let mut found = Self::new(triangles, &groups);
-        found.find_cavities(triangles, &spheres_of_glass(spheres, is_glass), &Opaque::none());
-        found
     }
 
     /// For each shell, whether it is closed and crosses itself.

@@ -235,6 +235,9 @@ fn small_lamp(add: impl Fn(&mut Scene), radiance: f32) -> Scene {
     scene
 }
 
+/// What puts a lamp into a scene.
+type Add<'a> = &'a dyn Fn(&mut Scene);
+
 #[test]
 fn small_lamps_amid_wide_scenes_light_what_is_far() {
     let ball = |scene: &mut Scene| scene.spheres.push(sphere(Vec3::ZERO, 0.03, 1));
@@ -248,7 +251,7 @@ fn small_lamps_amid_wide_scenes_light_what_is_far() {
         // Cosines at the ground and at the faces that look down and sideways.
         let (down, aside) = (1.0 / d, f64::from(x) / d);
         let face = 0.0036 / (d * d);
-        let lamps: [(&str, &dyn Fn(&mut Scene), f64); 4] = [
+        let lamps: [(&str, Add, f64); 4] = [
             ("ball", &ball, PI * 0.0009 / (d * d) * down),
             ("square", &square, face * down * down),
             ("upright square", &upright, face * aside * down),
