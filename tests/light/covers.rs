@@ -180,7 +180,7 @@ fn a_bubble_in_a_pool_is_empty() {
         assert!(!is_turned, "a bubble faces inwards");
         for (name, inner) in [("no bubble", None), ("a solid ball", Some(&ball))] {
             let (other, _) = picture(&cover, inner, eye);
-            assert!(difference(&other, &right) > 0.01, "control: {name} from {eye}: {}", difference(&other, &right));
+            assert!(difference(&other, &right) > 5e-3, "control: {name} from {eye}: {}", difference(&other, &right));
         }
     }
 }
