@@ -278,6 +278,7 @@ impl LightTable {
             let emission = emission_in(material.emission, unit);
             let solid_angle = if material.double_sided { TAU } else { PI };
             let clearcoat = if material.unlit { 0.0 } else { material.clearcoat };
+            let uncoated = 1.0 - f64::from(clearcoat) * MEAN_CLEARCOAT;
             let first = self.lights.len();
             for primitive in primitives {
                 let own = self.lights.len() as u32;
@@ -286,8 +287,7 @@ impl LightTable {
                 let sent = if hidden.get(primitive) == Some(&true) { 0.5 } else { 1.0 };
                 let sent_angle = sent * solid_angle;
                 for SurfaceLight { light, emitted } in surfaces.of(primitive) {
-                    let kept = 1.0 - f64::from(clearcoat) * MEAN_CLEARCOAT;
-                    let power = emission.as_dvec3() * f64::from(light.area) * solid_angle * kept;
+                    let power = emission.as_dvec3() * f64::from(light.area) * solid_angle * uncoated;
                     let light = layout::Light { emission: emission.to_array(), clearcoat, ..light };
                     self.add(layout::Light { solid_angle: sent_angle as f32, ..light }, power * emitted.mean);
                     let own_power = self.powers.last_mut();

@@ -6,7 +6,7 @@
 //! | plate on water, photons | three interfaces with all reflections between them | without the water |
 //! | blocks | two blocks that share a face are one block | a gap between them |
 //! | bubble | an ior-1 ball in glass is a cavity, in an exact sphere too | solid |
-//! | film | thinner than rounding it reflects as a slab | two of them |
+//! | slab thinner than rounding | it reflects as a slab | two of them |
 //! | turned, doubled | the picture of the clean ball | another index |
 //! | chains | a cut diamond loses nothing | |
 //! | far away | thin glass far from the origin lets all light through | |
@@ -179,7 +179,7 @@ fn unclean_solids_look_as_the_clean_one() {
 }
 
 #[test]
-fn films_reflect_as_slabs() {
+fn slabs_thinner_than_rounding_reflect_as_slabs() {
     let lamp = json!({
         "pbrMetallicRoughness": { "baseColorFactor": [0, 0, 0, 1], "roughnessFactor": 1, "metallicFactor": 0 },
         "emissiveFactor": [1, 1, 1],
@@ -204,7 +204,7 @@ fn films_reflect_as_slabs() {
         assert!(within(found, right, 0.01), "{half}: {found} instead of {right}");
     }
     let two = seen(&[slab(0.0, 1e-7), slab(0.5, 1e-7)]);
-    assert!(!within(two, right, 0.05), "control: two films: {two}");
+    assert!(!within(two, right, 0.05), "control: two slabs: {two}");
 }
 
 /// Transmittance of a stack of plane interfaces with all reflections between them, for intensities,

@@ -29,6 +29,7 @@ const TRIES: u32 = 16;
 const LIFT: f32 = 1e-5;
 /// Index from which on a level sheet is glass and no liquid if a camera looks at it from below.
 const GLASS_INDEX: f32 = 1.4;
+
 /// Whether a sheet is a cover, and then whether its faces look the wrong way. It ends at or in
 /// opaque surfaces all around, as the water of a pool does, and these part what lies behind it from
 /// what lies before it. A flat one is level: a window is a pane.

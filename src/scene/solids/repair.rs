@@ -22,9 +22,9 @@ const SMALL_HOLE: f64 = 0.05;
 /// Edges of the largest hole that counts as missing triangles.
 const HOLE_EDGES: usize = 6;
 
-/// Mean thickness below which a solid is a film, over its largest coordinate or size: 2^-21, as of
-/// surfaces in contact.
-const FILM: f64 = 1.0 / (1 << 21) as f64;
+/// Mean thickness below which both faces of a solid are one to a ray, over its largest coordinate
+/// or size: 2^-21, as of surfaces in contact.
+const THINNEST: f64 = 1.0 / (1 << 21) as f64;
 
 /// The triangles of one copy of a mesh, as a node shows it.
 #[derive(Clone, Debug)]
@@ -50,7 +50,7 @@ pub(crate) struct Surroundings<'a> {
 struct Faults {
     doubled: usize,
     open: usize,
-    films: usize,
+    thin: usize,
     covers: usize,
     turned: usize,
     turned_covers: usize,
@@ -90,7 +90,7 @@ pub(crate) fn repair(
     found.join(triangles, |_, _| true);
     let mesh = |shell: &Shell| mesh_of[shell.triangles[0] as usize];
     let (sheets, solids): (Vec<Shell>, Vec<Shell>) =
-        found.shells.into_iter().partition(|shell| is_sheet(shell) || is_film(shell, triangles));
+        found.shells.into_iter().partition(|shell| is_sheet(shell) || is_too_thin(shell, triangles));
     let opaque = match sheets.is_empty() {
         true => Opaque::none(),
         false => Opaque::new(triangles, materials, around.shared, around.instances),
@@ -111,7 +111,7 @@ pub(crate) fn repair(
     for shell in &sheets {
         let fault = &mut faults[mesh(shell)];
         fault.open += usize::from(is_sheet(shell));
-        fault.films += usize::from(!is_sheet(shell));
+        fault.thin += usize::from(!is_sheet(shell));
         let solid = triangles[shell.triangles[0] as usize].material;
         let pane = pane_of(materials, solid);
         shell.triangles.iter().for_each(|i| triangles[*i as usize].material = pane);
@@ -147,11 +147,11 @@ fn is_sheet(shell: &Shell) -> bool {
 }
 
 /// Whether a closed shell is thinner than rounding: to a ray, both of its faces are one.
-fn is_film(shell: &Shell, triangles: &[Triangle]) -> bool {
+fn is_too_thin(shell: &Shell, triangles: &[Triangle]) -> bool {
     let area: f64 = shell.triangles.iter().map(|i| triangles[*i as usize].area()).sum();
     let Bounds { min, max } = shell.bounds;
     let reach = min.abs().max(max.abs()).max(max - min).max_element();
-    2.0 * shell.volume.abs() < FILM * f64::from(reach) * area
+    2.0 * shell.volume.abs() < THINNEST * f64::from(reach) * area
 }
 
 /// Triangles to keep: of glass that lies in one place several times the first, whichever way
@@ -229,7 +229,7 @@ fn warning(name: &str, faults: &Faults) -> Option<String> {
     let parts = [
         (faults.doubled > 0, "has doubled faces, which count once"),
         (faults.open > 0, "is an open sheet, taken for a thin pane (a solid has to be closed)"),
-        (faults.films > 0, "is thinner than rounding, taken for a thin pane"),
+        (faults.thin > 0, "is thinner than rounding, taken for a thin pane"),
         (
             faults.covers > 0,
             "is an open sheet that ends at opaque surfaces, taken for the face of a solid that fills what lies behind",

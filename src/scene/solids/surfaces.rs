@@ -75,13 +75,13 @@ pub(super) struct Opaque<'a> {
     own: Surfaces<'a>,
     meshes: Vec<Surfaces<'a>>,
     /// Copies of these, in a tree over their boxes.
-    copies: Vec<Copy>,
+    copies: Vec<MeshCopy>,
     tree: CompleteTree<Bounds>,
 }
 
 /// A mesh in one place.
 #[derive(Debug)]
-struct Copy {
+struct MeshCopy {
     instance: Instance,
     to_mesh: Mat3,
 }
@@ -99,9 +99,10 @@ impl<'a> Opaque<'a> {
         let own = Surfaces::new(triangles.iter().filter(is_opaque).copied().collect::<Vec<_>>());
         let meshes: Vec<Surfaces<'a>> =
             meshes.par_iter().map(|mesh| Surfaces::new(mesh.triangles.as_slice())).collect();
-        let place = |instance: &Instance| Copy { instance: *instance, to_mesh: instance.linear.inverse() };
-        let copies: Vec<Copy> = instances.iter().map(place).collect();
-        let around = |copy: &Copy| moved(&meshes[copy.instance.mesh as usize].bounds(), |p| copy.instance.position(p));
+        let place = |instance: &Instance| MeshCopy { instance: *instance, to_mesh: instance.linear.inverse() };
+        let copies: Vec<MeshCopy> = instances.iter().map(place).collect();
+        let around =
+            |copy: &MeshCopy| moved(&meshes[copy.instance.mesh as usize].bounds(), |p| copy.instance.position(p));
         let tree = CompleteTree::of_boxes(&copies.iter().map(around).collect::<Vec<_>>());
         Self { own, meshes, copies, tree }
     }
@@ -150,7 +151,7 @@ impl<'a> Opaque<'a> {
             !found
         });
         self.tree.near(&around, |i| {
-            let Copy { instance, to_mesh } = &self.copies[i];
+            let MeshCopy { instance, to_mesh } = &self.copies[i];
             let mesh = &self.meshes[instance.mesh as usize];
             let in_mesh = moved(&around, |p| *to_mesh * (p - instance.offset));
             mesh.tree.near(&in_mesh, |i| {

@@ -7,6 +7,7 @@
 //! | uniform sky | E = π L on an open floor | 2 % stronger |
 //! | square emitter | Lambert's formula for polygons, facing and askew | the back side; an emitter 5 cm higher |
 //! | spherical emitter | E = π L (r/d)² cos θ | 2 % larger |
+//! | rays to a lamp | one a sample where the lamp is small, two where it is large | the other lamp |
 //! | small lamp | the same far from a small lamp amid a wide scene, of each shape | a lamp 2 % stronger |
 //! | lamp under a clear coat | what its camera, its rays and its photons have is less by the coat's reflectance | half the coat |
 //! | furnace | closed objects of albedo 1 in radiance L look L | albedo 0.9 |
@@ -220,6 +221,21 @@ fn a_spherical_emitter_gives_what_its_solid_angle_says() {
     let right = PI * 2.0 * 4.0 * PI * 0.64;
     assert!(within(flux(0.8), right, 1e-3), "photons: {} W instead of {right} W", flux(0.8));
     assert!(!within(flux(0.801), right, 1e-3), "control: photons of a bulb 1 mm larger pass");
+}
+
+#[test]
+fn only_large_lamps_are_looked_for_by_the_cosine() {
+    let rays = |side: f32| {
+        let mut scene = floor(0.5);
+        scene.materials.push(emissive("lamp", 0.0, 1.0, false));
+        add_quad(&mut scene, vec3(-0.5 * side, 2.0, -0.5 * side), vec3(side, 0.0, 0.0), vec3(0.0, 0.0, side), 1);
+        scene.cameras = vec![camera(vec3(0.0, 1.0, 0.001), Vec3::ZERO, 10.0)];
+        let settings = settings(Mode::DirectRays, 1, 8).with(|s| s.picture.light_samples = 16);
+        render_scene(&scene, &settings).stats.rays
+    };
+    // Each of 64 pixels has its own ray and 16 samples.
+    assert_eq!(rays(0.1), 64 * 17, "a lamp of 0.0025 sr");
+    assert_eq!(rays(3.0), 64 * 33, "a lamp of 1.6 sr");
 }
 
 /// A lamp of 6 cm at the origin, in the middle of the scene: 1 m above a ground of 200 m, below a
