@@ -93,6 +93,8 @@ pub(super) fn trace_maps(
     tally::count_faults(&mut stats, traced.media_overflows, traced.unfinished);
     stats.non_finite.photons += traced.non_finite;
     stats.warnings.extend(traced.warnings);
+    let lost = traced.lost / scene.lights.table.power();
+    stats.warnings.extend(tally::lost_between_surfaces(lost, settings.bounce_limit()));
     progress.report(Stage::Grid, 0, 1);
     let (mut maps, mut kinds) = (Vec::new(), Vec::new());
     timed(&mut stats.seconds.grid, || {

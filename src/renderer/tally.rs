@@ -62,6 +62,17 @@ pub(super) fn lost_in_chains(fraction: f64) -> Option<String> {
     })
 }
 
+/// Warning for light that the limit of diffuse surfaces took, as a fraction of all light.
+pub(super) fn lost_between_surfaces(fraction: f64, limit: u32) -> Option<String> {
+    (fraction > 0.01).then(|| {
+        let percent = 100.0 * fraction;
+        format!(
+            "{percent:.0} % of the light met more than {limit} diffuse surfaces, the limit of bounces, and was followed \
+             no further: the picture is too dark"
+        )
+    })
+}
+
 pub(super) fn add_step(stats: &mut Stats, count: StepCount) {
     stats.rays += count.rays;
     stats.lost_camera_paths += count.lost;

@@ -138,7 +138,7 @@ impl Default for PhotonSettings {
             caustic: 100_000,
             max_paths: None,
             emission: Emission::Aimed,
-            max_bounces: 20,
+            max_bounces: 100,
             sampler: Sampler::Sobol,
             seed: 0,
             final_gather: 0,

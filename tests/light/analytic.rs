@@ -6,6 +6,7 @@
 //! | final gathering | the same series with one bounce more | traced with B − 1 |
 //! | closed box | stored flux = Φ (1 − ρ^B)/(1 − ρ) | traced with B − 1 |
 //! | bounce limit | stored flux · (1 − ρ) + lost flux = Φ | without the lost flux |
+//! | white paint | stored flux = Φ / (1 − ρ), the light that a low limit takes is told | the default limit |
 //! | inverse-square law | L = ρ/π · I/d² | another distance |
 //! | thin wall | black behind | lit in front |
 
@@ -139,6 +140,29 @@ fn roulette_alone_ends_paths() {
     assert_eq!(traced.lost, 0.0);
     let (_, limited) = trace_photons(&scene, &settings.clone().with(|s| s.photons.max_bounces = 20));
     assert!(!within(limited[0], right, 0.02), "control: {} with at most 20 bounces", limited[0]);
+    // The default limit is one that no paint notices; one that takes light is told.
+    let (_, default) =
+        trace_photons(&scene, &settings.with(|s| s.photons.max_bounces = Settings::default().photons.max_bounces));
+    assert!(within(default[0], right, 0.02), "{} instead of {right} by default", default[0]);
+}
+
+#[test]
+fn light_that_the_limit_of_bounces_takes_is_told() {
+    let mut scene = scene(&[diffuse(0.9)]);
+    add_box(&mut scene, Vec3::splat(-1.0), Vec3::splat(1.0), 0);
+    scene.lights.push(point_light(vec3(0.2, 0.3, -0.1), 1.0));
+    scene.cameras.push(camera(Vec3::ZERO, Vec3::X, 60.0));
+    let told = |bounces| {
+        let settings = settings(Mode::Photons, 20_000, 8).with(|s| s.photons.max_bounces = bounces);
+        render_scene(&scene, &settings).stats.warnings
+    };
+    let lines = told(20);
+    // 0.9^20 = 0.122.
+    assert!(
+        lines.len() == 1 && lines[0].starts_with("12 % of the light met more than 20 diffuse surfaces"),
+        "{lines:?}"
+    );
+    assert_eq!(told(Settings::default().photons.max_bounces), [""; 0], "control");
 }
 
 /// A floor at height 0 under a light, seen from above over a small field.
