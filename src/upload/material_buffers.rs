@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use super::texels::Texels;
+use super::texels::{Texels, Values};
 use crate::{
     emitters::light_table::emission_in,
     error::{Error, Result},
@@ -12,7 +12,7 @@ use crate::{
         SECOND_UV_BIT, SRGB_BIT, TEXTURE_ROLE_SHIFT, TEXTURE_TEXELS, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR,
         WRAP_REPEAT, octahedral,
     },
-    scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Textures, Wrap},
+    scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
     settings::LightUnit,
 };
 
@@ -166,9 +166,9 @@ fn record(
     };
     let first_texture = textures.len() as u32;
     let mut roles = 0;
-    for (role, texture, is_color) in by_role(&material.textures) {
+    for (role, texture, values) in by_role(material) {
         roles |= 1 << role;
-        textures.push(texture_record(&texture, role, is_color, texels));
+        textures.push(texture_record(&texture, role, values, texels));
     }
     // Finishes are those of layers.
     let is_finished = material.is_finished() && !surface.transmits();
@@ -213,12 +213,14 @@ fn record(
     }
 }
 
-/// The textures with their roles, in the order of these, and whether they are of colours.
-fn by_role(all: &Textures) -> impl Iterator<Item = (u32, Texture, bool)> {
-    let of_colors = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, true));
-    let of_data = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, false));
+/// The textures of a material with their roles, in the order of these, and what they are of.
+fn by_role(material: &Material) -> impl Iterator<Item = (u32, Texture, Values)> {
+    let all = &material.textures;
+    let of_colors = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, Values::Colors));
+    let of_data = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, Values::Data));
+    let base = if material.alpha == Alpha::Opaque { Values::Colors } else { Values::Covers };
     [
-        of_colors(layout::BASE_COLOR_TEXTURE, all.base_color),
+        all.base_color.map(|texture| (layout::BASE_COLOR_TEXTURE, texture, base)),
         of_data(layout::METALLIC_ROUGHNESS_TEXTURE, all.metallic_roughness),
         of_data(layout::NORMAL_TEXTURE, all.normal),
         of_colors(layout::EMISSION_TEXTURE, all.emission),
@@ -240,7 +242,7 @@ fn by_role(all: &Textures) -> impl Iterator<Item = (u32, Texture, bool)> {
     .flatten()
 }
 
-fn texture_record(texture: &Texture, role: u32, is_color: bool, texels: &mut Texels<'_>) -> TextureRecord {
+fn texture_record(texture: &Texture, role: u32, values: Values, texels: &mut Texels<'_>) -> TextureRecord {
     let wrap = |wrap| match wrap {
         Wrap::Repeat => WRAP_REPEAT,
         Wrap::Mirror => WRAP_MIRROR,
@@ -248,7 +250,7 @@ fn texture_record(texture: &Texture, role: u32, is_color: bool, texels: &mut Tex
     };
     let [u, v] = texture.wrap.map(wrap);
     let bit = |is: bool, bit: u32| if is { bit } else { 0 };
-    let image = texels.add(texture.image, is_color, texture.is_mipmapped);
+    let image = texels.add(texture.image, values, texture.is_mipmapped);
     let row = |row: [f32; 3]| [row[0], row[1], row[2], 0.0];
     TextureRecord {
         first: image.first,
@@ -256,7 +258,7 @@ fn texture_record(texture: &Texture, role: u32, is_color: bool, texels: &mut Tex
         flags: u
             | (v << 2)
             | bit(texture.is_linear, LINEAR_BIT)
-            | bit(is_color, SRGB_BIT)
+            | bit(values != Values::Data, SRGB_BIT)
             | bit(texture.uv_set == 1, SECOND_UV_BIT)
             | (role << TEXTURE_ROLE_SHIFT),
         levels: image.levels,

@@ -9,6 +9,17 @@ use crate::{
     scene::Image,
 };
 
+/// What the RGBA of an image are, which says how texels are averaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Values {
+    /// Numbers.
+    Data,
+    /// Colours with the sRGB curve.
+    Colors,
+    /// Such colours and their opacity: a texel that is not there has no colour.
+    Covers,
+}
+
 /// An image among the texels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ImageTexels {
@@ -24,7 +35,7 @@ pub(super) struct ImageTexels {
 pub(super) struct Texels<'a> {
     images: &'a [Image],
     words: Vec<u32>,
-    known: HashMap<(u32, bool, bool), ImageTexels>,
+    known: HashMap<(u32, Values, bool), ImageTexels>,
 }
 
 impl<'a> Texels<'a> {
@@ -32,10 +43,10 @@ impl<'a> Texels<'a> {
         Self { images, words: Vec::new(), known: HashMap::new() }
     }
 
-    /// The texels of an image, which is added at its first use. `is_color`: it is averaged as
-    /// colours by the sRGB curve, weighted by their opacity. `is_mipmapped`: with smaller versions.
-    pub fn add(&mut self, image: u32, is_color: bool, is_mipmapped: bool) -> ImageTexels {
-        if let Some(added) = self.known.get(&(image, is_color, is_mipmapped)) {
+    /// The texels of an image, which is added at its first use of that kind. `is_mipmapped`: with
+    /// smaller versions.
+    pub fn add(&mut self, image: u32, values: Values, is_mipmapped: bool) -> ImageTexels {
+        if let Some(added) = self.known.get(&(image, values, is_mipmapped)) {
             return *added;
         }
         let source = &self.images[image as usize];
@@ -45,12 +56,12 @@ impl<'a> Texels<'a> {
         let mut level: Vec<[u8; 4]> = Vec::new();
         while is_mipmapped && (width > 1 || height > 1) {
             let finer = if levels == 1 { &source.texels } else { &level };
-            level = halved(finer, (width, height), is_color);
+            level = halved(finer, (width, height), values);
             (width, height, levels) = ((width / 2).max(1), (height / 2).max(1), levels + 1);
             self.words.extend(level.iter().map(|texel| u32::from_le_bytes(*texel)));
         }
         let added = ImageTexels { first, width: source.width, height: source.height, levels };
-        self.known.insert((image, is_color, is_mipmapped), added);
+        self.known.insert((image, values, is_mipmapped), added);
         added
     }
 
@@ -61,7 +72,8 @@ impl<'a> Texels<'a> {
 
 /// An image of half the size: each texel is the mean of those that it covers, two by two, or three
 /// where the size is odd.
-fn halved(finer: &[[u8; 4]], (width, height): (u32, u32), is_color: bool) -> Vec<[u8; 4]> {
+fn halved(finer: &[[u8; 4]], (width, height): (u32, u32), values: Values) -> Vec<[u8; 4]> {
+    let is_color = values != Values::Data;
     let linear: Vec<f32> = (0..=255_u8)
         .map(|byte| if is_color { srgb_decode(f32::from(byte) / 255.0) } else { f32::from(byte) })
         .collect();
@@ -75,8 +87,7 @@ fn halved(finer: &[[u8; 4]], (width, height): (u32, u32), is_color: bool) -> Vec
         for y in covered(i / columns, rows, height) {
             for x in covered(i % columns, columns, width) {
                 let [r, g, b, a] = finer[(y * width + x) as usize];
-                // A texel that is not there has no colour.
-                let own = if is_color { f32::from(a).max(1e-3) } else { 1.0 };
+                let own = if values == Values::Covers { f32::from(a).max(1e-3) } else { 1.0 };
                 for (sum, value) in sum.iter_mut().zip([r, g, b]) {
                     *sum += own * linear[usize::from(value)];
                 }
@@ -89,4 +100,20 @@ fn halved(finer: &[[u8; 4]], (width, height): (u32, u32), is_color: bool) -> Vec
         [stored(sum[0] / weight), stored(sum[1] / weight), stored(sum[2] / weight), (sum[3] / count + 0.5) as u8]
     };
     (0..columns * rows).into_par_iter().map(texel).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn opacity_weighs_the_colours_of_what_is_there_in_part_alone() {
+        // White that is not there beside black that is.
+        let pair = [[255, 255, 255, 0], [0, 0, 0, 255]];
+        let mean = |values| halved(&pair, (2, 1), values)[0];
+        assert_eq!(mean(Values::Data), [128, 128, 128, 128]);
+        assert_eq!(mean(Values::Colors), [188, 188, 188, 128]);
+        let [r, g, b, a] = mean(Values::Covers);
+        assert!(r < 2 && [g, b] == [r; 2] && a == 128, "{r} {g} {b} {a}");
+    }
 }

@@ -5,6 +5,8 @@ use glam::{Vec3, Vec4};
 use serde_json::{Value, json};
 use support::gltf::{add_accessor, floats, lambert, load, loaded, message, read_with, triangle};
 
+use super::pictures::textured;
+
 /// The material of a triangle, and the notes on it.
 fn read(material: Value) -> (Material, Vec<String>) {
     let mut gltf = triangle();
@@ -74,6 +76,10 @@ fn index_and_specular_make_the_coat() {
     let strong = json!({ "KHR_materials_ior": { "ior": 3 },
         "KHR_materials_specular": { "specularFactor": 0.5, "specularColorFactor": [8, 2, 1] } });
     assert_eq!(coat(strong), layered(Vec3::ONE, 0.0, Vec3::new(2.0, 0.5, 0.25), 0.5));
+    let through = json!({ "KHR_materials_diffuse_transmission": { "diffuseTransmissionFactor": 0.5 },
+        "KHR_materials_volume": { "thicknessFactor": 1 } });
+    let said = "KHR_materials_volume has no effect on diffuse transmission, which is that of a thin sheet";
+    assert_eq!(read(with(json!({}), through)).1, [format!("material \"m\": {said}")]);
     let place = "materials[0].extensions.KHR_materials_";
     for (extension, said) in [
         (json!({ "KHR_materials_ior": { "ior": 0.5 } }), "ior.ior: 0.5 is not an index of refraction from 1, nor 0"),
@@ -146,9 +152,15 @@ fn transmission_makes_glass_or_a_pane() {
     assert_eq!(notes, [r#"material "m": transmits nothing, because ior 0 reflects all light"#]);
     thin["extensions"]["KHR_materials_ior"]["ior"] = 1.5.into();
     thin["extensions"]["KHR_materials_specular"] = json!({ "specularFactor": 0.5 });
-    let (_, notes) = read(thin);
+    let (_, notes) = read(thin.clone());
     let said = "KHR_materials_specular does not change the reflection of glass, which its ior decides";
     assert_eq!(notes, [format!("material \"m\": {said}")]);
+    let mut gltf = textured();
+    gltf["materials"][0] = thin;
+    for (specular, is_said) in [(json!({ "specularColorTexture": { "index": 0 } }), true), (json!({}), false)] {
+        gltf["materials"][0]["extensions"]["KHR_materials_specular"] = specular;
+        assert_eq!(loaded(&gltf).warnings.iter().any(|line| line.ends_with(said)), is_said);
+    }
 }
 
 #[test]

@@ -55,6 +55,7 @@ fn lobes() -> Vec<(&'static str, Material)> {
         ("coat", coated(0.3)),
         ("clear coat over sheen", cloth),
         ("leaf", leaf),
+        ("film", Material { iridescence: 1.0, iridescence_ior: 2.0, iridescence_thickness: [300.0; 2], ..metal(0.6) }),
         ("rough glass", rough_glass()),
         ("coated glass", Material { clearcoat: 1.0, clearcoat_roughness: 0.1, ..Material::new("", glass()) }),
         ("prism", Material { dispersion: 2.0, ..Material::new("prism", glass()) }),
@@ -96,6 +97,8 @@ fn every_lobe_reflects_what_it_gets() {
         ("glass under a clear coat", Material { clearcoat: 1.0, ..Material::new("", glass()) }, 0.98, 1.01),
         ("glass", Material { dispersion: 2.0, ..Material::new("", glass()) }, 0.98, 1.02),
         ("rough glass", rough_glass(), 0.95, 1.0),
+        ("white under a film", filmed([300.0; 2]), 0.85, 1.005),
+        ("white under a film that reflects much", filmed([200.0; 2]), 0.8, 1.005),
         ("white under a coat", Material { surface: white_coated(), roughness: 0.5, ..coated(0.5) }, 0.985, 1.02),
     ] {
         let found = mean_of(&material, 1.0);
@@ -103,6 +106,12 @@ fn every_lobe_reflects_what_it_gets() {
         let half = mean_of(&material, 0.5);
         assert!(half < least, "control: {name} under half of the sky has {half}");
     }
+}
+
+/// A strong film over a white base.
+fn filmed(iridescence_thickness: [f32; 2]) -> Material {
+    let surface = white_coated();
+    Material { surface, iridescence: 1.0, iridescence_ior: 2.4, iridescence_thickness, roughness: 0.3, ..coated(0.3) }
 }
 
 fn white_coated() -> Surface {

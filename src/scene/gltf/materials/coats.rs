@@ -146,6 +146,10 @@ fn diffuse_transmission(reader: &mut Reader<'_>, material: &mut Material) -> Rea
     if material.diffuse_transmission == 0.0 {
         return Ok(());
     }
+    let volume = reader.material.extensions.as_ref().and_then(|extensions| extensions.volume.as_ref());
+    if !material.surface.transmits() && volume.is_some_and(|volume| volume.thickness_factor.0 > 0.0) {
+        reader.note("KHR_materials_volume has no effect on diffuse transmission, which is that of a thin sheet");
+    }
     let textures = &mut material.textures;
     let texture = through.diffuse_transmission_texture.as_ref();
     textures.diffuse_transmission = reader.data_texture(texture, &at("diffuseTransmissionTexture"))?;

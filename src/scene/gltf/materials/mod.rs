@@ -113,10 +113,14 @@ impl Reader<'_> {
 
     /// Glass or a thin pane, as the thickness says.
     fn transmitting(&mut self, base: &Base, material: &mut Material) -> Read<Surface> {
-        if base.specular != 1.0 || base.f0 != Vec3::splat(base::normal_reflectance(base.ior)) {
+        let extensions = self.material.extensions.as_ref();
+        let is_textured = extensions
+            .and_then(|extensions| extensions.specular.as_ref())
+            .is_some_and(|specular| specular.specular_texture.is_some() || specular.specular_color_texture.is_some());
+        let is_given = base.specular != 1.0 || base.f0 != Vec3::splat(base::normal_reflectance(base.ior));
+        if is_given || is_textured {
             self.note("KHR_materials_specular does not change the reflection of glass, which its ior decides");
         }
-        let extensions = self.material.extensions.as_ref();
         (material.transmission, material.metallic) = (base.transmission, base.metallic);
         let texture = extensions.and_then(|e| e.transmission.as_ref()?.transmission_texture.as_ref());
         let at = "extensions.KHR_materials_transmission.transmissionTexture";
