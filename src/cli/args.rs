@@ -62,8 +62,8 @@ pub enum Command {
         #[arg(long)]
         photons: bool,
 
-        /// Adapter that traces them, as in `render`
-        #[arg(long, value_name = "NAME|INDEX", requires = "photons", env = "CAUSTICA_DEVICE", hide_env_values = true)]
+        /// Adapter that traces them, as in `render` [env: CAUSTICA_DEVICE]
+        #[arg(long, value_name = "NAME|INDEX", requires = "photons")]
         device: Option<String>,
     },
 }

@@ -50,7 +50,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     comparison.write(&args.output, &origin, options.shared.exposure.of_all(), options.shared.tonemap.into())?;
     display.note(&format!("wrote {} in {:.1} s", args.output.display(), started.elapsed().as_secs_f64()));
     if !options.shared.quiet {
-        print(&comparison.report.table());
+        print(&comparison.report.table())?;
     }
     comparison.verdict()
 }

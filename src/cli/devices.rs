@@ -15,8 +15,7 @@ pub fn devices() -> Result<()> {
     if all.is_empty() {
         return Err(Error::Device(NO_ADAPTER.to_string()));
     }
-    print(&all.iter().enumerate().map(describe).collect::<String>());
-    Ok(())
+    print(&all.iter().enumerate().map(describe).collect::<String>())
 }
 
 fn describe((index, adapter): (usize, &AdapterReport)) -> String {

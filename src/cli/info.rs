@@ -29,12 +29,13 @@ pub fn info(path: &Path, options: &LoadOptions, json: bool, device: Option<Optio
     } else {
         info.to_string() + &photons.as_ref().map(lines).unwrap_or_default()
     };
-    print(&format!("{}\n", text.trim_end()));
-    Ok(())
+    print(&format!("{}\n", text.trim_end()))
 }
 
 fn photons(scene: &Scene, device: Option<&str>) -> Result<PhotonStats> {
-    let gpu = Gpu::open(device)?;
+    // Not an environment of the option, which would ask for photons wherever it is set.
+    let named = std::env::var("CAUSTICA_DEVICE").ok();
+    let gpu = Gpu::open(device.or(named.as_deref()))?;
     let settings = Quality::Normal.settings().with(|s| s.counts_seen = true);
     let display = Display::new(false, false);
     let stats = trace_photons(&gpu, scene, &settings, &display);

@@ -33,6 +33,12 @@ pub fn run(args: &MergeArgs) -> Result<()> {
     if !found.overlaps.is_empty() {
         return Err(Error::Differs(format!("parts overlap: {}", listed(&found.overlaps))));
     }
+    if let Some(wanted) = args.passes {
+        let there = found.windows.iter().flat_map(|parts| parts.passes());
+        if let Some(more) = there.into_iter().find(|there| there.first < wanted.first || there.end > wanted.end) {
+            return Err(Error::Differs(format!("parts have the passes {more}, and {wanted} are asked for")));
+        }
+    }
     let missing = missing(&found, args.passes);
     match (missing.is_empty(), args.allow_gaps) {
         (true, _) => {}
@@ -78,8 +84,7 @@ pub fn status(args: &StatusArgs) -> Result<()> {
     if args.json {
         let mut text = serde_json::to_string_pretty(&report(&found, &missing)).expect("it is JSON");
         text.push('\n');
-        print(&text);
-        return Ok(());
+        return print(&text);
     }
     let (width, height) = found.whole;
     let mut text = format!("picture: {width}x{height}\n");
@@ -92,8 +97,7 @@ pub fn status(args: &StatusArgs) -> Result<()> {
     missing.iter().for_each(|missing| line("missing", missing));
     found.overlaps.iter().for_each(|overlap| line("twice", overlap));
     found.devices.iter().for_each(|(device, driver)| line("device", &format!("{device} ({driver})")));
-    print(&text);
-    Ok(())
+    print(&text)
 }
 
 fn report(found: &Survey, missing: &[String]) -> serde_json::Value {

@@ -18,7 +18,7 @@ use caustica::{
     stats::{DeviceStats, PassStats, Stats},
 };
 
-use super::{args::RenderArgs, progress::Display, signals, values::words_of_seconds};
+use super::{args::RenderArgs, progress::Display, values::words_of_seconds};
 
 /// Passes from which on their spread is trusted to end a run.
 const LEAST_PASSES: u32 = 4;
@@ -49,9 +49,9 @@ struct Done {
     passes: u32,
 }
 
-/// Renders the passes that are left. `None` if the run was asked to end after it wrote a
-/// checkpoint, with its outputs as far as they were.
-pub fn render(inputs: &Inputs) -> Result<Option<Picture>> {
+/// Renders the passes that are left. A run with a checkpoint that is asked to end writes it first,
+/// and its outputs as far as they are.
+pub fn render(inputs: &Inputs) -> Result<Picture> {
     let started = Instant::now();
     let Inputs { args, settings, display, .. } = *inputs;
     let options = &args.passes;
@@ -61,9 +61,6 @@ pub fn render(inputs: &Inputs) -> Result<Option<Picture>> {
     let device = DeviceStats { name: inputs.gpu.name.clone(), driver: inputs.gpu.driver.clone() };
     let stats = Stats { device, ..Stats::default() };
     let mut done = Done { sum: resumed(inputs, range, &attributes(inputs, &stats))?, stats, passes: 0 };
-    if options.checkpoint.is_some() {
-        signals::keep_work();
-    }
     let ended = run(inputs, range, started, &mut done);
     display.finish();
     if let Some(path) = options.checkpoint.as_deref().filter(|_| !done.sum.blocks().is_empty()) {
@@ -74,15 +71,12 @@ pub fn render(inputs: &Inputs) -> Result<Option<Picture>> {
         }
         display.note(&format!("checkpoint: {} is in {}", passes(&done.sum), path.display()));
     }
-    match ended {
-        Err(Error::Stopped) if options.checkpoint.is_some() && signals::is_termination() => return Ok(None),
-        ended => ended?,
-    }
+    ended?;
     if let Some(path) = &options.part {
         write_part(path, &done.sum, &attributes(inputs, &done.stats))?;
         display.note(&format!("wrote {}", path.display()));
     }
-    picture(inputs, &done).map(Some)
+    picture(inputs, &done)
 }
 
 /// Renders passes until the end.

@@ -28,6 +28,7 @@ use super::{
     passes::{self, Inputs, Picture},
     progress::Display,
     say::say,
+    signals,
     values::{Exposure, extension},
 };
 
@@ -122,6 +123,9 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
     outputs(args, job).try_for_each(|path| files.write(path))?;
     let settings = args.settings();
 
+    if args.passes.checkpoint.is_some() {
+        signals::keep_work();
+    }
     let mut load_seconds = 0.0;
     display.report(Stage::Load, 0, 0);
     let scene = timed(&mut load_seconds, || -> Result<Scene> {
@@ -158,9 +162,9 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
         let result = renderer::render(gpu, &scene, &settings, display);
         display.finish();
         let renderer::Render { frame, stats } = result?;
-        Some(Picture { frame, attributes: scene.origin(&settings, &stats).attributes(), stats })
+        Picture { frame, attributes: scene.origin(&settings, &stats).attributes(), stats }
     };
-    let Some(Picture { frame, attributes, mut stats }) = picture else { return Ok(()) };
+    let Picture { frame, attributes, mut stats } = picture;
     for warning in stats.warnings.iter().filter(|w| !scene.warnings.contains(w)) {
         display.note(&format!("warning: {warning}"));
     }

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use caustica::{Error, Result};
+
 use super::flags::with_flags;
 
 /// Prints a line on stderr. Names of the library's settings are replaced by flags.
@@ -10,7 +12,15 @@ pub fn say(line: &str) {
 }
 
 /// Prints the result of a command on stdout.
-pub fn print(text: &str) {
+///
+/// # Errors
+/// A full disk behind it, and the like.
+pub fn print(text: &str) -> Result<()> {
     let mut out = io::stdout().lock();
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(source) if source.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Error::Io { path: "standard output".into(), source })
+        }
+        _ => Ok(()),
+    }
 }

@@ -27,7 +27,7 @@ static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 /// The work writes a checkpoint when it is asked to stop.
 static KEEPS_WORK: AtomicBool = AtomicBool::new(false);
 
-/// Gives the work the time to write a checkpoint when it is asked to stop.
+/// Gives the work the time to write a checkpoint when it is asked to stop, which is then no failure.
 pub fn keep_work() {
     KEEPS_WORK.store(true, Ordering::Relaxed);
 }
@@ -74,13 +74,10 @@ pub fn stop_requested() -> bool {
     SIGNAL.load(Ordering::Relaxed) != 0
 }
 
-/// Whether the signal was SIGTERM, by which queues take back their machines.
-pub fn is_termination() -> bool {
-    SIGNAL.load(Ordering::Relaxed) == SIGTERM as usize
-}
-
 /// Exit code of a process ended by the signal, as a shell reports it: 130 for SIGINT, 143 for
-/// SIGTERM, 129 for SIGHUP.
+/// SIGTERM, 129 for SIGHUP. 0 for SIGTERM, by which queues take back their machines, where the work
+/// can be resumed.
 pub fn exit_code() -> u8 {
-    128 + SIGNAL.load(Ordering::Relaxed) as u8
+    let signal = SIGNAL.load(Ordering::Relaxed);
+    if signal == SIGTERM as usize && KEEPS_WORK.load(Ordering::Relaxed) { 0 } else { 128 + signal as u8 }
 }

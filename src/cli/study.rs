@@ -69,7 +69,7 @@ pub fn run(args: &StudyArgs) -> Result<()> {
         started.elapsed().as_secs_f64()
     ));
     if !options.quiet {
-        print(&study::summary(&plan, &results));
+        print(&study::summary(&plan, &results))?;
     }
     verdict(&results, &args.output)
 }

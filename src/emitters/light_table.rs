@@ -81,8 +81,8 @@ pub struct Choices {
 }
 
 impl LightTable {
-    /// # Errors [`Error::Scene`] if there are more lights and emissive primitives than a table can
-    /// hold; [`Error::Setting`] if `light_photons` names no light.
+    /// # Errors
+    /// [`Error::Scene`] if there are more lights and emissive primitives than a table can hold.
     pub fn new(
         scene: &Scene,
         environment: Option<&EnvironmentMap>,
@@ -104,7 +104,6 @@ impl LightTable {
             let problem = format!("{} lights and emissive triangles; at most {MAX_CHOICES}", table.lights.len());
             return Err(Error::Scene { path: scene.path.clone(), place: "materials".to_owned(), problem });
         }
-        table.check_names(settings)?;
         table.plant_trees(environment);
         Ok(table)
     }
@@ -307,12 +306,17 @@ impl LightTable {
         }
     }
 
-    fn check_names(&self, settings: &LightSettings) -> Result<()> {
-        let is_known = |name: &String| self.named.iter().any(|light| light.name == *name);
+    /// Checks that each light that the settings name is in one of the tables of a scene's lights.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] with the first that is in none.
+    pub fn check_names<'t>(tables: impl Iterator<Item = &'t Self>, settings: &LightSettings) -> Result<()> {
+        let named: Vec<&NamedLight> = tables.flat_map(|table| &table.named).collect();
+        let is_known = |name: &String| named.iter().any(|light| light.name == *name);
         let Some((name, weight)) = settings.photon_weights.iter().find(|(name, _)| !is_known(name)) else {
             return Ok(());
         };
-        let names: Vec<String> = self.named.iter().map(|light| format!("{:?}", light.name)).collect();
+        let names: Vec<String> = named.iter().map(|light| format!("{:?}", light.name)).collect();
         let problem = format!("no light is called {name:?}; the scene has {}", names.join(", "));
         Err(Error::Setting { name: "lights.photon_weights", value: format!("{name}={weight}"), problem })
     }

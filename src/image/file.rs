@@ -95,7 +95,11 @@ fn target_of(path: &Path) -> io::Result<Option<PathBuf>> {
             Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file there is write-protected"))
         }
         Ok(_) => fs::canonicalize(path).map(Some),
-        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(Some(path.to_path_buf())),
+        // A link to a file that is not there yet is followed as one to a file is.
+        Err(e) if e.kind() == io::ErrorKind::NotFound => match fs::read_link(path) {
+            Ok(link) => Ok(Some(path.parent().unwrap_or(Path::new("")).join(link))),
+            Err(_) => Ok(Some(path.to_path_buf())),
+        },
         Err(e) => Err(e),
     }
 }

@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     bvh::{Bvh, Media, MediaProbe, contacts},
+    emitters::light_table::LightTable,
     error::{Error, Result},
     gpu::Gpu,
     image::{Film, Frame},
@@ -121,6 +122,7 @@ impl<'a> Session<'a> {
                 std::iter::once(first).chain(others).collect()
             }
         };
+        LightTable::check_names(buffers.iter().map(|buffers| &buffers.lights.table), lights)?;
         let solids = &buffers[0].solids;
         stats.warnings.extend(solids.warning());
         stats.warnings.extend(contacts.warning.clone());

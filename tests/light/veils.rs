@@ -8,6 +8,7 @@
 //! | in one place | a card on a wall, two on it, and a doubled one | the doubled card once |
 //! | glass and metal | all is as bright as the sky | the sky without the cards |
 //! | modes | those of rays and of photons agree | cards of another opacity |
+//! | many faint veils | before white, all is as bright as the sky, by photons | the raw estimate |
 //! | mattes | each object has its part, in the mean | – |
 
 use caustica::{
@@ -190,6 +191,24 @@ fn what_veils_show_of_an_even_world_is_even() {
     assert!(within(seen, 1.0, 0.01), "{seen}");
     scene.materials[..2].iter_mut().for_each(|card| *card = veil(card.opacity, unlit([0.0; 3])));
     assert!(mean(&render_scene(&scene, &settings)) < 0.7, "control: black cards");
+}
+
+#[test]
+fn faint_veils_have_the_light_of_their_photons() {
+    // A tenth of the light stays at each, and so does a tenth of the photons.
+    let cards: Vec<Card> =
+        (0..20).map(|i| (0.1, [1.0; 3], 0.05 * (20 - i) as f32)).chain([(1.0, [1.0; 3], -0.1)]).collect();
+    let white = |color: [f32; 3]| Material::new("veil", Surface::Diffuse { albedo: color.into() });
+    let scene = scene_of(&cards, white, 1.0);
+    let seen = |raw| {
+        let settings = settings(Mode::Hybrid, 100_000, 8).with(|s| {
+            s.estimate.raw = raw;
+            s.picture.spp = 16;
+        });
+        mean(&render_scene(&scene, &settings))
+    };
+    assert!(within(seen(false), 1.0, 0.02), "{}", seen(false));
+    assert!(!within(seen(true), 1.0, 0.05), "control: {} as if all of each disc were there", seen(true));
 }
 
 #[test]

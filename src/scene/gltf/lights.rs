@@ -11,7 +11,7 @@ use punctual::{Spot, Type};
 
 use super::extras;
 use super::fault::{Notes, Read, fault};
-use super::nodes::{self, PlacedNode};
+use super::nodes::PlacedNode;
 use crate::scene::{Light, LightKind};
 
 /// Largest outer angle that is taken for a right angle that was rounded up, radians.
@@ -35,7 +35,8 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
         return fault(at, format!("{index} of {}", lights.len()));
     };
     let place = format!("extensions.KHR_lights_punctual.lights[{index}]");
-    let name = nodes::name(node, "light", index);
+    let name = node.name.as_ref().or(light.name.as_ref());
+    let name = name.filter(|name| !name.is_empty()).cloned().unwrap_or_else(|| format!("light {index}"));
     let kind = match light.type_ {
         Checked::Valid(Type::Point) => LightKind::Point,
         Checked::Valid(Type::Spot) => spot(light.spot.as_ref(), &name, &place, notes)?,

@@ -166,8 +166,3 @@ fn local(node: &Node, index: usize) -> Read<DMat4> {
     }
     Ok(DMat4::from_scale_rotation_translation(scale, rotation / length, translation))
 }
-
-/// Name of a node for messages and lists.
-pub(super) fn name(node: &Node, fallback: &str, index: usize) -> String {
-    node.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("{fallback} {index}"))
-}
