@@ -217,11 +217,10 @@ pub struct ArrivingLight {
     pub red: [f32; 4],
     pub green: [f32; 4],
     pub blue: [f32; 4],
+    /// Radiance from all directions alike, of each colour.
+    pub fluence: [f32; 3],
     /// Inverse distances to what was hit, 1/m.
     pub nearness: f32,
-    pub pad0: f32,
-    pub pad1: f32,
-    pub pad2: f32,
 }
 
 /// Sums over a tile's samples of one pixel, by rows. The first row is the radiance, and the number

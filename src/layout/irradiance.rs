@@ -29,14 +29,21 @@ pub struct IrradianceRecord {
     pub ng: u32,
     /// By that normal, W/m²; negative: no point.
     pub irradiance: [f32; 3],
-    /// Eight bits each, signed and normalised: the vector ∫ L ω dω of red along the surface, over
-    /// twice the irradiance; and the fraction of the filter's radius up to which the record is
-    /// taken.
-    pub red_and_reach: u32,
+    /// Fraction of the filter's radius up to which the record is taken.
+    pub reach: f32,
 }
 
-/// The vectors of an [`IrradianceRecord`] for green and blue.
-pub type GreenAndBlue = [u32; 2];
+/// The directions from which the light of an [`IrradianceRecord`] comes, of each colour four
+/// numbers of eight bits, signed and normalised. The first three are v/(1 + |v|), where v is the
+/// vector ∫ L ω dω along the surface, over the irradiance E; the last one is E/∫ L dω, the mean
+/// cosine.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct LightDirections {
+    pub red: u32,
+    pub green: u32,
+    pub blue: u32,
+}
 
 /// Arguments of `filter_irradiance`: records by rows of a grid that is coarser than the picture,
 /// each pixel of it with as many slots as a camera sample has branches.

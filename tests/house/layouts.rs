@@ -64,8 +64,9 @@ fn twins() -> Vec<Twin> {
         FinalStep { first_ray, rays_now, rays, chosen, seed, patches, other_light, pad0 }
         BrightPatch { position, radius, normal, power }
         CellGrid { per_metre, levels, mask, points, next_map, pad0, pad1, pad2 }
-        ArrivingLight { red, green, blue, nearness, pad0, pad1, pad2 }
-        IrradianceRecord { position, ng, irradiance, red_and_reach }
+        ArrivingLight { red, green, blue, fluence, nearness }
+        IrradianceRecord { position, ng, irradiance, reach }
+        LightDirections { red, green, blue }
         RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, footprint }
         IrradianceCell { coordinates, level, position, split, normal, pad0, irradiance, pad1 }
         FirstHit { normal, depth, albedo, alpha, position, id, uv, instance, material }

@@ -6,7 +6,7 @@ use glam::Vec3;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{ArrivingLight, CameraTile, GreenAndBlue, IrradianceRecord, RecordGrid, VisiblePoint, octahedral},
+    layout::{ArrivingLight, CameraTile, IrradianceRecord, LightDirections, RecordGrid, VisiblePoint, octahedral},
 };
 
 /// Pixels of the record grid on each side of a point among which the filter looks for records at
@@ -21,8 +21,7 @@ pub fn filter_footprint(radius: f32, spacing: u32) -> u32 {
 }
 
 /// A slot without a point.
-const NO_RECORD: IrradianceRecord =
-    IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], red_and_reach: 0 };
+const NO_RECORD: IrradianceRecord = IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], reach: 0.0 };
 
 /// Slots of records of a picture at most: 128 MiB, which all adapters bind.
 const MAX_RECORDS: u64 = 1 << 22;
@@ -45,7 +44,7 @@ pub struct Records {
     columns: usize,
     branches: usize,
     records: Vec<IrradianceRecord>,
-    green_and_blue: Vec<GreenAndBlue>,
+    directions: Vec<LightDirections>,
     /// Harmonic mean distance of each point to what is around it, metres.
     distances: Vec<f32>,
 }
@@ -60,7 +59,7 @@ impl Records {
             columns,
             branches,
             records: vec![NO_RECORD; slots],
-            green_and_blue: vec![[0; 2]; slots],
+            directions: vec![LightDirections::default(); slots],
             distances: vec![f32::INFINITY; slots],
         }
     }
@@ -78,35 +77,46 @@ impl Records {
     ) {
         let slot = (row as usize * self.columns + column as usize) * self.branches + branch;
         let normal = Vec3::from(point.ng);
-        let along = |[x, y, z, light]: [f32; 4]| {
-            let all = Vec3::new(x, y, z);
-            let along = (all - normal * all.dot(normal)) / (2.0 * light.max(f32::MIN_POSITIVE));
-            along.clamp_length_max(1.0).to_array().iter().rev().fold(0, |word, x| word << 8 | snorm8(*x))
+        let direction = |[x, y, z, light]: [f32; 4], fluence: f32| {
+            let (all, light) = (Vec3::new(x, y, z), light.max(f32::MIN_POSITIVE));
+            let along = (all - normal * all.dot(normal)) / light;
+            let [x, y, z] = (along / (1.0 + along.length())).to_array();
+            let mean_cosine = light / fluence.max(light);
+            [mean_cosine, z, y, x].iter().fold(0, |word, x| word << 8 | snorm8(*x))
         };
         self.records[slot] = IrradianceRecord {
             position: point.position,
             ng: octahedral(point.ng.into()),
             irradiance: [light[0], light[1], light[2]],
-            red_and_reach: along(arriving.red),
+            reach: 0.0,
         };
-        self.green_and_blue[slot] = [along(arriving.green), along(arriving.blue)];
+        let [red, green, blue] = arriving.fluence;
+        self.directions[slot] = LightDirections {
+            red: direction(arriving.red, red),
+            green: direction(arriving.green, green),
+            blue: direction(arriving.blue, blue),
+        };
         self.distances[slot] = rays as f32 / arriving.nearness;
     }
 
     /// All records, with their reach: that fraction of the distance to what is around each.
     /// `radius`: that of the filter at a position, metres.
     #[must_use]
-    pub fn finish(mut self, fraction: f32, radius: impl Fn(Vec3) -> f32) -> (Vec<IrradianceRecord>, Vec<GreenAndBlue>) {
+    pub fn finish(
+        mut self,
+        fraction: f32,
+        radius: impl Fn(Vec3) -> f32,
+    ) -> (Vec<IrradianceRecord>, Vec<LightDirections>) {
         for slot in 0..self.records.len() {
             let distance = self.distance(slot);
             let record = &mut self.records[slot];
             let reach = fraction * distance / radius(record.position.into());
-            record.red_and_reach |= snorm8(reach.clamp(1.0 / 127.0, 1.0)) << 24;
+            record.reach = reach.clamp(1e-3, 1.0);
         }
         // All that lies beyond the grid has the slot behind all others.
         self.records.push(NO_RECORD);
-        self.green_and_blue.push([0; 2]);
-        (self.records, self.green_and_blue)
+        self.directions.push(LightDirections::default());
+        (self.records, self.directions)
     }
 
     /// Distance to what is around a record. It is no farther away than from a neighbour by way of
@@ -137,7 +147,7 @@ fn snorm8(x: f32) -> u32 {
 pub struct IrradianceRecords {
     kernel: Kernel,
     records: Buffer,
-    green_and_blue: Buffer,
+    directions: Buffer,
     grid: RecordGrid,
 }
 
@@ -148,12 +158,12 @@ impl IrradianceRecords {
     /// Limits of the adapter.
     pub fn new(
         gpu: &Gpu,
-        (records, green_and_blue): &(Vec<IrradianceRecord>, Vec<GreenAndBlue>),
+        (records, directions): &(Vec<IrradianceRecord>, Vec<LightDirections>),
         grid: RecordGrid,
     ) -> Result<Self> {
         let records = gpu.storage_with("irradiance records", records)?;
-        let green_and_blue = gpu.storage_with("directions of irradiance records", green_and_blue)?;
-        Ok(Self { kernel: Kernel::new(gpu, "filter_irradiance", &[]), records, green_and_blue, grid })
+        let directions = gpu.storage_with("directions of irradiance records", directions)?;
+        Ok(Self { kernel: Kernel::new(gpu, "filter_irradiance", &[]), records, directions, grid })
     }
 
     /// Has the kernel compiled ahead of its use.
@@ -171,7 +181,7 @@ impl IrradianceRecords {
             ("tile", &tile),
             ("record_grid", &grid),
             ("records", &self.records),
-            ("green_and_blue", &self.green_and_blue),
+            ("light_directions", &self.directions),
             ("points", points),
             ("radiance", radiance),
             ("lists", lists),
@@ -196,10 +206,10 @@ mod tests {
                 records.put(place, 0, &point, [1.0; 4], &light(nearness), 1);
             }
             // What is near at one limits the other: the distance is 1.5 units, or a hundredth.
-            records.finish(1.5, |_| 3.0).0[4].red_and_reach >> 24
+            records.finish(1.5, |_| 3.0).0[4].reach
         };
-        assert_eq!(reach((1, 0)), snorm8(0.01), "above and beside it");
-        assert_eq!(reach((3, 0)), snorm8(0.5), "control: the end of the row before");
+        assert_eq!(reach((1, 0)), 0.01, "above and beside it");
+        assert_eq!(reach((3, 0)), 0.5, "control: the end of the row before");
     }
 
     #[test]
