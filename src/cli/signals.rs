@@ -27,7 +27,8 @@ static SIGNAL: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 /// The work writes a checkpoint when it is asked to stop.
 static KEEPS_WORK: AtomicBool = AtomicBool::new(false);
 
-/// Gives the work the time to write a checkpoint when it is asked to stop, which is then no failure.
+/// Gives the work the time to write a checkpoint when it is asked to stop, which is then no
+/// failure.
 pub fn keep_work() {
     KEEPS_WORK.store(true, Ordering::Relaxed);
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use super::texels::{Texels, Values};
+use super::texels::Texels;
 use crate::{
     emitters::light_table::emission_in,
     error::{Error, Result},
@@ -12,7 +12,7 @@ use crate::{
         SECOND_UV_BIT, SRGB_BIT, TEXTURE_ROLE_SHIFT, TEXTURE_TEXELS, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR,
         WRAP_REPEAT, octahedral,
     },
-    scene::{Alpha, Attributes, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
+    scene::{Alpha, Attributes, ImageValues, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
     settings::LightUnit,
 };
 
@@ -214,11 +214,11 @@ fn record(
 }
 
 /// The textures of a material with their roles, in the order of these, and what they are of.
-fn by_role(material: &Material) -> impl Iterator<Item = (u32, Texture, Values)> {
+fn by_role(material: &Material) -> impl Iterator<Item = (u32, Texture, ImageValues)> {
     let all = &material.textures;
-    let of_colors = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, Values::Colors));
-    let of_data = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, Values::Data));
-    let base = if material.alpha == Alpha::Opaque { Values::Colors } else { Values::Covers };
+    let of_colors = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, ImageValues::Colors));
+    let of_data = |role, texture: Option<Texture>| texture.map(|texture| (role, texture, ImageValues::Data));
+    let base = ImageValues::of_colors(material.alpha, material.opacity);
     [
         all.base_color.map(|texture| (layout::BASE_COLOR_TEXTURE, texture, base)),
         of_data(layout::METALLIC_ROUGHNESS_TEXTURE, all.metallic_roughness),
@@ -242,7 +242,7 @@ fn by_role(material: &Material) -> impl Iterator<Item = (u32, Texture, Values)> 
     .flatten()
 }
 
-fn texture_record(texture: &Texture, role: u32, values: Values, texels: &mut Texels<'_>) -> TextureRecord {
+fn texture_record(texture: &Texture, role: u32, values: ImageValues, texels: &mut Texels<'_>) -> TextureRecord {
     let wrap = |wrap| match wrap {
         Wrap::Repeat => WRAP_REPEAT,
         Wrap::Mirror => WRAP_MIRROR,
@@ -258,7 +258,7 @@ fn texture_record(texture: &Texture, role: u32, values: Values, texels: &mut Tex
         flags: u
             | (v << 2)
             | bit(texture.is_linear, LINEAR_BIT)
-            | bit(values != Values::Data, SRGB_BIT)
+            | bit(values.are_colors(), SRGB_BIT)
             | bit(texture.uv_set == 1, SECOND_UV_BIT)
             | (role << TEXTURE_ROLE_SHIFT),
         levels: image.levels,

@@ -323,6 +323,10 @@ fn specular_and_glossiness_become_base_and_coat() {
     let (base, f0) = (Vec3::new(0.5, 0.25, 0.125), Vec3::new(1.0, 0.75, 0.5));
     assert_eq!((converted.surface, converted.roughness), (layered(base, 0.0, f0, 1.0), 0.25));
     assert_eq!((converted.alpha, converted.opacity), (Alpha::Blend, 0.5));
+    let glass =
+        json!({ "KHR_materials_pbrSpecularGlossiness": {}, "KHR_materials_transmission": { "transmissionFactor": 1 } });
+    let said = "KHR_materials_transmission has no effect on KHR_materials_pbrSpecularGlossiness";
+    assert_eq!(read(with(json!({}), glass)).1, [format!("material \"m\": {said}")]);
     let default = quiet(with(json!({}), json!({ "KHR_materials_pbrSpecularGlossiness": {} })));
     assert_eq!((default.surface, default.roughness), (layered(Vec3::ONE, 0.0, Vec3::ONE, 1.0), 0.0));
 }

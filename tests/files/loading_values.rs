@@ -216,6 +216,9 @@ fn what_the_format_allows_is_read_whatever_else_the_file_holds() {
             r#"material "paint": its alphaMode is not one of glTF's: it is opaque"#,
         ]
     );
+    gltf["materials"][0]["extensions"]["FAKE_paint"] = json!({});
+    assert_eq!(loaded(&gltf).warnings[1], "extension FAKE_paint is not read", "though it is not listed");
+    gltf["materials"][0]["extensions"].as_object_mut().expect("an object").remove("FAKE_paint");
     gltf["extensionsRequired"] = json!(["FAKE_thing"]);
     let ignoring = |name: &str| {
         let options = LoadOptions { ignore_required: vec![name.into()], ..LoadOptions::default() };

@@ -8,6 +8,7 @@
 //! | passes from the second on: a contact shadow | the same | the reach of the first pass |
 //! | a part of a picture of 4096 x 4096 | the same | the same |
 //! | a floor whose interpolated normals lean | the same | the floor without them |
+//! | a floor whose normals lean from a wall, the only light | the same | the floor without them |
 //! | a floor whose normals lean towards a red wall, opposite a blue one | the same, red over blue | the floor without them |
 //! | a wall of rough metal | estimates at all that it shows, in place of cells | smooth metal has the same bits without cells |
 //! | a crop | the bits of the whole | another seed |
@@ -18,7 +19,7 @@ use caustica::{
     image::{PassBlock, PassSum},
     progress::Silent,
     renderer::{Progressive, Render, Session},
-    scene::{Material, Scene, Surface, Triangle},
+    scene::{Light, LightKind, Material, Scene, Surface, Triangle},
     settings::{Crop, ExtraLayers, Mode, PassSettings, Settings},
 };
 use glam::{Vec3, vec3};
@@ -281,6 +282,30 @@ fn leaning_normals_take_light_from_their_side() {
         let (right, found) = (of(&floor(lean), &converged(128)), of(&floor(lean), &gathering(32, 2)));
         assert!(within(found, right, 0.06), "{lean}: {found} instead of {right}");
         assert!(!matters || !within(flat, right, 0.15), "control: {flat} without them instead of {right}");
+    }
+}
+
+#[test]
+fn normals_that_lean_away_keep_the_light_above_their_horizon() {
+    // A floor beside a wall that the sun lights, in the open: all light comes from one side, and
+    // half of it from above the horizon of a normal that leans by 37 degrees.
+    let floor = |lean: f32| {
+        let mut scene = scene(&[diffuse(0.5), diffuse(0.05)]);
+        add_quad(&mut scene, vec3(-0.5, 0.0, 0.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), 0);
+        let first = scene.triangles.len();
+        add_quad(&mut scene, vec3(-0.5, 0.0, 1.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 0.0, -1.0), 1);
+        let normal = vec3(0.0, 1.0, lean).normalize();
+        scene.triangles[first..].iter_mut().for_each(|t| t.normals = [normal; 3]);
+        scene.lights.push(Light { kind: LightKind::Directional, ..point_light(Vec3::ZERO, 3.0) });
+        scene.cameras.push(camera(vec3(0.0, 1.2, 0.501), vec3(0.0, 0.0, 0.5), 35.0));
+        scene
+    };
+    let of = |scene: &Scene, settings: &Settings| mean(&render_scene(scene, settings));
+    let flat = of(&floor(0.0), &gathering(32, 2));
+    for lean in [-0.3, 0.3, 0.75] {
+        let (right, found) = (of(&floor(lean), &converged(128)), of(&floor(lean), &gathering(32, 2)));
+        assert!(within(found, right, 0.06), "{lean}: {found} instead of {right}");
+        assert!(!within(flat, right, 0.15), "control: {flat} without it instead of {right}");
     }
 }
 

@@ -97,6 +97,7 @@ fn every_lobe_reflects_what_it_gets() {
         ("glass under a clear coat", Material { clearcoat: 1.0, ..Material::new("", glass()) }, 0.98, 1.01),
         ("glass", Material { dispersion: 2.0, ..Material::new("", glass()) }, 0.98, 1.02),
         ("rough glass", rough_glass(), 0.95, 1.0),
+        ("white and metal under a film", half_metal(filmed([400.0; 2])), 0.93, 1.01),
         ("white under a film", filmed([300.0; 2]), 0.85, 1.005),
         ("white under a film that reflects much", filmed([200.0; 2]), 0.8, 1.005),
         ("white under a coat", Material { surface: white_coated(), roughness: 0.5, ..coated(0.5) }, 0.985, 1.02),
@@ -112,6 +113,12 @@ fn every_lobe_reflects_what_it_gets() {
 fn filmed(iridescence_thickness: [f32; 2]) -> Material {
     let surface = white_coated();
     Material { surface, iridescence: 1.0, iridescence_ior: 2.4, iridescence_thickness, roughness: 0.3, ..coated(0.3) }
+}
+
+/// The same of a base that is metal in half, under a fainter film.
+fn half_metal(material: Material) -> Material {
+    let surface = Surface::Layered { base: Vec3::ONE, metallic: 0.5, f0: Vec3::splat(0.04), specular: 1.0 };
+    Material { surface, iridescence_ior: 1.3, ..material }
 }
 
 fn white_coated() -> Surface {

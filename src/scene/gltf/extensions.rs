@@ -1,8 +1,9 @@
 //! Extensions that a file may use or require.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use gltf::json;
+use serde_json::Value;
 
 use super::fault::{Notes, Read, fault};
 
@@ -65,6 +66,16 @@ pub(super) fn check(used: &[String], required: &[String], ignored: &[String], no
         notes.add(format!("extension {name} is not read"));
     }
     Ok(())
+}
+
+/// Notes extensions of materials that are not read, and that the file does not list as it should.
+pub(super) fn note_unlisted(materials: &Value, used: &[String], notes: &mut Notes) {
+    let extensions =
+        materials.as_array().into_iter().flatten().filter_map(|material| material["extensions"].as_object());
+    let names: BTreeSet<&String> = extensions.flat_map(|extensions| extensions.keys()).collect();
+    for name in names.into_iter().filter(|name| !SUPPORTED.contains(&name.as_str()) && !used.contains(name)) {
+        notes.add(format!("extension {name} is not read"));
+    }
 }
 
 /// Whether a buffer has no data because all its views are compressed.

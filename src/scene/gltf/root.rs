@@ -23,6 +23,7 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
         (elements(&mut file, "textures")?, elements(&mut file, "samplers")?);
     if let Some(materials) = file.get("materials") {
         check_textures(materials, textures.len() as u64, false, &|| "materials".to_owned())?;
+        extensions::note_unlisted(materials, &used, notes);
     }
     if file.get("meshes").is_some_and(morphs_more) {
         notes.add("morph targets of texture coordinates and colours are not read: these stay as in the mesh");

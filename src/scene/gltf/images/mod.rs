@@ -11,13 +11,12 @@ use super::buffers::decode_data_uri;
 use super::fault::{Notes, Read, fault};
 use super::files::Resources;
 use super::memory;
-use crate::scene::Image;
+use crate::scene::{Image, ImageValues};
 
 mod decode;
 mod shrink;
 
 use decode::{Encoded, FREE_TEXELS, TEXELS_PER_BYTE};
-use shrink::Curve;
 
 /// Largest image file, bytes.
 const MAX_FILE: u64 = 1 << 30;
@@ -47,20 +46,18 @@ impl Content {
 /// Images that materials in use need, in the order of their first use.
 #[derive(Debug, Default)]
 pub(super) struct ImageList {
-    wanted: Vec<(Content, Curve)>,
+    wanted: Vec<(Content, ImageValues)>,
 }
 
 impl ImageList {
-    /// Index of an image in the scene. `is_color`: its RGB are colours, stored with the sRGB curve.
-    pub(super) fn index(&mut self, content: Content, is_color: bool) -> u32 {
+    /// Index of an image in the scene. `values`: what it is used as.
+    pub(super) fn index(&mut self, content: Content, values: ImageValues) -> u32 {
         let known = self.wanted.iter().position(|(known, _)| *known == content);
         let index = known.unwrap_or_else(|| {
-            self.wanted.push((content, Curve::Linear));
+            self.wanted.push((content, values));
             self.wanted.len() - 1
         });
-        if is_color {
-            self.wanted[index].1 = Curve::Srgb;
-        }
+        self.wanted[index].1 = self.wanted[index].1.and(values);
         index as u32
     }
 
@@ -91,7 +88,7 @@ impl ImageList {
         memory::check_images(&sizes, longest)?;
         // Images that several contents show are decoded for each: a second one is rare.
         let images: Vec<Read<Image>> = (self.wanted.par_iter())
-            .map(|(content, curve)| {
+            .map(|(content, values)| {
                 let (mut name, encoded) =
                     (name(&root.images[content.file()], content.file()), &encoded[source(*content)]);
                 let mut texels = encoded.texels()?;
@@ -102,7 +99,7 @@ impl ImageList {
                 let [width, height] = encoded.size;
                 let image = Image { name, width, height, texels };
                 Ok(match longest {
-                    Some(longest) => shrink::shrunk(image, longest, *curve),
+                    Some(longest) => shrink::shrunk(image, longest, *values),
                     None => image,
                 })
             })

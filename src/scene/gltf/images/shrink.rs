@@ -1,10 +1,10 @@
 //! Smaller versions of images.
 
-use crate::scene::Image;
+use crate::scene::{Image, ImageValues};
 
 /// Encodings of light in the RGB of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Curve {
+enum Curve {
     Linear,
     /// IEC 61966-2-1.
     Srgb,
@@ -31,8 +31,9 @@ impl Curve {
 }
 
 /// The image with its sides halved, rounded down, until none is longer than `longest`. Each texel
-/// is the mean over its area of the values that the RGB stand for.
-pub(super) fn shrunk(image: Image, longest: u32, curve: Curve) -> Image {
+/// is the mean over its area of the values that the RGB stand for, of colours as far as they are
+/// there.
+pub(super) fn shrunk(image: Image, longest: u32, values: ImageValues) -> Image {
     let mut halvings = 0;
     while image.width.max(image.height) >> halvings > longest {
         halvings += 1;
@@ -41,24 +42,29 @@ pub(super) fn shrunk(image: Image, longest: u32, curve: Curve) -> Image {
         return image;
     }
     let (width, height) = ((image.width >> halvings).max(1), (image.height >> halvings).max(1));
+    let curve = if values.are_colors() { Curve::Srgb } else { Curve::Linear };
     let table: [[f32; 256]; 2] =
         [curve, Curve::Linear].map(|curve| std::array::from_fn(|value| curve.linear(value as u8)));
+    let there: [f32; 256] = std::array::from_fn(|alpha| values.there(alpha as u8).max(1e-5));
     let (columns, rows) = (spans(image.width, width), spans(image.height, height));
     let mut texels = Vec::with_capacity(width as usize * height as usize);
     for (first_row, row_weights) in &rows {
         // Sums over the rows of the span, for each column of the image.
-        let mut sums = vec![[0.0_f32; 4]; image.width as usize];
+        let mut sums = vec![[0.0_f32; 5]; image.width as usize];
         for (row, weight) in image.texels.chunks_exact(image.width as usize).skip(*first_row).zip(row_weights) {
             for (sum, texel) in sums.iter_mut().zip(row) {
-                (0..4).for_each(|c| sum[c] += weight * table[usize::from(c == 3)][usize::from(texel[c])]);
+                let own = weight * there[usize::from(texel[3])];
+                (0..3).for_each(|c| sum[c] += own * table[0][usize::from(texel[c])]);
+                sum[3] += weight * table[1][usize::from(texel[3])];
+                sum[4] += own;
             }
         }
         for (first, weights) in &columns {
-            let mut mean = [0.0_f32; 4];
+            let mut mean = [0.0_f32; 5];
             for (sum, weight) in sums[*first..].iter().zip(weights) {
-                (0..4).for_each(|c| mean[c] += weight * sum[c]);
+                (0..5).for_each(|c| mean[c] += weight * sum[c]);
             }
-            let [r, g, b] = [0, 1, 2].map(|c| curve.stored(mean[c]));
+            let [r, g, b] = [0, 1, 2].map(|c| curve.stored(mean[c] / mean[4]));
             texels.push([r, g, b, Curve::Linear.stored(mean[3])]);
         }
     }
@@ -91,21 +97,29 @@ mod tests {
     fn a_checker_becomes_the_grey_of_half_its_light() {
         let checker = image(8, 4, |x, y| [255 * ((x + y) % 2) as u8; 4]);
         let size = |image: &Image| (image.width, image.height);
-        let color = shrunk(checker.clone(), 4, Curve::Srgb);
+        let color = shrunk(checker.clone(), 4, ImageValues::Colors);
         assert_eq!((size(&color), &color.texels[..]), ((4, 2), &[[188, 188, 188, 128]; 8][..]));
-        let data = shrunk(checker.clone(), 1, Curve::Linear);
+        let data = shrunk(checker.clone(), 1, ImageValues::Data);
         assert_eq!((size(&data), &data.texels[..]), ((1, 1), &[[128; 4]][..]));
-        assert_eq!(shrunk(checker.clone(), 8, Curve::Srgb), checker, "small enough");
+        assert_eq!(shrunk(checker.clone(), 8, ImageValues::Colors), checker, "small enough");
+    }
+
+    #[test]
+    fn what_is_not_there_has_no_colour() {
+        let leaf = image(8, 8, |x, _| if x % 2 == 0 { [255, 255, 255, 200] } else { [0, 0, 0, 0] });
+        let of = |values| shrunk(leaf.clone(), 4, values).texels[0];
+        assert_eq!((of(ImageValues::Blend), of(ImageValues::Mask(128))), ([255, 255, 255, 100], [255, 255, 255, 100]));
+        assert_eq!(of(ImageValues::Colors), [188, 188, 188, 100], "control");
     }
 
     #[test]
     fn odd_sides_keep_the_mean() {
         let ramp = image(5, 1, |x, _| [50 * x as u8, 100, 200, 255]);
-        let small = shrunk(ramp, 2, Curve::Linear);
+        let small = shrunk(ramp, 2, ImageValues::Data);
         // Two parts of 2.5 texels: (0 + 50 + 100/2) / 2.5 and (100/2 + 150 + 200) / 2.5.
         assert_eq!(small.texels, [[40, 100, 200, 255], [160, 100, 200, 255]]);
         let all = image(7, 3, |x, y| [(x * y) as u8, 0, 0, 0]);
-        assert_eq!(shrunk(all, 1, Curve::Linear).texels, [[3, 0, 0, 0]]);
+        assert_eq!(shrunk(all, 1, ImageValues::Data).texels, [[3, 0, 0, 0]]);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::super::fault::{Read, fault};
 use super::super::images::Content;
 use super::extensions::SpecularGlossiness;
 use super::reader::Reader;
-use crate::scene::{Alpha, Texture};
+use crate::scene::{Alpha, ImageValues, Texture};
 use gltf::json::material::AlphaMode;
 use gltf::json::validation::Checked;
 
@@ -18,6 +18,7 @@ const DEFAULT_IOR: f32 = 1.5;
 #[derive(Default)]
 pub(super) struct Base {
     pub(super) color: Vec3,
+    pub(super) alpha: Alpha,
     pub(super) opacity: f32,
     pub(super) metallic: f32,
     pub(super) roughness: f32,
@@ -60,11 +61,16 @@ pub(super) fn of_unlit(reader: &mut Reader<'_>) -> Read<Base> {
     let pbr = &reader.material.pbr_metallic_roughness;
     let [r, g, b, a] = pbr.base_color_factor.0;
     let at = "pbrMetallicRoughness.baseColorFactor";
+    let alpha = alpha(reader)?;
     Ok(Base {
+        alpha,
         color: reader.color([r, g, b], "base colour", at)?,
         opacity: reader.unit(a, "opacity", at)?,
-        color_texture: reader
-            .color_texture(pbr.base_color_texture.as_ref(), "pbrMetallicRoughness.baseColorTexture")?,
+        color_texture: reader.base_texture(
+            pbr.base_color_texture.as_ref(),
+            (alpha, a),
+            "pbrMetallicRoughness.baseColorTexture",
+        )?,
         ..Base::default()
     })
 }
@@ -77,7 +83,9 @@ fn of_metal(reader: &mut Reader<'_>) -> Read<Base> {
     let [r, g, b, a] = pbr.base_color_factor.0;
     let specular = material.extensions.as_ref().and_then(|extensions| extensions.specular.as_ref());
     let ior = ior(reader)?;
+    let alpha = alpha(reader)?;
     let mut base = Base {
+        alpha,
         color: reader.color([r, g, b], "base colour", &format!("{PBR}.baseColorFactor"))?,
         opacity: reader.unit(a, "opacity", &format!("{PBR}.baseColorFactor"))?,
         metallic: reader.unit(pbr.metallic_factor.0, "metallic", &format!("{PBR}.metallicFactor"))?,
@@ -86,7 +94,11 @@ fn of_metal(reader: &mut Reader<'_>) -> Read<Base> {
         f0: Vec3::splat(normal_reflectance(ior)),
         specular: 1.0,
         transmission: 0.0,
-        color_texture: reader.color_texture(pbr.base_color_texture.as_ref(), &format!("{PBR}.baseColorTexture"))?,
+        color_texture: reader.base_texture(
+            pbr.base_color_texture.as_ref(),
+            (alpha, a),
+            &format!("{PBR}.baseColorTexture"),
+        )?,
         metallic_roughness: None,
         specular_texture: None,
         specular_color: None,
@@ -126,11 +138,17 @@ fn of_glossiness(reader: &mut Reader<'_>, glossy: &SpecularGlossiness) -> Read<B
     let at = |member: &str| format!("extensions.{SPECULAR_GLOSSINESS}.{member}");
     let [r, g, b, a] = glossy.diffuse_factor;
     let glossiness = reader.unit(glossy.glossiness_factor, "glossiness", &at("glossinessFactor"))?;
+    let transmission = reader.material.extensions.as_ref().and_then(|extensions| extensions.transmission.as_ref());
+    if transmission.is_some_and(|transmission| transmission.transmission_factor.0 > 0.0) {
+        reader.note(&format!("KHR_materials_transmission has no effect on {SPECULAR_GLOSSINESS}"));
+    }
     let texture = glossy.specular_glossiness_texture.as_ref();
     let metallic_roughness = reader.texture(texture, &at("specularGlossinessTexture"), |image| {
-        (Content::Roughness { image, glossiness }, false)
+        (Content::Roughness { image, glossiness }, ImageValues::Data)
     })?;
+    let alpha = alpha(reader)?;
     Ok(Base {
+        alpha,
         color: reader.color([r, g, b], "diffuse colour", &at("diffuseFactor"))?,
         opacity: reader.unit(a, "opacity", &at("diffuseFactor"))?,
         metallic: 0.0,
@@ -139,7 +157,7 @@ fn of_glossiness(reader: &mut Reader<'_>, glossy: &SpecularGlossiness) -> Read<B
         f0: reader.color(glossy.specular_factor, "specular colour", &at("specularFactor"))?,
         specular: 1.0,
         transmission: 0.0,
-        color_texture: reader.color_texture(glossy.diffuse_texture.as_ref(), &at("diffuseTexture"))?,
+        color_texture: reader.base_texture(glossy.diffuse_texture.as_ref(), (alpha, a), &at("diffuseTexture"))?,
         metallic_roughness,
         specular_texture: None,
         specular_color: reader.color_texture(texture, &at("specularGlossinessTexture"))?,
@@ -171,7 +189,7 @@ pub(super) fn normal_reflectance(ior: f32) -> f32 {
 }
 
 /// Reads how much of the surface is there.
-pub(super) fn alpha(reader: &mut Reader<'_>) -> Read<Alpha> {
+fn alpha(reader: &mut Reader<'_>) -> Read<Alpha> {
     let cutoff = reader.material.alpha_cutoff.unwrap_or_default().0;
     match reader.material.alpha_mode {
         Checked::Valid(AlphaMode::Opaque) => Ok(Alpha::Opaque),

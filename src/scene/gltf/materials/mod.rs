@@ -58,10 +58,10 @@ impl Reader<'_> {
         let extensions = self.material.extensions.as_ref();
         let unlit = extensions.is_some_and(|extensions| extensions.others.contains_key("KHR_materials_unlit"));
         let base = if unlit { base::of_unlit(self)? } else { base::read(self)? };
-        let alpha = base::alpha(self)?;
         let mut material = Material::new(&self.name, Surface::Diffuse { albedo: base.color });
         material.double_sided = self.material.double_sided;
-        (material.alpha, material.opacity) = (alpha, if alpha == Alpha::Opaque { 1.0 } else { base.opacity });
+        material.alpha = base.alpha;
+        material.opacity = if base.alpha == Alpha::Opaque { 1.0 } else { base.opacity };
         material.priority = extras::priority(&self.material.extras, &self.place)?;
         material.group = extras::group(&self.material.extras, &self.place)?;
         material.textures.base_color = base.color_texture;

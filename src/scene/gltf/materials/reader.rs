@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use super::super::fault::{Notes, Read, fault};
 use super::super::images::{Content, ImageList};
 use super::super::textures::{self, AXES, Reference};
-use crate::scene::{Texture, UV_SETS};
+use crate::scene::{Alpha, ImageValues, Texture, UV_SETS};
 use glam::Vec3;
 
 /// Reader of one material of the file, as a mesh without some sets of texture coordinates shows it.
@@ -81,7 +81,18 @@ impl Reader<'_> {
         reference: Option<impl Into<Reference<'r>>>,
         at: &str,
     ) -> Read<Option<Texture>> {
-        self.texture(reference, at, |image| (Content::File(image), true))
+        self.texture(reference, at, |image| (Content::File(image), ImageValues::Colors))
+    }
+
+    /// The texture of the base colour of a material: its A is the opacity.
+    pub(super) fn base_texture<'r>(
+        &mut self,
+        reference: Option<impl Into<Reference<'r>>>,
+        (alpha, opacity): (Alpha, f32),
+        at: &str,
+    ) -> Read<Option<Texture>> {
+        let values = ImageValues::of_colors(alpha, opacity);
+        self.texture(reference, at, |image| (Content::File(image), values))
     }
 
     /// A texture of linear values.
@@ -90,16 +101,16 @@ impl Reader<'_> {
         reference: Option<impl Into<Reference<'r>>>,
         at: &str,
     ) -> Read<Option<Texture>> {
-        self.texture(reference, at, |image| (Content::File(image), false))
+        self.texture(reference, at, |image| (Content::File(image), ImageValues::Data))
     }
 
-    /// A texture that shows what `content` makes of an image of the file, and whether that is of
-    /// colours. `None` if there is none, or if it is left out with a note.
+    /// A texture that shows what `content` makes of an image of the file, and what that is.
+    /// `None` if there is none, or if it is left out with a note.
     pub(super) fn texture<'r>(
         &mut self,
         reference: Option<impl Into<Reference<'r>>>,
         at: &str,
-        content: impl Fn(usize) -> (Content, bool),
+        content: impl Fn(usize) -> (Content, ImageValues),
     ) -> Read<Option<Texture>> {
         let Some(reference) = reference.map(Into::into) else { return Ok(None) };
         let place = format!("{}.{at}", self.place);
@@ -116,8 +127,8 @@ impl Reader<'_> {
             }
             return Ok(None);
         };
-        let (content, is_color) = content(image);
-        Ok(Some(Texture { image: self.images.index(content, is_color), uv_set, ..texture }))
+        let (content, values) = content(image);
+        Ok(Some(Texture { image: self.images.index(content, values), uv_set, ..texture }))
     }
 
     /// Asks for tangents, which may be made along the first set of texture coordinates; whether the
