@@ -141,6 +141,8 @@ pub const MASK_BIT: u32 = 2;
 pub const BLEND_BIT: u32 = 4;
 /// The surface is seen in its base colour, whatever lights it.
 pub const UNLIT_BIT: u32 = 8;
+/// What of it is glass casts caustics however rough it is.
+pub const SMALL_GLASS_BIT: u32 = 16;
 
 /// Factors of a material, and where its textures are.
 #[repr(C)]
@@ -159,7 +161,7 @@ pub struct MaterialRecord {
     pub metallic: f32,
     /// Fraction of the light within glass that is transmitted.
     pub transmission: f32,
-    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`UNLIT_BIT`].
+    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`UNLIT_BIT`], [`SMALL_GLASS_BIT`].
     pub flags: u32,
     /// Reflectance of the coat along the normal, without its strength.
     pub f0: [f32; 3],

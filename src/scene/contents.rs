@@ -16,6 +16,9 @@ use crate::{
     stats::Stats,
 };
 
+/// Fraction of the area of all surfaces below which glass is small.
+const SMALL: f64 = 0.01;
+
 /// A scene, ready to be traced.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -100,11 +103,32 @@ impl Scene {
     }
 
     /// For each material, whether what it reflects or transmits is sharp enough for caustics
-    /// somewhere: mirrors, metals, glass and panes up to [`LoadOptions::caustic_roughness`]. For
-    /// one point `shaders/lib/transport/material.wesl` decides.
+    /// somewhere: mirrors, metals, glass and panes up to [`LoadOptions::caustic_roughness`], and
+    /// [small glass](Self::small_glass). For one point `shaders/lib/transport/material.wesl`
+    /// decides.
     #[must_use]
     pub fn caustic_materials(&self) -> Vec<bool> {
-        self.materials.iter().map(|material| self.casts_caustics(material)).collect()
+        let small = self.small_glass();
+        self.materials.iter().zip(small).map(|(material, small)| small || self.casts_caustics(material)).collect()
+    }
+
+    /// For each material, whether it is glass or a pane, and all of its surfaces are less than
+    /// [`SMALL`] of those of the scene, as the covers of lamps are. It casts caustics however rough
+    /// it is: few of the rays that look around meet it, and each brings much light. None where
+    /// [`LoadOptions::caustic_roughness`] is 0.
+    #[must_use]
+    pub fn small_glass(&self) -> Vec<bool> {
+        let mut areas = vec![0.0; self.materials.len()];
+        self.triangles.iter().for_each(|triangle| areas[triangle.material as usize] += triangle.area());
+        self.spheres.iter().for_each(|sphere| areas[sphere.material as usize] += sphere.area());
+        let of_mesh = |mesh: &SharedMesh| mesh.triangles.iter().map(Triangle::area).sum::<f64>();
+        let meshes: Vec<f64> = self.meshes.iter().map(of_mesh).collect();
+        let scale = |instance: &Instance| f64::from(instance.linear.determinant()).powf(2.0 / 3.0);
+        let instances: f64 = self.instances.iter().map(|i| meshes[i.mesh as usize] * scale(i)).sum();
+        let all = areas.iter().sum::<f64>() + instances;
+        let is_small = |(material, area): (&Material, f64)| material.surface.transmits() && area < SMALL * all;
+        let may_be = self.options.caustic_roughness > 0.0;
+        self.materials.iter().zip(areas).map(|of| may_be && is_small(of)).collect()
     }
 
     fn casts_caustics(&self, material: &Material) -> bool {

@@ -9,8 +9,8 @@ use crate::{
     gpu::{Gpu, Table},
     layout::{
         self, BLEND_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS, MaterialRecord,
-        SECOND_UV_BIT, SRGB_BIT, TEXTURE_ROLE_SHIFT, TEXTURE_TEXELS, TextureRecord, UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR,
-        WRAP_REPEAT, octahedral,
+        SECOND_UV_BIT, SMALL_GLASS_BIT, SRGB_BIT, TEXTURE_ROLE_SHIFT, TEXTURE_TEXELS, TextureRecord, UNLIT_BIT,
+        WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
     },
     scene::{Alpha, Attributes, ImageValues, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
     settings::LightUnit,
@@ -87,8 +87,11 @@ impl MaterialBuffers {
 fn rows(scene: &Scene, unit: LightUnit, texels: &mut Texels<'_>) -> Vec<[u32; 4]> {
     let first_row = scene.materials.len() as u32 * MATERIAL_TEXELS;
     let mut textures = Vec::new();
-    let record = |material| record(material, unit, first_row, &mut textures, texels);
-    let records: Vec<MaterialRecord> = scene.materials.iter().map(record).collect();
+    let record = |(material, small): (&Material, bool)| {
+        let record = record(material, unit, first_row, &mut textures, texels);
+        MaterialRecord { flags: record.flags | if small { SMALL_GLASS_BIT } else { 0 }, ..record }
+    };
+    let records: Vec<MaterialRecord> = scene.materials.iter().zip(scene.small_glass()).map(record).collect();
     [bytemuck::cast_slice(&records), bytemuck::cast_slice(&textures)].concat()
 }
 

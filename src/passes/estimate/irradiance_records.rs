@@ -20,6 +20,9 @@ pub fn filter_footprint(radius: f32, spacing: u32) -> u32 {
     ((radius / spacing as f32).ceil() as u32).clamp(1, MAX_FOOTPRINT)
 }
 
+/// Largest reach of a record: that of the widest filter, `MAX_RADIUS` in `filter_irradiance.wesl`.
+const MAX_REACH: f32 = 8.0;
+
 /// A slot without a point.
 const NO_RECORD: IrradianceRecord = IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], reach: 0.0 };
 
@@ -111,7 +114,7 @@ impl Records {
             let distance = self.distance(slot);
             let record = &mut self.records[slot];
             let reach = fraction * distance / radius(record.position.into());
-            record.reach = reach.clamp(1e-3, 1.0);
+            record.reach = reach.clamp(1e-3, MAX_REACH);
         }
         // All that lies beyond the grid has the slot behind all others.
         self.records.push(NO_RECORD);
@@ -208,7 +211,7 @@ mod tests {
             // What is near at one limits the other: the distance is 1.5 units, or a hundredth.
             records.finish(1.5, |_| 3.0).0[4].reach
         };
-        assert_eq!(reach((1, 0)), 0.01, "above and beside it");
+        assert_eq!(reach((1, 0)), 0.005, "above and beside it");
         assert_eq!(reach((3, 0)), 0.5, "control: the end of the row before");
     }
 
