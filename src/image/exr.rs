@@ -99,9 +99,9 @@ pub fn write_exr_with(path: &Path, frame: &Frame, attributes: &Attributes) -> Re
     write_file(path, &bytes)
 }
 
-/// One channel.
+/// One channel. A name has at most 255 bytes, none of which is 0.
 pub(super) fn channel(name: String, samples: Vec<f32>) -> Channel {
-    AnyChannel::new(name.as_str(), FlatSamples::F32(samples))
+    AnyChannel::new(text(&name), FlatSamples::F32(samples))
 }
 
 /// Channels of a layer whose numbers are stored pixel by pixel; `before` begins their names.
@@ -194,7 +194,7 @@ fn layer_attributes(attributes: &Attributes) -> LayerAttributes {
     let version = attributes.get("version").map_or(env!("CARGO_PKG_VERSION"), String::as_str);
     let attribute = |(name, value): (&String, &String)| {
         let name = if name.starts_with(CRYPTOMATTE) { name.clone() } else { format!("{OURS}{name}") };
-        (Text::from(name.as_str()), AttributeValue::Text(text(value)))
+        (text(&name), AttributeValue::Text(text(value)))
     };
     LayerAttributes {
         software_name: Some(text(&format!("Caustica {version}"))),
@@ -203,7 +203,7 @@ fn layer_attributes(attributes: &Attributes) -> LayerAttributes {
     }
 }
 
-/// Text in UTF-8, the encoding of OpenEXR.
+/// Text in UTF-8, the encoding of OpenEXR. The crate's own conversion writes Latin-1.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }

@@ -84,8 +84,8 @@ pub(super) fn attributes_of(image: &ReadImage) -> Attributes {
 pub(super) fn our_attributes<'a>(all: impl Iterator<Item = (&'a Text, &'a AttributeValue)>) -> Attributes {
     let ours = all.filter_map(|(name, value)| match value {
         AttributeValue::Text(value) => {
-            let name = name.to_string();
-            let ours = name.strip_prefix(OURS).or(Some(name.as_str()).filter(|name| name.starts_with(CRYPTOMATTE)))?;
+            let name = String::from_utf8_lossy(name.bytes());
+            let ours = name.strip_prefix(OURS).or(Some(&*name).filter(|name| name.starts_with(CRYPTOMATTE)))?;
             Some((ours.to_owned(), String::from_utf8_lossy(value.bytes()).into_owned()))
         }
         _ => None,

@@ -226,7 +226,7 @@ pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
     let read = |before: &str, names: &[&str]| -> Result<Vec<f32>> {
         let channel = |name: &&str| {
             let name = format!("{before}{name}");
-            let channel = layer.channel_data.list.iter().find(|c| c.name == *name.as_str());
+            let channel = layer.channel_data.list.iter().find(|c| c.name.bytes() == name.as_bytes());
             let samples = channel.map(|c| c.sample_data.values_as_f32().collect::<Vec<_>>());
             let missing = || failure(path, format!("the part has no channel {name}"));
             samples.filter(|samples| samples.len() == pixels).ok_or_else(missing)

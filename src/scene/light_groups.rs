@@ -3,16 +3,19 @@
 use glam::Vec3;
 
 use super::{Material, Scene, Surface};
-use crate::{Error, Result};
+use crate::{Error, Result, image::cryptomatte::hash};
 
 /// Maximum number of groups of a picture.
 const MAX_GROUPS: usize = 32;
+/// Maximum length of a group's name, bytes: names of channels end at 255, of which those of parts
+/// need some for themselves.
+const MAX_BYTES: usize = 200;
 /// Group of what shows its colour without light.
 const UNLIT: &str = "unlit";
 
 impl Scene {
     /// Names of the groups of lights, in the order of the scene: what shines, by its own name or
-    /// that of its group. Names have no dots, which divide layers.
+    /// that of its group, as [`group`] makes it fit for a layer.
     ///
     /// # Errors
     /// [`Error::Setting`] if there are too many.
@@ -71,9 +74,20 @@ impl Material {
     }
 }
 
+/// Name of a group that a file's layers can have: without dots, which divide layers, and without
+/// control characters. Of a long name the beginning is kept, and the hash of all of it tells it
+/// from others that begin alike.
 fn group(own: Option<&String>, name: &str) -> String {
-    let name = own.map_or(name, String::as_str).replace('.', "_");
-    if name.is_empty() { "unnamed".to_owned() } else { name }
+    let fit = |c: char| if c == '.' || c.is_control() { '_' } else { c };
+    let name: String = own.map_or(name, String::as_str).chars().map(fit).collect();
+    match name.len() {
+        0 => "unnamed".to_owned(),
+        1..=MAX_BYTES => name,
+        _ => {
+            let hash = format!("~{:08x}", hash(&name));
+            format!("{}{hash}", &name[..name.floor_char_boundary(MAX_BYTES - hash.len())])
+        }
+    }
 }
 
 #[cfg(test)]
@@ -120,6 +134,20 @@ mod tests {
         assert_eq!(Scene::default().light_groups().expect("none"), [""; 0]);
         let many = Scene { lights: (0..33).map(|i| light(&i.to_string(), None)).collect(), ..Scene::default() };
         assert!(many.light_groups().expect_err("too many").to_string().contains("33 groups of lights, at most 32"));
+    }
+
+    #[test]
+    fn names_of_groups_are_fit_for_layers() {
+        let of = |name: &str| group(None, name);
+        for kept in ["Lampe Tür", "ü☃", "a b/c"] {
+            assert_eq!(of(kept), kept);
+        }
+        assert_eq!(of("a.b\0c\nd"), "a_b_c_d");
+        assert_eq!(of(&"x".repeat(200)), "x".repeat(200));
+        let long = |end: &str| of(&format!("{}{end}", "ü☃".repeat(60)));
+        assert!(long("1").len() <= 200 && long("1").starts_with("ü☃ü☃"), "{}", long("1"));
+        assert_eq!(long("1"), long("1"));
+        assert_ne!(long("1"), long("2"), "what begins alike is told apart");
     }
 
     #[test]

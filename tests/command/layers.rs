@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | components | emission, direct, global and caustic add up to the picture, whose bits layers do not change | one left out |
 //! | lights | the layer of a light is the picture of this light alone, and a group's that of its lights | another light's layer |
+//! | names | lights of any name have layers that are read, in pictures and in parts; long names are told apart | |
 //! | first hits | position, depth and the planes of the room agree; texture coordinates are those of the mesh | another plane |
 //! | mattes | names cover what they name, by the manifest | another name |
 //! | passes | layers of merged parts have the bytes of one run | fewer passes |
@@ -33,8 +34,9 @@ fn succeeds(folder: &Path, line: &str) {
 fn channels(path: &Path) -> Vec<(String, Vec<f32>)> {
     let read = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
     let image = read.all_attributes().from_file(path).expect("an OpenEXR file");
+    let text = |name: &[u8]| String::from_utf8(name.to_vec()).expect("names are UTF-8");
     let numbers = |samples: &FlatSamples| samples.values_as_f32().collect::<Vec<f32>>();
-    image.layer_data.channel_data.list.iter().map(|c| (c.name.to_string(), numbers(&c.sample_data))).collect()
+    image.layer_data.channel_data.list.iter().map(|c| (text(c.name.bytes()), numbers(&c.sample_data))).collect()
 }
 
 struct File(Vec<(String, Vec<f32>)>);
@@ -137,6 +139,32 @@ fn the_layer_of_a_light_is_its_picture_alone() {
         refused.status.code() == Some(1) && said.contains("nodes[7].extras.caustica.group: 7 is no name"),
         "{said}"
     );
+}
+
+#[test]
+fn lights_of_any_name_have_layers() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let long = |end: &str| format!("{}{end}", "Lampe Tür ".repeat(30));
+    changed(folder, "named.gltf", |scene| {
+        for (name, new) in [("light 1", "Tür\u{0}☃".to_owned()), ("light 2", long("1")), ("light 3", long("2"))] {
+            let node = nodes(scene).iter_mut().find(|node| node["name"] == name).expect("a light");
+            node["name"] = new.into();
+        }
+        nodes(scene).iter_mut().find(|node| node["name"] == "floor").expect("a floor")["name"] = "Fußboden ☃".into();
+    });
+    let tiny = "--size 4x4 --spp 1 --photons 1k -k 20 --layers lights,objects -q";
+    succeeds(folder, &format!("render named.gltf {tiny} --passes 2 --part part.exr -o one.exr"));
+    succeeds(folder, "merge part.exr -o merged.exr -q");
+    assert!(fs::read(folder.join("merged.exr")).expect("it is there") == fs::read(folder.join("one.exr")).expect("it"));
+    let file = File::read(folder, "one.exr");
+    let lights: Vec<_> = file.names().into_iter().filter(|name| name.starts_with("light.")).collect();
+    assert!(lights.len() == 9 && lights.contains(&"light.Tür_☃.R"), "{lights:?}");
+    assert!(lights.iter().all(|name| name.matches('.').count() == 2 && name.len() < 220), "{lights:?}");
+    let layers: Vec<_> = lights.iter().filter_map(|name| name.strip_suffix(".R")).collect();
+    assert!(file.misses(&layers) < 1e-6);
+    let attributes = caustica::image::read_exr_attributes(&folder.join("one.exr")).expect("a file");
+    assert!(attributes.values().any(|value| value.contains(r#""Fußboden ☃":"#)), "{attributes:?}");
 }
 
 #[test]
