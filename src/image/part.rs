@@ -8,7 +8,10 @@
 
 use std::{io::BufReader, path::Path};
 
-use exr::meta::MetaData;
+use exr::{
+    block::{BlockIndex, chunk::TileCoordinates},
+    meta::MetaData,
+};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -194,11 +197,11 @@ fn range(rows: &[BlockRow]) -> PassRange {
 /// Reads what a part says of itself, without its pixels.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read or is not a part.
+/// [`Error::Io`] if the file cannot be read, is not a part, or is cut off.
 pub fn read_part_header(path: &Path) -> Result<PartHeader> {
     let file = open_regular(path).map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
-    let meta = MetaData::read_from_buffered(BufReader::new(file), false).map_err(|e| failure(path, e))?;
-    let [header] = meta.headers.as_slice() else { return Err(no_part(path)) };
+    let file = exr::block::read(BufReader::new(file), false).map_err(|e| failure(path, e))?;
+    let [header] = file.headers() else { return Err(no_part(path)) };
     let attributes = our_attributes(header.shared_attributes.other.iter().chain(&header.own_attributes.other));
     let size = (header.layer_size.width() as u32, header.layer_size.height() as u32);
     let whole = header.shared_attributes.display_window;
@@ -207,7 +210,15 @@ pub fn read_part_header(path: &Path) -> Result<PartHeader> {
     let window = Crop { column: at(position.x())?, row: at(position.y())?, width: size.0, height: size.1 };
     let whole = (whole.size.width() as u32, whole.size.height() as u32);
     let rows = rows(path, &attributes)?;
-    Ok(PartHeader { passes: range(&rows), attributes, whole, window })
+    // The last lines of the picture are the last bytes of the file.
+    let is_last = |_: &MetaData, _: TileCoordinates, block: BlockIndex| {
+        block.pixel_position.y() + block.pixel_size.height() == size.1 as usize
+    };
+    let mut lines = file.filter_chunks(false, is_last).map_err(|_| cut_off(path))?;
+    match lines.next() {
+        Some(Ok(_)) => Ok(PartHeader { passes: range(&rows), attributes, whole, window }),
+        _ => Err(cut_off(path)),
+    }
 }
 
 /// Reads a part.
@@ -318,6 +329,10 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
         FORMAT => Ok(rows),
         other => Err(failure(path, format!("is a part of format {other}; this version reads and writes {FORMAT}"))),
     }
+}
+
+fn cut_off(path: &Path) -> Error {
+    failure(path, "is a broken part: the end of the file is missing")
 }
 
 fn no_part(path: &Path) -> Error {
@@ -436,6 +451,14 @@ mod tests {
         bytes[at] = b'1';
         std::fs::write(&path, &bytes).unwrap();
         assert!(said(&path).contains("is a part of format 1; this version reads and writes 3"), "{}", said(&path));
+        write_part(&path, &sum(0..1), &attributes()).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for bytes in [whole.len() - 1, whole.len() - 200] {
+            std::fs::write(&path, &whole[..bytes]).unwrap();
+            let message = read_part_header(&path).unwrap_err().to_string();
+            assert!(message.ends_with("a.exr: is a broken part: the end of the file is missing"), "{message}");
+            assert!(read_part(&path).is_err());
+        }
         for blocks in ["[]", "{}", "7", r#"[{"passes":{"first":3,"end":9}}]"#] {
             let mut attributes = attributes();
             attributes.insert("blocks".to_owned(), blocks.to_owned());

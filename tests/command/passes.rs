@@ -96,6 +96,13 @@ fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
     let none = fails(folder, "merge one.exr -o y.exr");
     assert!(none.contains("one.exr: is no part of a picture: render --part or --checkpoint did not"), "{none}");
     assert!(fails(folder, "merge a.exr b.exr -o a.exr").contains("is a part as well"));
+    let whole = bytes(folder, "b.exr");
+    fs::write(folder.join("cut.exr"), &whole[..whole.len() - 1]).expect("it is written");
+    for line in ["status a.exr cut.exr", "status a.exr cut.exr --json", "merge a.exr cut.exr -o y.exr"] {
+        assert!(fails(folder, line).contains("cut.exr: is a broken part: the end of the file is missing"), "{line}");
+    }
+    let more = fails(folder, "merge a.exr b.exr --passes 0..3 -o y.exr");
+    assert!(more.contains("parts have the passes 0..5, and 0..3 are asked for"), "{more}");
     assert!(!folder.join("y.exr").exists());
 }
 
