@@ -87,7 +87,8 @@ pub struct PhotonStats {
     pub global: MapStats,
     /// The map of light from mirrors and glass.
     pub caustic: MapStats,
-    /// Flux in W that the limits of bounces took, mean of the channels, over all emitted paths.
+    /// Flux in W that the limits of bounces took, mean of the channels, over all emitted paths; of
+    /// several passes their mean, since each has all the light.
     pub lost_to_bounce_limit: f64,
     /// Each light.
     #[serde(default)]
@@ -190,9 +191,17 @@ pub struct Stats {
 }
 
 impl Stats {
-    /// Adds the work of a further pass. A warning that differs in numbers only is kept once.
-    pub fn add(&mut self, pass: &Self) {
-        let (s, t) = (&mut self.seconds, &pass.seconds);
+    /// Adds a further pass to `passes` of them. Counts add up; of flux it is the mean that counts.
+    pub fn add_pass(&mut self, pass: &Self, passes: u32) {
+        let (n, lost) = (f64::from(passes), self.photons.lost_to_bounce_limit);
+        self.add(pass);
+        self.photons.lost_to_bounce_limit = (n * lost + pass.photons.lost_to_bounce_limit) / (n + 1.0);
+    }
+
+    /// Adds further work for the same picture, as that for other lights. A warning that differs in
+    /// numbers only is kept once.
+    pub fn add(&mut self, more: &Self) {
+        let (s, t) = (&mut self.seconds, &more.seconds);
         for (sum, seconds) in [
             (&mut s.photons, t.photons),
             (&mut s.grid, t.grid),
@@ -203,23 +212,23 @@ impl Stats {
             *sum += seconds;
         }
         s.total = s.bvh + s.photons + s.grid + s.camera + s.direct + s.gather;
-        let (p, q) = (&mut self.photons, &pass.photons);
+        let (p, q) = (&mut self.photons, &more.photons);
         p.global.add(q.global);
         p.caustic.add(q.caustic);
         p.lost_to_bounce_limit += q.lost_to_bounce_limit;
-        p.lights.iter_mut().zip(&q.lights).for_each(|(light, of_pass)| light.photons += of_pass.photons);
-        self.rays += pass.rays;
-        self.lost_camera_paths += pass.lost_camera_paths;
-        self.extra_samples += pass.extra_samples;
-        self.media_overflows += pass.media_overflows;
-        self.unfinished_rays += pass.unfinished_rays;
-        self.non_finite.add(pass.non_finite);
-        self.peak_device_bytes = self.peak_device_bytes.max(pass.peak_device_bytes);
-        for (kernel, seconds) in &pass.kernel_seconds {
+        p.lights.iter_mut().zip(&q.lights).for_each(|(light, other)| light.photons += other.photons);
+        self.rays += more.rays;
+        self.lost_camera_paths += more.lost_camera_paths;
+        self.extra_samples += more.extra_samples;
+        self.media_overflows += more.media_overflows;
+        self.unfinished_rays += more.unfinished_rays;
+        self.non_finite.add(more.non_finite);
+        self.peak_device_bytes = self.peak_device_bytes.max(more.peak_device_bytes);
+        for (kernel, seconds) in &more.kernel_seconds {
             *self.kernel_seconds.entry(kernel.clone()).or_default() += seconds;
         }
         let words = |line: &String| line.chars().filter(|c| !c.is_ascii_digit()).collect::<String>();
-        for warning in &pass.warnings {
+        for warning in &more.warnings {
             if self.warnings.iter().all(|told| words(told) != words(warning)) {
                 self.warnings.push(warning.clone());
             }
@@ -256,5 +265,21 @@ mod tests {
         assert_eq!((sum.rays, sum.peak_device_bytes, sum.photons.global.emitted), (8, 5, 8));
         assert_eq!(sum.photons.global.seen, Some(SeenStats { sampled: 8, seen: 2 }));
         assert_eq!(sum.warnings, ["3 rays were given up", "the same", "another"]);
+    }
+
+    #[test]
+    fn lost_flux_is_the_mean_of_passes_and_the_sum_of_lights() {
+        let of = |lost_to_bounce_limit: f64| Stats {
+            rays: 1,
+            photons: PhotonStats { lost_to_bounce_limit, ..PhotonStats::default() },
+            ..Stats::default()
+        };
+        let mut lights = of(2.0);
+        lights.add(&of(4.0));
+        assert_eq!((lights.photons.lost_to_bounce_limit, lights.rays), (6.0, 2));
+        let mut passes = lights;
+        passes.add_pass(&of(9.0), 1);
+        passes.add_pass(&of(3.0), 2);
+        assert_eq!((passes.photons.lost_to_bounce_limit, passes.rays), (6.0, 4));
     }
 }

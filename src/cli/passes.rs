@@ -103,7 +103,7 @@ fn run(inputs: &Inputs, range: PassRange, started: Instant, done: &mut Done) -> 
         done.sum.push(PassBlock::of_pass(next, film, &stats))?;
         match done.passes {
             0 => done.stats = stats,
-            _ => done.stats.add(&stats),
+            passes => done.stats.add_pass(&stats, passes),
         }
         done.passes += 1;
         next += 1;

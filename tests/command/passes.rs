@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | splits | parts of passes and of pixels merge to the bytes of one run, and the first pass is the single picture | fewer passes |
 //! | refusals | gaps, overlaps, other settings and other scenes are refused by name, in one line | the same with what is right |
+//! | lost flux | is that of one pass, however many there are | rays are counted |
 //! | checkpoints | a run that goes on has the bytes of one that never stopped; other runs are refused | |
 //! | killed | after SIGKILL and SIGTERM, nothing is lost but the running pass | SIGTERM without a checkpoint |
 
@@ -104,6 +105,20 @@ fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
     let more = fails(folder, "merge a.exr b.exr --passes 0..3 -o y.exr");
     assert!(more.contains("parts have the passes 0..5, and 0..3 are asked for"), "{more}");
     assert!(!folder.join("y.exr").exists());
+}
+
+#[test]
+fn lost_flux_is_the_mean_over_passes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let lost = |words: &str| {
+        succeeds(folder, &small(&format!("--max-bounces 1 --stats s.json -o a.exr {words}")));
+        let stats: Value = serde_json::from_slice(&bytes(folder, "s.json")).expect("JSON");
+        (stats["photons"]["lost_to_bounce_limit"].as_f64().expect("a number"), stats["rays"].as_u64().expect("rays"))
+    };
+    let ((one, rays), (four, more_rays)) = (lost("--passes 1"), lost("--passes 4"));
+    assert!(one > 0.1 && (four / one - 1.0).abs() < 0.25, "{one}, {four}");
+    assert!(more_rays > 3 * rays, "rays are counted");
 }
 
 #[test]
