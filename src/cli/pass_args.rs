@@ -67,11 +67,20 @@ impl PassOptions {
         PassSettings { alpha: self.alpha }
     }
 
+    /// The passes to render; `None` if a time or a target alone ends them.
+    fn wanted(&self) -> Option<PassRange> {
+        let ends_otherwise = self.time.is_some() || self.target_error.is_some();
+        self.passes.or((!ends_otherwise).then_some(PassRange { first: 0, end: 1 }))
+    }
+
     /// The passes to render at most.
     pub fn range(&self, settings: &Settings) -> PassRange {
-        let ends_by_itself = self.time.is_some() || self.target_error.is_some();
-        let otherwise = if ends_by_itself { PassRange::longest(settings) } else { PassRange { first: 0, end: 1 } };
-        self.passes.unwrap_or(otherwise)
+        self.wanted().unwrap_or_else(|| PassRange::longest(settings))
+    }
+
+    /// Number of passes to render; `None` if a time or a target alone ends them.
+    pub fn count(&self) -> Option<u32> {
+        self.wanted().map(|range| range.count())
     }
 }
 

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | splits | parts of passes and of pixels merge to the bytes of one run, and the first pass is the single picture | fewer passes |
 //! | refusals | gaps, overlaps, other settings and other scenes are refused by name, in one line | the same with what is right |
+//! | ends | a run speaks of the passes, the time or the error that it is to end by, and says whether it reached the error | |
 //! | lost flux | is that of one pass, however many there are | rays are counted |
 //! | checkpoints | a run that goes on has the bytes of one that never stopped; other runs are refused | |
 //! | killed | after SIGKILL and SIGTERM, nothing is lost but the running pass | SIGTERM without a checkpoint |
@@ -105,6 +106,34 @@ fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
     let more = fails(folder, "merge a.exr b.exr --passes 0..3 -o y.exr");
     assert!(more.contains("parts have the passes 0..5, and 0..3 are asked for"), "{more}");
     assert!(!folder.join("y.exr").exists());
+}
+
+#[test]
+fn a_run_says_what_ends_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let said = |words: &str| {
+        let output = command(folder, &small(&format!("-o a.exr {words}")).replace(" -q", "")).output();
+        let output = output.expect("it starts");
+        let said = String::from_utf8(output.stderr).expect("messages are text");
+        assert!(output.status.success(), "{words}: {said}");
+        said
+    };
+    let states =
+        |said: &str| said.lines().filter(|line| line.starts_with("passes: ")).map(str::to_owned).collect::<Vec<_>>();
+    let timed = said("--time 2s");
+    let lines = states(&timed);
+    assert!(lines.iter().all(|line| !line.contains(" of ")), "nobody asked for a number: {timed}");
+    assert!(lines.last().is_some_and(|line| !line.contains("left")), "it ends here: {timed}");
+    assert!(!timed.contains("--target-error"), "control");
+    let reached = said("--target-error 0.9");
+    let lines = states(&reached);
+    assert!(lines.iter().all(|line| !line.contains(" of ") && !line.contains("left")), "{reached}");
+    assert!(lines.last().is_some_and(|line| line.ends_with(", 90.00 % wanted")), "{reached}");
+    assert!(reached.contains("\n--target-error 0.9 is reached after 4 passes: "), "{reached}");
+    let missed = said("--target-error 0.0001 --passes 5");
+    assert!(missed.contains("\nwarning: --target-error 0.0001 is not reached after 5 passes: "), "{missed}");
+    assert!(states(&missed)[0].starts_with("passes: 1 of 5"), "{missed}");
 }
 
 #[test]
