@@ -51,7 +51,7 @@ pub struct PassOptions {
     #[arg(requires = "checkpoint")]
     pub every: Duration,
 
-    /// Go on with the checkpoint, if there is one
+    /// Go on with the checkpoint, or with the part of an earlier run, if there is one
     #[arg(long, requires = "checkpoint", help_heading = "Passes")]
     pub resume: bool,
 }

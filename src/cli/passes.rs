@@ -60,11 +60,16 @@ pub fn render(inputs: &Inputs) -> Result<Picture> {
     check_region(inputs)?;
     let device = DeviceStats { name: inputs.gpu.name.clone(), driver: inputs.gpu.driver.clone() };
     let stats = Stats { device, ..Stats::default() };
-    let mut done = Done { sum: resumed(inputs, range, &attributes(inputs, &stats))?, stats, passes: 0 };
+    let mut done = Done { sum: PassSum::default(), stats, passes: 0 };
+    let from = resume(inputs, range, &mut done)?;
     let ended = run(inputs, range, started, &mut done);
     display.finish();
+    // What was read and got nothing new stays as it is.
+    let is_new = |path: &Path| done.passes > 0 || from != Some(path);
     if let Some(path) = options.checkpoint.as_deref().filter(|_| !done.sum.blocks().is_empty()) {
-        save(inputs, path, &done)?;
+        if is_new(path) {
+            save(inputs, path, &done)?;
+        }
         if ended.is_err() {
             let picture = picture(inputs, &done)?;
             (inputs.write)(&picture.frame, &picture.attributes)?;
@@ -75,8 +80,8 @@ pub fn render(inputs: &Inputs) -> Result<Picture> {
     if let Some(target) = options.target_error {
         display.note(&verdict(target, estimate(inputs, &done)?.as_ref(), done.sum.range()));
     }
-    if let Some(path) = &options.part {
-        write_part(path, &done.sum, &attributes(inputs, &done.stats))?;
+    if let Some(path) = options.part.as_deref().filter(|path| is_new(path)) {
+        save(inputs, path, &done)?;
         display.note(&format!("wrote {}", path.display()));
     }
     picture(inputs, &done)
@@ -246,10 +251,14 @@ fn attributes(inputs: &Inputs, stats: &Stats) -> Attributes {
     attributes
 }
 
-/// The passes of the checkpoint, if the run goes on with one; none otherwise.
-fn resumed(inputs: &Inputs, range: PassRange, ours: &Attributes) -> Result<PassSum> {
+/// Takes the passes of the checkpoint, or where there is none those of the part, if the run goes on
+/// with them, and returns the file.
+fn resume<'a>(inputs: &Inputs<'a>, range: PassRange, done: &mut Done) -> Result<Option<&'a Path>> {
     let options = &inputs.args.passes;
-    let Some(path) = options.checkpoint.as_deref().filter(|path| path.exists()) else { return Ok(PassSum::default()) };
+    let (checkpoint, part) = (options.checkpoint.as_deref(), options.part.as_deref());
+    let of_checkpoint = checkpoint.filter(|path| path.exists()).map(|path| (path, "the checkpoint"));
+    let of_part = part.filter(|path| options.resume && path.exists()).map(|path| (path, "a part"));
+    let Some((path, what)) = of_checkpoint.or(of_part) else { return Ok(None) };
     let refuse = |problem: String| {
         let source = io::Error::new(io::ErrorKind::AlreadyExists, problem);
         Err(Error::Io { path: path.to_path_buf(), source })
@@ -258,25 +267,30 @@ fn resumed(inputs: &Inputs, range: PassRange, ours: &Attributes) -> Result<PassS
         return refuse("is there already; --resume goes on with it".to_owned());
     }
     let (header, sum) = read_part(path)?;
-    let mut told = differences(ours, &header.attributes);
-    for name in ["device", "driver"] {
-        let (here, there) = (&ours[name], header.attributes.get(name));
-        if there != Some(here) {
-            told.push(format!("the {name} was {}, and is {here}", there.map_or("unknown", String::as_str)));
+    let ours = attributes(inputs, &done.stats);
+    let mut told = differences(&ours, &header.attributes);
+    let theirs = |name: &str| header.attributes.get(name).map_or("unknown", String::as_str).to_owned();
+    if header.passes == range {
+        // All of the picture is theirs.
+        done.stats.device = DeviceStats { name: theirs("device"), driver: theirs("driver") };
+    } else {
+        for name in ["device", "driver"].into_iter().filter(|name| theirs(name) != ours[*name]) {
+            told.push(format!("the {name} was {}, and is {}", theirs(name), ours[name]));
         }
     }
     let size = size_of(inputs.scene, &inputs.settings.picture)?;
-    if (header.whole, header.window) != (size, inputs.settings.picture.window(size)) {
-        told.push("`picture.size` or `picture.crop` are others".to_owned());
+    if told.is_empty() && (header.whole, header.window) != (size, inputs.settings.picture.window(size)) {
+        told.push("`picture.size` or `picture.crop` differs".to_owned());
     }
     if header.passes.first != range.first || header.passes.end > range.end {
         told.push(format!("it has the passes {}, and {range} are asked for", header.passes));
     }
     if !told.is_empty() {
-        return refuse(format!("is the checkpoint of another run: {}", told.join(", ")));
+        return refuse(format!("is {what} of another run: {}; without the file, it is begun anew", told.join(", ")));
     }
     inputs.display.note(&format!("goes on after the passes {} of {}", header.passes, path.display()));
-    Ok(sum)
+    done.sum = sum;
+    Ok(Some(path))
 }
 
 fn save(inputs: &Inputs, path: &Path, done: &Done) -> Result<()> {

@@ -7,6 +7,7 @@
 //! | ends | a run speaks of the passes, the time or the error that it is to end by, and says whether it reached the error | |
 //! | lost flux | is that of one pass, however many there are | rays are counted |
 //! | checkpoints | a run that goes on has the bytes of one that never stopped; other runs are refused | |
+//! | parts | a part that is there is gone on with, stays if nothing is left to do, or is refused by name | without `--resume` |
 //! | killed | after SIGKILL and SIGTERM, nothing is lost but the running pass | SIGTERM without a checkpoint |
 
 use std::{
@@ -168,6 +169,37 @@ fn a_run_that_goes_on_has_the_bytes_of_one_that_never_stopped() {
     assert!(bytes(folder, "again.exr") == bytes(folder, "one.exr"), "nothing was left to do");
     fs::write(folder.join("kept"), &bytes(folder, "kept")[..2000]).expect("it can be written");
     assert!(fails(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr")).contains("kept: "));
+}
+
+#[test]
+fn a_run_goes_on_with_a_part_that_is_there() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let part = |words: &str| small(&format!("--part p.exr --checkpoint kept {words}"));
+    succeeds(folder, &small("--passes 3 --part one.exr"));
+    succeeds(folder, &part("--passes 2 --resume"));
+    let written = || fs::metadata(folder.join("p.exr")).and_then(|found| found.modified()).expect("it is there");
+    let (two, first_written) = (bytes(folder, "p.exr"), written());
+    let begin_anew = || fs::remove_file(folder.join("kept")).expect("it is there");
+    begin_anew();
+    succeeds(folder, &part("--passes 2 --resume"));
+    assert!(bytes(folder, "p.exr") == two && written() == first_written, "nothing was left to do");
+    for (words, said) in [
+        ("--passes 2 --seed 3", "p.exr: is a part of another run: --seed is 0, not 3"),
+        ("--passes 2 --crop 0,0,4,4", "--size or --crop differs"),
+        ("--passes 1", "it has the passes 0..2, and 0..1 are asked for; without the file, it is begun anew"),
+    ] {
+        begin_anew();
+        let problem = fails(folder, &part(&format!("{words} --resume")));
+        assert!(problem.contains(said), "{problem}");
+        fs::write(folder.join("kept"), &two).expect("it is written");
+    }
+    begin_anew();
+    succeeds(folder, &part("--passes 3 --resume"));
+    assert!(bytes(folder, "p.exr") == bytes(folder, "one.exr"));
+    begin_anew();
+    succeeds(folder, &part("--passes 2 --seed 3"));
+    assert!(bytes(folder, "p.exr") != two, "control: without --resume it is written anew");
 }
 
 /// Starts a run without an end and waits for the file of that name.
