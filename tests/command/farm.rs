@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | manifest | `kubernetes-validate --strict` accepts the manifest | a member of another name |
 //! | engines | GNU parallel, Open Job Description and Slurm give the bytes of one run, whatever is killed or requeued meanwhile | fewer passes |
+//! | again | a recipe that is called again renders what is missing, and refuses parts of other options | |
 
 use std::{
     fs,
@@ -84,13 +85,29 @@ fn gnu_parallel_renders_what_one_machine_does() {
     if left_out() {
         return;
     }
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let out = folder.path().join("out.exr");
-    let mut run = Command::new(format!("{ROOT}/deploy/parallel/render"));
-    run.arg(scene()).arg(&out).args([PASSES.to_string().as_str(), "6"]).args(OPTIONS.split_whitespace());
-    let mut child = run.env("CAUSTICA", PROGRAM).env("JOBS", "2").stderr(Stdio::null()).spawn().expect("it starts");
-    kill_a_render(&folder.path().join("out.exr.parts"));
+    // A shell would take this path apart.
+    let folder = tempfile::Builder::new().prefix("it's here; ").tempdir().expect("a temporary folder");
+    let (out, parts) = (folder.path().join("out.exr"), folder.path().join("out.exr.parts"));
+    let scene_here = folder.path().join("mirror-and-glass.gltf");
+    fs::copy(scene(), &scene_here).expect("it is copied");
+    let recipe = |more: &str| {
+        let mut run = Command::new(format!("{ROOT}/deploy/parallel/render"));
+        run.arg(&scene_here).arg(&out).args([PASSES.to_string().as_str(), "6"]).args(OPTIONS.split_whitespace());
+        run.args(more.split_whitespace()).env("CAUSTICA", PROGRAM).env("JOBS", "2");
+        run
+    };
+    let mut child = recipe("").stderr(Stdio::null()).spawn().expect("it starts");
+    kill_a_render(&parts);
     assert!(child.wait().expect("it ends").success(), "scripts/install-farm-tools installs GNU parallel");
+    assert_same(folder.path(), "out.exr");
+    fs::remove_file(parts.join("part-0000006.exr")).expect("a part");
+    fs::remove_file(&out).expect("a picture");
+    assert!(recipe("").status().expect("it starts").success());
+    assert_same(folder.path(), "out.exr");
+    let refused = recipe("--seed 3").output().expect("it starts");
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(1), "{said}");
+    assert!(said.contains("part-0000000.exr: is a part of another run: --seed is 0, not 3"), "{said}");
     assert_same(folder.path(), "out.exr");
 }
 
@@ -106,23 +123,28 @@ fn open_job_description_renders_what_one_machine_does() {
     let template = format!("{ROOT}/deploy/openjd/template.yaml");
     let check = Command::new(&program).args(["check", &template]).output();
     assert!(check.expect("scripts/install-farm-tools installs openjd").status.success());
-    let mut run = Command::new(&program);
-    run.args(["run", &template, "--step", "Merge", "--run-dependencies"]);
-    for (name, value) in [
-        ("Scene", scene()),
-        ("Parts", parts.display().to_string()),
-        ("Out", out.display().to_string()),
-        ("LastPass", (PASSES - 1).to_string()),
-        ("PassesPerTask", "5".to_string()),
-        ("Options", OPTIONS.to_string()),
-        ("Caustica", PROGRAM.to_string()),
-    ] {
-        run.args(["-p", &format!("{name}={value}")]);
-    }
-    let output = run.output().expect("it starts");
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success() && said.contains("openjd_progress: 100.0"), "{said}");
+    let job = |options: &str| {
+        let mut run = Command::new(&program);
+        run.args(["run", &template, "--step", "Merge", "--run-dependencies"]);
+        for (name, value) in [
+            ("Scene", scene()),
+            ("Parts", parts.display().to_string()),
+            ("Out", out.display().to_string()),
+            ("LastPass", (PASSES - 1).to_string()),
+            ("PassesPerTask", "5".to_string()),
+            ("Options", options.to_string()),
+            ("Caustica", PROGRAM.to_string()),
+        ] {
+            run.args(["-p", &format!("{name}={value}")]);
+        }
+        let output = run.output().expect("it starts");
+        (output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (is_done, said) = job(OPTIONS);
+    assert!(is_done && said.contains("openjd_progress: 100.0"), "{said}");
     assert_same(folder.path(), "out.exr");
+    let (is_done, said) = job(&format!("{OPTIONS} --seed 3"));
+    assert!(!is_done && said.contains("is a part of another run: --seed is 0, not 3"), "{said}");
 }
 
 #[test]
@@ -152,15 +174,19 @@ fn slurm_renders_what_one_machine_does() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("out.exr");
     let parts = folder.path().join("out.exr.parts");
-    // Requeues the second task once it has a checkpoint, and waits for the picture.
+    // Requeues the second task once it has a checkpoint, and waits for the picture. Then parts of
+    // other options are refused, and nothing is merged.
     let script = format!(
-        "set -eu; '{ROOT}/deploy/slurm/submit' '{}' '{}' {PASSES} 6 {OPTIONS}
+        "set -eu; submit() {{ '{ROOT}/deploy/slurm/submit' '{scene}' '{out}' {PASSES} 6 {OPTIONS} \"$@\"; }}
+         submit
          until [ -e '{parts}/kept-0000006.exr' ]; do sleep 0.02; done
          scontrol requeue 1_1 || true
-         until [ -e '{}' ]; do sleep 0.2; done",
-        scene(),
-        out.display(),
-        out.display(),
+         until [ -e '{out}' ]; do sleep 0.2; done
+         submit --seed 3
+         until grep -q 'is a part of another run: --seed is 0, not 3' '{parts}/log-1'; do sleep 0.2; done
+         until [ -z \"$(squeue -h)\" ]; do sleep 0.2; done",
+        scene = scene(),
+        out = out.display(),
         parts = parts.display()
     );
     let mut run = Command::new("timeout");
