@@ -95,13 +95,19 @@ fn target_of(path: &Path) -> io::Result<Option<PathBuf>> {
             Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file there is write-protected"))
         }
         Ok(_) => fs::canonicalize(path).map(Some),
-        // A link to a file that is not there yet is followed as one to a file is.
-        Err(e) if e.kind() == io::ErrorKind::NotFound => match fs::read_link(path) {
-            Ok(link) => Ok(Some(path.parent().unwrap_or(Path::new("")).join(link))),
-            Err(_) => Ok(Some(path.to_path_buf())),
-        },
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(Some(end_of_links(path))),
         Err(e) => Err(e),
     }
+}
+
+/// The file that links lead to, which is not there yet.
+fn end_of_links(path: &Path) -> PathBuf {
+    let mut end = path.to_path_buf();
+    // A loop of links is another error than that of a file that is not there.
+    while let Ok(link) = fs::read_link(&end) {
+        end = end.parent().unwrap_or(Path::new("")).join(link);
+    }
+    end
 }
 
 fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
@@ -215,5 +221,20 @@ mod tests {
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read(&file).unwrap(), b"new");
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o640);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_a_file_that_is_not_there_is_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir(path("far")).unwrap();
+        std::os::unix::fs::symlink("far/link", path("link")).unwrap();
+        std::os::unix::fs::symlink("file", path("far/link")).unwrap();
+        check_output(&path("link")).unwrap();
+        assert_eq!(names(&path("far")), ["link"]);
+        write_file(&path("link"), b"new").unwrap();
+        assert_eq!(fs::read(path("far/file")).unwrap(), b"new");
+        assert!(["link", "far/link"].iter().all(|link| fs::symlink_metadata(path(link)).unwrap().is_symlink()));
     }
 }

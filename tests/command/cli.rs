@@ -315,6 +315,16 @@ fn info_says_what_the_scene_holds() {
 }
 
 #[test]
+fn info_asks_for_a_device_with_photons_alone() {
+    let folder = folder();
+    let with_device = |line: &str| run(command(folder.path(), line).env("CAUSTICA_DEVICE", "no-such-adapter"));
+    let ended = with_device("info scene.gltf");
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    assert_eq!(ended.stdout, caustica(folder.path(), "info scene.gltf").stdout);
+    assert!(with_device("info scene.gltf --photons").failed().contains("no-such-adapter"), "control");
+}
+
+#[test]
 fn info_says_how_many_photons_the_camera_sees() {
     let folder = folder();
     let told = |scene: &str, more: &str| {

@@ -132,6 +132,17 @@ fn the_layer_of_a_light_is_its_picture_alone() {
     let names: Vec<_> = grouped.names().into_iter().filter(|name| name.starts_with("light.")).collect();
     assert_eq!(names.len(), 6, "{names:?}");
     assert_eq!(grouped.of("light.key_lights.R"), pair.of("R"));
+    // Each session has a part of the lights alone; the name may be that of any.
+    let shifted = |name: &str| {
+        let mut command = command(folder, &format!("render grouped.gltf {SMALL} --layers lights -o shifted.exr"));
+        let output = command.args(["--light-photons", name]).output().expect("it starts");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for name in ["light 1=4", "light 2=4"] {
+        assert_eq!(shifted(name), (Some(0), String::new()));
+    }
+    let (code, said) = shifted("light 9=4");
+    assert!(code == Some(1) && ["light 1", "light 2", "light 3"].iter().all(|name| said.contains(name)), "{said}");
     changed(folder, "wrong.gltf", |scene| nodes(scene)[7]["extras"] = json!({"caustica": {"group": 7}}));
     let refused = command(folder, "render wrong.gltf -o wrong.exr").output().expect("it starts");
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();

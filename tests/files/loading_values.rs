@@ -22,6 +22,26 @@ fn lights_keep_their_candela_whatever_the_scale() {
 }
 
 #[test]
+fn a_light_is_called_as_its_node_or_by_its_own_name() {
+    let name = |node: Option<&str>, own: Option<&str>| {
+        let mut gltf = triangle();
+        gltf["nodes"][1].as_object_mut().expect("a node").remove("name");
+        if let Some(node) = node {
+            gltf["nodes"][1]["name"] = node.into();
+        }
+        if let Some(own) = own {
+            gltf["extensions"]["KHR_lights_punctual"]["lights"][0]["name"] = own.into();
+        }
+        loaded(&gltf).lights[0].name.clone()
+    };
+    assert_eq!(name(Some("node"), Some("own")), "node");
+    assert_eq!(name(None, Some("own")), "own");
+    assert_eq!(name(Some(""), Some("own")), "own");
+    assert_eq!(name(None, None), "light 0");
+    assert_eq!(name(Some(""), Some("")), "light 0");
+}
+
+#[test]
 fn spots_and_directional_lights_shine_along_minus_z_of_their_node() {
     let light = |light: Value, change: fn(&mut Value)| {
         let mut gltf = triangle();

@@ -3,9 +3,10 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | destroys | an output over any file that is read, or over another output, is refused before the work | a path beside it is written |
-//! | full | a file that cannot be written whole is an error, and the older one stays | without the limit it is replaced |
+//! | full | a file or output that cannot be written whole is an error, and the older one stays | without the limit it is replaced |
 //! | places | folders, files as folders, names too long, and pipes to read are refused before the work | names that are only long or odd are written |
 //! | closed | a closed pipe, or a full disk behind stderr, is no failure | an open pipe gets the whole output |
+//! | resumable | SIGTERM is no failure of a run with a checkpoint, also while the scene is read | without a checkpoint |
 //! | stops | SIGINT and SIGTERM end every stage of every command, and leave no file | a run that is not stopped goes on |
 #![cfg(unix)]
 
@@ -157,6 +158,13 @@ fn what_cannot_be_written_whole_leaves_the_older_file() {
     let (code, said) = ended(&mut command(folder.path(), &format!("{QUICK} -q -o full.exr")));
     assert!(code == Some(1) && said.starts_with("error: full.exr: No space left"), "{said}");
     fs::remove_file(folder.path().join("full.exr")).expect("can be removed");
+    // What is asked for on stdout is lost as well.
+    for line in ["info scene.gltf", "info scene.gltf --json"] {
+        let full = fs::File::options().write(true).open("/dev/full").expect("Linux has it");
+        let (code, said) = ended(command(folder.path(), line).stdout(full));
+        assert!(code == Some(1) && said.starts_with("error: standard output: No space left"), "{line}: {said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
     assert_eq!(limited(""), (Some(0), String::new()), "control: without the limit");
     assert!(caustica::image::read_exr(&old).is_ok());
     assert_eq!(names(folder.path()), FILES);
@@ -241,8 +249,9 @@ fn hearing_hangups(command: &Command) -> Command {
     hearing
 }
 
-/// Sends a signal once a line with this prefix is on stderr. Returns the exit code.
-fn stopped_at(folder: &Path, line: &str, stage: &str, signal: &str) -> Option<i32> {
+/// Sends a signal once a line with this prefix is on stderr. Returns the exit code, and what was
+/// said later.
+fn stopped_at(folder: &Path, line: &str, stage: &str, signal: &str) -> (Option<i32>, String) {
     let mut child = hearing_hangups(&command(folder, line)).stderr(Stdio::piped()).spawn().expect("it starts");
     let mut stderr = BufReader::new(child.stderr.take().expect("it is piped"));
     let mut said = String::new();
@@ -260,7 +269,7 @@ fn stopped_at(folder: &Path, line: &str, stage: &str, signal: &str) -> Option<i3
     let mut rest = String::new();
     stderr.read_to_string(&mut rest).expect("messages are text");
     assert!(!rest.contains("wrote") && !rest.contains("error"), "{line}: {rest}");
-    status.code()
+    (status.code(), rest)
 }
 
 #[test]
@@ -285,7 +294,7 @@ fn signals_end_every_stage_and_leave_no_file() {
         (study, "study:", "INT", 130),
         (compare, "compare", "TERM", 143),
     ] {
-        assert_eq!(stopped_at(folder.path(), line, stage, signal), Some(code), "{line} at {stage}");
+        assert_eq!(stopped_at(folder.path(), line, stage, signal).0, Some(code), "{line} at {stage}");
         let mut left = names(folder.path());
         left.retain(|name| name != "pipe.exr");
         assert_eq!(left, FILES, "{line} at {stage}");
@@ -298,4 +307,26 @@ fn signals_end_every_stage_and_leave_no_file() {
     child.kill().expect("it can be killed");
     child.wait().expect("it ends");
     assert_eq!(early, None, "control: it ended by itself");
+}
+
+#[test]
+fn sigterm_is_no_failure_of_work_that_can_be_resumed() {
+    let folder = folder();
+    // It takes a second to load.
+    const VERTICES: u32 = 1_500_000;
+    let numbers = |i: u32| [i, i.wrapping_mul(0x9e37_79b9), i.wrapping_mul(0x85eb_ca6b)];
+    let corner = |i: u32| numbers(i).map(|n| (n >> 8) as f32).map(f32::to_le_bytes);
+    let corners: Vec<u8> = (0..VERTICES).flat_map(corner).flatten().collect();
+    let counts = [(r#""count": 3"#, format!(r#""count": {VERTICES}"#)), ("36", corners.len().to_string())];
+    let scene = counts.iter().fold(SCENE.to_owned(), |scene, (from, to)| scene.replace(from, to));
+    fs::write(folder.path().join("corners.json"), corners).expect("can be written");
+    fs::write(folder.path().join("scene.gltf"), scene).expect("can be written");
+    let before = names(folder.path());
+    for (options, code) in [("--passes 9 --checkpoint kept --resume", 0), ("--passes 9", 143)] {
+        let line = format!("{QUICK} -o a.exr {options}");
+        let (ended, said) = stopped_at(folder.path(), &line, "load", "TERM");
+        assert_eq!(ended, Some(code), "{line}: {said}");
+        assert!(!said.contains("light unit"), "it ended while the scene was read: {said}");
+        assert_eq!(names(folder.path()), before);
+    }
 }

@@ -35,8 +35,8 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
         return fault(at, format!("{index} of {}", lights.len()));
     };
     let place = format!("extensions.KHR_lights_punctual.lights[{index}]");
-    let name = node.name.as_ref().or(light.name.as_ref());
-    let name = name.filter(|name| !name.is_empty()).cloned().unwrap_or_else(|| format!("light {index}"));
+    let name = [&node.name, &light.name].into_iter().flatten().find(|name| !name.is_empty());
+    let name = name.cloned().unwrap_or_else(|| format!("light {index}"));
     let kind = match light.type_ {
         Checked::Valid(Type::Point) => LightKind::Point,
         Checked::Valid(Type::Spot) => spot(light.spot.as_ref(), &name, &place, notes)?,
