@@ -100,8 +100,16 @@ fn gnu_parallel_renders_what_one_machine_does() {
     kill_a_render(&parts);
     assert!(child.wait().expect("it ends").success(), "scripts/install-farm-tools installs GNU parallel");
     assert_same(folder.path(), "out.exr");
+    fs::remove_file(parts.join("part-0000000.exr")).expect("a part");
     fs::remove_file(parts.join("part-0000006.exr")).expect("a part");
     fs::remove_file(&out).expect("a picture");
+    // A part of fewer passes is there already, as of a recipe that was to render fewer.
+    let mut fewer = Command::new(PROGRAM);
+    fewer
+        .arg("render")
+        .arg(&scene_here)
+        .args(OPTIONS.replace("--every 0s", "-q --passes 6..8 --part").split_whitespace());
+    assert!(fewer.arg(parts.join("part-0000006.exr")).status().expect("it starts").success());
     assert!(recipe("").status().expect("it starts").success());
     assert_same(folder.path(), "out.exr");
     let refused = recipe("--seed 3").output().expect("it starts");
