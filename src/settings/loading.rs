@@ -14,8 +14,9 @@ pub struct LoadOptions {
     pub variant: Option<String>,
     /// Longest side of images, texels: larger ones are halved. `None` for no limit.
     pub texture_size: Option<u32>,
-    /// Roughness up to which metal and glass cast caustics, in [`Self::CAUSTIC_ROUGHNESS`]: light
-    /// that rougher surfaces throw is gathered as that of diffuse ones.
+    /// Roughness up to which metal and glass, but for [small glass](crate::Scene::small_glass),
+    /// cast caustics, in [`Self::CAUSTIC_ROUGHNESS`]: light that rougher surfaces throw is gathered
+    /// as that of diffuse ones.
     pub caustic_roughness: f32,
     /// Metals lose the light that their microfacets reflect more than once, as by the bare
     /// specification.

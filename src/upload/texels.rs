@@ -124,7 +124,7 @@ mod tests {
             assert_eq!(texels.add(0, values, true).levels, 3);
             texels.into_words().pop().expect("a texel").to_le_bytes()
         };
-        assert_eq!(coarsest(ImageValues::Mask(35)), [255, 0, 0, 191]);
+        assert_eq!(coarsest(ImageValues::Mask(35)), [255, 0, 0, 192]);
         assert!(coarsest(ImageValues::Blend)[1] > 100, "control: as if it were there by its alpha");
     }
 }

@@ -138,6 +138,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         MASK_BIT,
         BLEND_BIT,
         UNLIT_BIT,
+        SMALL_GLASS_BIT,
         WRAP_REPEAT,
         WRAP_MIRROR,
         WRAP_CLAMP,

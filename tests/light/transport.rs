@@ -139,6 +139,27 @@ fn room(material: Material) -> Scene {
 }
 
 #[test]
+fn small_frosted_covers_cast_caustics() {
+    // A lamp in a bulb of rough glass, by a bound of roughness.
+    let lit = |radius: f32, bound: f32| {
+        let cover = Material { roughness: 0.6, ..Material::new("bulb", Surface::Pane { ior: 1.5, tint: Vec3::ONE }) };
+        let mut scene = Scene { materials: vec![Material::new("wall", diffuse(0.5)), cover], ..Scene::default() };
+        scene.materials.push(emissive("lamp", 0.0, 100.0, false));
+        add_box(&mut scene, vec3(-1.0, 0.0, -1.0), vec3(1.0, 2.0, 3.0), 0);
+        scene.spheres.push(sphere(vec3(0.0, 1.0, 0.0), radius, 1));
+        scene.spheres.push(sphere(vec3(0.0, 1.0, 0.0), 0.02, 2));
+        scene.cameras.push(camera(vec3(0.0, 1.0, 2.9), vec3(0.0, 0.8, 0.0), 50.0));
+        scene.options.caustic_roughness = bound;
+        let render = render_scene(&scene, &settings(Mode::Hybrid, 20_000, 12));
+        (render.stats.photons.caustic.stored > 0, mean(&render))
+    };
+    let (stored, found) = lit(0.08, 0.45);
+    assert_eq!((stored, found), lit(0.08, 1.0), "the bulb casts caustics by any bound");
+    assert!(!lit(0.08, 0.0).0, "but for that by which nothing does");
+    assert!(!lit(0.5, 0.45).0 && lit(0.5, 1.0).0, "control: as large a cover by its roughness");
+}
+
+#[test]
 fn unlit_surfaces_show_their_colour_alone() {
     let seen = |unlit: bool| {
         let mut scene = furnace(Material { unlit, ..Material::new("label", diffuse(0.5)) });
