@@ -34,6 +34,8 @@ const MEAN_CLEARCOAT: f64 = 0.04 + 0.96 / 21.0;
 /// Least fraction that paths take of what a subtriangle would emit if nothing darkened it: its
 /// mean may miss what is bright between the points by which it is taken.
 const MIN_FRACTION: f64 = 1.0 / 64.0;
+/// Fraction of the paths aimed at what cameras see that choose lights by power alone.
+const BY_POWER: f64 = 0.1;
 /// Maximum number of points and spots, and of directional lights, whose direct light at a visible
 /// point is the sum over all of them. Of more, light samples choose.
 pub const MAX_SUMMED: usize = 16;
@@ -206,6 +208,20 @@ impl LightTable {
     pub fn for_aimed_photons(&self, targets: &[Target], around: &Target, settings: &LightSettings) -> Choices {
         let aimed = |(light, power): (&layout::Light, &f64)| power * aimed_fraction(light, targets, around);
         self.choices(self.lights.iter().zip(&self.powers).map(aimed).collect(), settings)
+    }
+
+    /// Table for paths aimed at what the cameras see: as [`Self::for_photons`] for a part of them,
+    /// the others by the power that goes towards the sphere `seen`. The sun on a wide ground has
+    /// the power of a million lamps, and a window has as much of it as of one.
+    #[must_use]
+    pub fn for_seen_photons(&self, seen: &Target, around: &Target, settings: &LightSettings) -> Choices {
+        let fraction = |light| aimed_fraction(light, std::slice::from_ref(seen), around);
+        let towards: Vec<f64> =
+            self.lights.iter().zip(&self.powers).map(|(light, power)| power * fraction(light)).collect();
+        let [all, all_towards] =
+            [&self.powers, &towards].map(|powers| powers.iter().sum::<f64>().max(f64::MIN_POSITIVE));
+        let share = |(power, towards): (&f64, &f64)| BY_POWER * power / all + (1.0 - BY_POWER) * towards / all_towards;
+        self.choices(self.powers.iter().zip(&towards).map(share).collect(), settings)
     }
 
     fn choices(&self, powers: Vec<f64>, settings: &LightSettings) -> Choices {

@@ -112,9 +112,13 @@ pub(super) fn plans<'a>(
             least_kept: *least_kept,
             ..plain
         },
-        None if aimed && lights.seen_targets > 0 => {
-            EmissionPlan { first_target: 0, target_count: lights.seen_targets + 1, aim: lights.seen, ..plain }
-        }
+        None if aimed && lights.seen_targets > 0 => EmissionPlan {
+            choices: &lights.towards_seen,
+            first_target: 0,
+            target_count: lights.seen_targets + 1,
+            aim: lights.seen,
+            ..plain
+        },
         None => plain,
     };
     let caustic = EmissionPlan {

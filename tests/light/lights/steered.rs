@@ -3,14 +3,15 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | rooms | of twelve rooms of which the camera sees one, its photons have a fraction of the squared error of unaimed ones, and their mean | unaimed emission; a lamp fewer |
+//! | wide ground | sun and lamp in a house on a wide ground give the sum of both | one of them alone |
 //! | keyhole | the light of a bright lamp that comes through a small hole is all there | the hole is shut |
 //! | behind | a bright lamp behind the camera is not forgotten, nor is the light of a far room in the sum | the lamp is off |
 //! | whole | a scene that is seen whole has the photons of one that nobody looks at | the same in a long house |
 
 use caustica::{
     layout::Photon,
-    scene::{Camera, Scene},
-    settings::{Emission, Mode},
+    scene::{Camera, Light, LightKind, Scene},
+    settings::{Emission, Mode, Quality},
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -107,6 +108,39 @@ fn the_photons_of_a_house_lie_in_the_room_that_is_seen() {
     };
     let [all, right] = [Emission::Aimed, Emission::Unaimed].map(total);
     assert!(within(all, right, 0.03), "{all} W instead of {right} W");
+}
+
+#[test]
+fn a_lamp_in_a_house_on_a_wide_ground_is_not_lost_beside_the_sun() {
+    // One room of 4 m with a window, on a ground of 1 km, where the sun has ten thousand times the
+    // power of the lamp. Little of it comes in.
+    let mean_of = |sun: f32, lamp: f32| {
+        let mut scene = scene(&[diffuse(0.6)]);
+        add_quad(&mut scene, vec3(-500.0, -0.01, 500.0), Vec3::X * 1000.0, Vec3::NEG_Z * 1000.0, 0);
+        let wall = |scene: &mut Scene, low: Vec3, high: Vec3| add_box(scene, low, high, 0);
+        wall(&mut scene, vec3(-2.1, 0.0, -2.1), vec3(2.1, 2.5, -2.0));
+        wall(&mut scene, vec3(-2.1, 0.0, 2.0), vec3(2.1, 2.5, 2.1));
+        wall(&mut scene, vec3(-2.1, 0.0, -2.0), vec3(-2.0, 2.5, 2.0));
+        wall(&mut scene, vec3(2.0, 0.0, -2.0), vec3(2.1, 1.0, 2.0));
+        wall(&mut scene, vec3(2.0, 2.0, -2.0), vec3(2.1, 2.5, 2.0));
+        wall(&mut scene, vec3(2.0, 1.0, -2.0), vec3(2.1, 2.0, -0.5));
+        wall(&mut scene, vec3(2.0, 1.0, 0.5), vec3(2.1, 2.0, 2.0));
+        wall(&mut scene, vec3(-2.1, 2.5, -2.1), vec3(2.1, 2.6, 2.1));
+        let towards = vec3(-1.0, -0.8, 0.1).normalize();
+        let directional = LightKind::Directional;
+        scene.lights.push(Light { kind: directional, direction: towards, ..point_light(Vec3::ZERO, sun) });
+        scene.lights.push(point_light(vec3(-0.5, 2.0, 0.3), lamp));
+        scene.lights.retain(|light| light.intensity != Vec3::ZERO);
+        scene.cameras.push(camera(vec3(1.8, 1.6, 1.8), vec3(-1.0, 0.9, -1.0), 70.0));
+        let settings = Quality::Normal.settings_for((24, 24)).with(|s| {
+            s.photons.mode = Mode::IndirectPhotons;
+            s.picture.size = Some((24, 24));
+        });
+        mean(&render_scene(&scene, &settings))
+    };
+    let (sun, lamp, both) = (mean_of(10.0, 0.0), mean_of(0.0, 5.0), mean_of(10.0, 5.0));
+    assert!(within(both, sun + lamp, 0.08), "{both} instead of {sun} + {lamp}");
+    assert!(!within(both, lamp, 0.08) && !within(both, sun, 0.08), "control: {both} beside {sun} and {lamp}");
 }
 
 #[test]
