@@ -112,8 +112,8 @@ impl Scene {
         self.materials.iter().zip(small).map(|(material, small)| small || self.casts_caustics(material)).collect()
     }
 
-    /// For each material, whether it is glass or a pane, and all of its surfaces are less than
-    /// [`SMALL`] of those of the scene, as the covers of lamps are. It casts caustics however rough
+    /// For each material, whether it is glass or a pane, and all of its surfaces are less than a
+    /// hundredth of those of the scene, as the covers of lamps are. It casts caustics however rough
     /// it is: few of the rays that look around meet it, and each brings much light. None where
     /// [`LoadOptions::caustic_roughness`] is 0.
     #[must_use]

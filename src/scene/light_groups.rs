@@ -15,7 +15,7 @@ const UNLIT: &str = "unlit";
 
 impl Scene {
     /// Names of the groups of lights, in the order of the scene: what shines, by its own name or
-    /// that of its group, as [`group`] makes it fit for a layer.
+    /// that of its group, made fit for the name of a layer.
     ///
     /// # Errors
     /// [`Error::Setting`] if there are too many.
