@@ -34,8 +34,8 @@ const MEAN_CLEARCOAT: f64 = 0.04 + 0.96 / 21.0;
 /// Least fraction that paths take of what a subtriangle would emit if nothing darkened it: its
 /// mean may miss what is bright between the points by which it is taken.
 const MIN_FRACTION: f64 = 1.0 / 64.0;
-/// Fraction of the paths aimed at what cameras see that choose lights by power alone.
-const BY_POWER: f64 = 0.1;
+/// Fraction of the paths for what cameras see that choose lights by power alone.
+pub const BY_POWER: f64 = 0.1;
 /// Maximum number of points and spots, and of directional lights, whose direct light at a visible
 /// point is the sum over all of them. Of more, light samples choose.
 pub const MAX_SUMMED: usize = 16;

@@ -128,6 +128,12 @@ pub fn srgb_encode(linear: f32) -> f32 {
 mod tests {
     use super::*;
 
+    #[test]
+    fn bytes_keep_their_srgb_value() {
+        let again = |byte: u8| (255.0 * srgb_encode(srgb_decode(f32::from(byte) / 255.0))).round() as u8;
+        assert!((0..=255).all(|byte| again(byte) == byte));
+    }
+
     fn assert_near(a: [f32; 3], b: [f32; 3]) {
         assert!(a.iter().zip(b).all(|(x, y)| (x - y).abs() < 2e-4), "{a:?} is not {b:?}");
     }

@@ -44,9 +44,8 @@ pub struct LightBuffers {
     /// Tables for photon paths, and for paths aimed at mirrors and glass.
     pub photons: ChoiceBuffer,
     pub aimed: ChoiceBuffer,
-    /// The table for paths aimed at what the cameras see; that of all paths without spheres around
-    /// it.
-    pub towards_seen: ChoiceBuffer,
+    /// The table for paths aimed at what the cameras see, if spheres lie around that.
+    pub towards_seen: Option<ChoiceBuffer>,
     /// Number of spheres around what the cameras see, and around mirrors and glass. In `targets`,
     /// the sphere around the scene lies between them.
     pub seen_targets: u32,
@@ -89,10 +88,10 @@ impl LightBuffers {
         table.lights.par_iter_mut().for_each(|light| set_media(light, probe));
         // Paths are aimed at what is seen, and at all, as often, whatever the size.
         let even = 1.0 / (seen.len() + 1) as f32;
-        let towards_seen = match seen.first() {
-            Some(seen) => table.for_seen_photons(seen, &around, settings),
-            None => table.for_photons(settings),
-        };
+        let towards_seen = seen.first().map(|seen| {
+            let choices = table.for_seen_photons(seen, &around, settings);
+            ChoiceBuffer::new(gpu, "light choices towards what is seen", &choices)
+        });
         let general = seen.iter().chain([&around]).map(|sphere| (sphere, even));
         let mixes_powers = shares.iter().any(|share| *share > 0.0);
         let specular = targets.iter().zip(shares);
@@ -123,7 +122,7 @@ impl LightBuffers {
                 "aimed light choices",
                 &table.for_aimed_photons(&targets, &around, settings),
             )?,
-            towards_seen: ChoiceBuffer::new(gpu, "light choices towards what is seen", &towards_seen)?,
+            towards_seen: towards_seen.transpose()?,
             seen_targets: seen.len() as u32,
             seen: seen.first().map_or([0.0; 4], |target| target.center.extend(target.radius).to_array()),
             specular_targets: targets.len() as u32,

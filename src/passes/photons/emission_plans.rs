@@ -105,21 +105,17 @@ pub(super) fn plans<'a>(
     let lights = &scene.lights;
     let aimed = settings.emission == Emission::Aimed;
     let plain = EmissionPlan { paths: paths.global, ..unsteered(scene, settings) };
-    let general = match steered {
-        Some(Steered { choices, kept_scale, least_kept }) => EmissionPlan {
+    let general = match (steered, &lights.towards_seen) {
+        (Some(Steered { choices, kept_scale, least_kept }), _) => EmissionPlan {
             choices: choices.as_ref().unwrap_or(&lights.photons),
             kept_scale: *kept_scale,
             least_kept: *least_kept,
             ..plain
         },
-        None if aimed && lights.seen_targets > 0 => EmissionPlan {
-            choices: &lights.towards_seen,
-            first_target: 0,
-            target_count: lights.seen_targets + 1,
-            aim: lights.seen,
-            ..plain
-        },
-        None => plain,
+        (None, Some(choices)) if aimed => {
+            EmissionPlan { choices, first_target: 0, target_count: lights.seen_targets + 1, aim: lights.seen, ..plain }
+        }
+        (None, _) => plain,
     };
     let caustic = EmissionPlan {
         choices: &lights.aimed,

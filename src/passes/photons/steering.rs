@@ -8,10 +8,8 @@
 //! Willems 2000, "Density Control for Photon Maps"; Keller and Wald 2000), so that where it
 //! matters, they have the flux with which they arrived.
 
-use crate::emitters::light_clusters::LightCluster;
+use crate::emitters::{light_clusters::LightCluster, light_table::BY_POWER};
 
-/// Fraction of the paths that choose lights by power alone.
-const BY_POWER: f64 = 0.1;
 /// Paths of the mean of all lights that are added to those of each, and the square of importance
 /// that a light may have brought unseen.
 const PRIOR_PATHS: f64 = 4.0;
