@@ -1,6 +1,7 @@
 //! Atomic output files: written under a temporary name in the target folder, then renamed.
 
 use std::{
+    ffi::OsStr,
     fs::{self, File},
     io::{self, Write},
     path::{Path, PathBuf},
@@ -112,7 +113,9 @@ fn end_of_links(path: &Path) -> PathBuf {
 
 fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
     let parent = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if target.file_name().is_none() {
+    // A slash after the name, which `file_name` leaves out, makes it that of a folder.
+    let bytes = |text: &OsStr| text.as_encoded_bytes().to_vec();
+    if !target.file_name().is_some_and(|name| bytes(target.as_os_str()).ends_with(&bytes(name))) {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "names no file"));
     }
     // Uses a short temporary name: the name of the target may already have the maximum length.
@@ -197,6 +200,9 @@ mod tests {
             message
         };
         assert!(text(folder.path()).ends_with("is a folder"));
+        for name in ["a.exr/", "a.exr/.", "no/.."] {
+            assert!(text(&folder.path().join(name)).ends_with("names no file"), "{name}");
+        }
         assert!(text(&folder.path().join("no/a.exr")).contains("no does not exist"));
         let protected = folder.path().join("old.exr");
         fs::write(&protected, b"old").unwrap();

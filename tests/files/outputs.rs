@@ -179,6 +179,11 @@ fn places_that_cannot_be_written_are_refused_before_the_work() {
         ("folder.exr", "is a folder"),
         ("nowhere/a.exr", "the folder nowhere does not exist"),
         ("old.exr/a.exr", "Not a directory"),
+        ("old.exr/", "Not a directory"),
+        ("a.exr/", "a.exr/: names no file"),
+        ("a.exr --stats a.json/", "a.json/: names no file"),
+        ("a.exr --passes 2 --part part.exr/", "part.exr/: names no file"),
+        ("a.exr --passes 2 --checkpoint kept/", "kept/: names no file"),
         ("/proc/a.exr", "the folder /proc cannot be written"),
         (&format!("{long}n.exr"), "name too long"),
     ] {
