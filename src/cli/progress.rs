@@ -143,8 +143,23 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Whether the stage is that of another scene or group of lights than those that were told.
+fn begins_anew(told: &[(Stage, u64)], stage: Stage, done: u64) -> bool {
+    let camera = told.iter().find(|(s, _)| *s == Stage::Camera);
+    match stage {
+        Stage::Load => true,
+        Stage::Photons => camera.is_some(),
+        // Light of rays alone has no photons.
+        Stage::Camera => done == 0 && camera.is_some_and(|(_, tenths)| *tenths == 10),
+        _ => false,
+    }
+}
+
 /// Line to print now: one at the start of a stage, then one whenever a further tenth is done.
 fn next_line(told: &mut Vec<(Stage, u64)>, stage: Stage, done: u64, total: u64) -> Option<String> {
+    if begins_anew(told, stage, done) {
+        told.clear();
+    }
     let unit = unit(stage, total);
     let part = |units: u64| (u128::from(done.min(total)) * u128::from(units) / u128::from(total.max(1))) as u64;
     let tenth = part(10);
@@ -226,6 +241,22 @@ mod tests {
         assert!(line(Stage::Grid, 0).is_none());
         assert!(line(Stage::Camera, 20).is_none());
         assert!(line(Stage::Camera, 61).is_some());
+    }
+
+    #[test]
+    fn scenes_and_groups_of_lights_are_told_anew() {
+        let mut told = Vec::new();
+        let mut line = |stage, done| next_line(&mut told, stage, done, 100).is_some();
+        for stage in [Stage::Load, Stage::Bvh, Stage::Photons, Stage::Camera] {
+            assert!(line(stage, 0), "{stage:?}");
+        }
+        assert!(line(Stage::Camera, 100));
+        for scene_or_group in [[Stage::Load, Stage::Photons], [Stage::Photons, Stage::Grid]] {
+            assert!(scene_or_group.iter().all(|stage| line(*stage, 0)), "{scene_or_group:?}");
+            assert!(!line(Stage::Photons, 5), "control: the same photons");
+            assert!(line(Stage::Camera, 0) && line(Stage::Camera, 100));
+        }
+        assert!(line(Stage::Camera, 0) && line(Stage::Camera, 50), "a group without photons");
     }
 
     #[test]
