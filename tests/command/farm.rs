@@ -39,6 +39,11 @@ fn scene() -> String {
     format!("{ROOT}/scenes/mirror-and-glass.gltf")
 }
 
+/// A folder whose path a shell would take apart, and in which GNU parallel would replace words.
+fn odd_folder() -> tempfile::TempDir {
+    tempfile::Builder::new().prefix("it's here; {} {#} {= $_ = 9 =} ").tempdir().expect("a temporary folder")
+}
+
 fn assert_same(folder: &Path, name: &str) {
     let read = |path: &Path| fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let made = read(&folder.join(name));
@@ -85,8 +90,7 @@ fn gnu_parallel_renders_what_one_machine_does() {
     if left_out() {
         return;
     }
-    // A shell would take this path apart.
-    let folder = tempfile::Builder::new().prefix("it's here; ").tempdir().expect("a temporary folder");
+    let folder = odd_folder();
     let (out, parts) = (folder.path().join("out.exr"), folder.path().join("out.exr.parts"));
     let scene_here = folder.path().join("mirror-and-glass.gltf");
     fs::copy(scene(), &scene_here).expect("it is copied");
