@@ -128,8 +128,10 @@ fn open_job_description_renders_what_one_machine_does() {
     if left_out() {
         return;
     }
-    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = odd_folder();
     let (parts, out) = (folder.path().join("parts"), folder.path().join("out.exr"));
+    let scene_here = folder.path().join("mirror-and-glass.gltf");
+    fs::copy(scene(), &scene_here).expect("it is copied");
     fs::create_dir(&parts).expect("a folder");
     let program = format!("{ROOT}/target/openjd/bin/openjd");
     let template = format!("{ROOT}/deploy/openjd/template.yaml");
@@ -139,7 +141,7 @@ fn open_job_description_renders_what_one_machine_does() {
         let mut run = Command::new(&program);
         run.args(["run", &template, "--step", "Merge", "--run-dependencies"]);
         for (name, value) in [
-            ("Scene", scene()),
+            ("Scene", scene_here.display().to_string()),
             ("Parts", parts.display().to_string()),
             ("Out", out.display().to_string()),
             ("LastPass", (PASSES - 1).to_string()),
@@ -155,7 +157,7 @@ fn open_job_description_renders_what_one_machine_does() {
     let (is_done, said) = job(OPTIONS);
     assert!(is_done && said.contains("openjd_progress: 100.0"), "{said}");
     assert_same(folder.path(), "out.exr");
-    let (is_done, said) = job(&format!("{OPTIONS} --seed 3"));
+    let (is_done, said) = job(&format!("{OPTIONS} --seed '3'"));
     assert!(!is_done && said.contains("is a part of another run: --seed is 0, not 3"), "{said}");
 }
 
