@@ -1,6 +1,7 @@
 //! Estimates of less bias at some of a picture's pixels, summed over passes: how far the picture is
 //! from their mean.
 
+use super::film_sums::{add_all, finite};
 use crate::settings::{Crop, PixelGrid};
 
 /// Sums over passes of the radiance of closer estimates, at the pixels of a grid. Each pass has
@@ -35,16 +36,16 @@ impl BiasCheck {
         for i in 0..self.sums.len() {
             let apart = f64::from(other.sums[i]) / m - f64::from(self.sums[i]) / n;
             let both = f64::from(self.deviations[i]) + f64::from(other.deviations[i]);
-            self.deviations[i] = (both + apart * apart * (n * m / (n + m))) as f32;
-            self.sums[i] += other.sums[i];
+            self.deviations[i] = finite(both + apart * apart * (n * m / (n + m)));
         }
+        add_all(&mut self.sums, &other.sums);
         self.passes += other.passes;
     }
 
     /// Adds light that is summed with that of the same pass.
     pub fn add_light(&mut self, other: &Self) {
         debug_assert!((self.passes, other.passes) == (1, 1), "of one pass");
-        self.sums.iter_mut().zip(&other.sums).for_each(|(a, b)| *a += b);
+        add_all(&mut self.sums, &other.sums);
     }
 
     /// Of each checked pixel of a picture of the same passes, its index and its numbers, given the

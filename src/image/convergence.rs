@@ -38,7 +38,13 @@ impl ErrorEstimate {
         let count = 3 * (0..frame.pixels()).filter(|pixel| is_in(*pixel)).count();
         let numbers =
             || frame.layer("radiance").iter().map(|x| f64::from(*x)).enumerate().filter(|(i, _)| is_in(i / 3));
-        let floor = (FLOOR * numbers().map(|(_, x)| x).sum::<f64>() / count.max(1) as f64).powi(2);
+        let radiance = frame.layer("radiance");
+        let checked = film.check.as_ref().and_then(|check| check.numbers(radiance, film.whole, film.window));
+        let checked = checked.map(|all| all.filter(|(place, _)| is_in(*place)).collect::<Vec<_>>());
+        let floor = floor_of(numbers().map(|(_, x)| x));
+        // A black picture is measured by the light that closer estimates find.
+        let closer = || checked.iter().flatten().flat_map(|(_, of_pixel)| of_pixel.map(|number| number.closer));
+        let floor = if floor > 0.0 { floor } else { floor_of(closer()) };
         // The right number's square, without bias: one sample that is far too bright does not hide
         // itself.
         let relative = |square: f64, right: f64| square / (right + floor).max(f64::MIN_POSITIVE);
@@ -52,7 +58,6 @@ impl ErrorEstimate {
             let ratio = film.bias_noise().unwrap_or(0.0);
             (mean_square(&biases) - ratio * ratio * noise).max(0.0)
         };
-        let radiance = frame.layer("radiance");
         // Squared error beyond the noise, of one pixel. The square of the right number is the
         // product of two independent estimates of it, of which a closer one is the noisier.
         let beyond = |(place, checked): (usize, [Checked; 3])| {
@@ -62,8 +67,7 @@ impl ErrorEstimate {
             };
             (0..3).map(of_channel).sum::<f64>() / 3.0
         };
-        let checked = film.check.as_ref().and_then(|check| check.numbers(radiance, film.whole, film.window));
-        let checked = checked.and_then(|all| mean_and_error(all.filter(|(place, _)| is_in(*place)).map(beyond)));
+        let checked = checked.and_then(|all| mean_and_error(all.into_iter().map(beyond)));
         let (more, error) = checked.unwrap_or_else(|| (biases.map_or(0.0, unexplained), 0.0));
         // Less only where that is no chance.
         let noise = (noise + (more + error).min(0.0)).max(LEAST_NOISE * noise);
@@ -75,6 +79,12 @@ impl ErrorEstimate {
     pub fn total(&self) -> f64 {
         self.noise.hypot(self.bias)
     }
+}
+
+/// Square of the fraction [`FLOOR`] of the mean of numbers.
+fn floor_of(numbers: impl Iterator<Item = f64>) -> f64 {
+    let (count, sum) = numbers.fold((0_u64, 0.0), |(count, sum), x| (count + 1, sum + x));
+    (FLOOR * sum / count.max(1) as f64).powi(2)
 }
 
 /// Mean of the terms and its standard error; `None` if there are none.
@@ -176,6 +186,26 @@ mod tests {
             "{opposite:?}"
         );
         assert_eq!(merged(even, [1.3; 4]).total(), 0.0, "control: no difference");
+        // A black picture errs by the light that is missing, relative to a tenth of that.
+        let black = merged([0.0; 4], [1.0; 4]);
+        assert!(black.noise == 0.0 && is_near(black.bias, 10.0), "{black:?}");
+        assert_eq!(merged([0.0; 4], [0.0; 4]).total(), 0.0, "control: it is black");
+    }
+
+    #[test]
+    fn errors_of_numbers_that_have_no_square_are_finite() {
+        for values in [[1e20, 3e20, 2e20, 2e20], [0.0, 3e38, 0.0, 0.0], [3e38, 1e38, 3e38, 3e38]] {
+            let pass = |(value, radius): (f32, f64)| checked(value, value).with_bandwidth(radius);
+            let mut films = values.into_iter().zip([1.0, 0.5, 0.25, 0.125]).map(pass);
+            let mut merged = films.next().expect("a pass");
+            films.for_each(|film| merged.merge(&film).expect("of one picture"));
+            let estimate = ErrorEstimate::of(&merged, None).expect("passes");
+            assert!(estimate.noise.is_finite() && estimate.bias.is_finite(), "{estimate:?}");
+            assert!(estimate.noise > 1.0, "no less than it is: {estimate:?}");
+            let frame = merged.finish_with_errors();
+            assert!(frame.layer("radiance").iter().all(|x| x.is_finite()), "{values:?}");
+            assert!(frame.extras().flat_map(|(_, numbers)| numbers).all(|x| x.is_finite()), "{values:?}");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::array;
 use super::{
     bias_check::BiasCheck,
     cryptomatte::Matte,
-    film_sums::{Bandwidth, ExtraSums, LAYER_COUNT, Moments},
+    film_sums::{Bandwidth, ExtraSums, LAYER_COUNT, Moments, add_all},
     frame::{DataWindow, Frame},
     layers::{EXTRA_LAYERS, LAYERS, Rule, Source, layer_index},
 };
@@ -133,11 +133,10 @@ impl Film {
                 total = Some(film);
                 continue;
             };
-            let add = |into: &mut [f32], from: &[f32]| into.iter_mut().zip(from).for_each(|(a, b)| *a += b);
-            add(&mut total.sums[radiance], &film.sums[radiance]);
+            add_all(&mut total.sums[radiance], &film.sums[radiance]);
             for (layer, other) in total.extras.iter_mut().zip(&film.extras) {
                 if matches!(layer.source, Some(Source::Component(_))) {
-                    add(&mut layer.sums, &other.sums);
+                    add_all(&mut layer.sums, &other.sums);
                 }
             }
             total.non_finite += film.non_finite;
@@ -247,10 +246,10 @@ impl Film {
         }
         self.merge_moments(other);
         for (a, b) in self.sums.iter_mut().zip(&other.sums) {
-            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            add_all(a, b);
         }
         for (layer, theirs) in self.extras.iter_mut().zip(&other.extras) {
-            layer.sums.iter_mut().zip(&theirs.sums).for_each(|(a, b)| *a += b);
+            add_all(&mut layer.sums, &theirs.sums);
         }
         self.mattes.iter_mut().zip(&other.mattes).for_each(|(matte, theirs)| matte.merge(theirs));
         BiasCheck::join(&mut self.check, other.check.as_ref(), BiasCheck::merge);

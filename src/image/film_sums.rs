@@ -46,3 +46,13 @@ pub(super) struct Moments {
     /// Sums of the products of the deviations of radiance and bandwidth.
     pub with_bandwidth: Vec<f32>,
 }
+
+/// The number, or the largest one of its sign.
+pub(super) fn finite(number: f64) -> f32 {
+    number.clamp(f32::MIN.into(), f32::MAX.into()) as f32
+}
+
+/// Adds numbers one by one. A sum beyond the range is the largest number.
+pub(super) fn add_all(into: &mut [f32], from: &[f32]) {
+    into.iter_mut().zip(from).for_each(|(a, b)| *a = (*a + *b).clamp(f32::MIN, f32::MAX));
+}

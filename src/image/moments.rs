@@ -4,7 +4,7 @@ use std::array;
 
 use super::{
     film::Film,
-    film_sums::{Bandwidth, LAYER_COUNT, Moments},
+    film_sums::{Bandwidth, LAYER_COUNT, Moments, finite},
     layers::layer_index,
 };
 
@@ -42,7 +42,8 @@ impl Film {
         };
     }
 
-    /// Standard error over the passes of each of a layer's means; `None` for one pass.
+    /// Standard error over the passes of each of a layer's means; the largest number where its
+    /// square has none. `None` for one pass.
     ///
     /// # Panics
     /// If [`super::layers::LAYERS`] has no layer of that name.
@@ -50,7 +51,10 @@ impl Film {
     pub fn standard_error(&self, layer: &str) -> Option<Vec<f32>> {
         let (i, passes) = (layer_index(layer), f64::from(self.passes));
         let deviations = &self.moments.as_ref()?.deviations[i];
-        let error = |deviations: &f32| (f64::from(*deviations) / (passes - 1.0) / passes).sqrt() as f32;
+        let error = |deviations: &f32| match *deviations {
+            f32::MAX => f32::MAX,
+            deviations => (f64::from(deviations) / (passes - 1.0) / passes).sqrt() as f32,
+        };
         Some(deviations.iter().map(error).collect())
     }
 
@@ -62,7 +66,7 @@ impl Film {
     pub fn bias(&self) -> Option<Vec<f32>> {
         let moments = self.moments.as_ref().filter(|_| self.bandwidth.deviations > 0.0)?;
         let scale = self.bandwidth.mean / self.bandwidth.deviations;
-        Some(moments.with_bandwidth.iter().map(|product| (f64::from(*product) * scale) as f32).collect())
+        Some(moments.with_bandwidth.iter().map(|product| finite(f64::from(*product) * scale)).collect())
     }
 
     /// Standard error of [`Self::bias`] relative to [`Self::standard_error`], if the variance of a
@@ -91,7 +95,7 @@ impl Film {
 fn add(moments: &mut [f32], theirs: Option<&[f32]>, products: impl Iterator<Item = f64>) {
     for (i, (moment, product)) in moments.iter_mut().zip(products).enumerate() {
         let theirs = theirs.map_or(0.0, |moments| f64::from(moments[i]));
-        *moment = (f64::from(*moment) + theirs + product) as f32;
+        *moment = finite(f64::from(*moment) + theirs + product);
     }
 }
 
