@@ -68,6 +68,11 @@ pub enum Command {
     },
 }
 
+/// Settings of the default quality, for the words on defaults.
+fn normal() -> Settings {
+    Quality::default().settings()
+}
+
 const EXAMPLES: &str = "\
 Examples:
   caustica render scene.glb -o out.exr
@@ -120,16 +125,20 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WHAT", value_enum, default_value = "normal", help_heading = "Picture")]
     pub quality: QualityArg,
 
-    /// Camera samples of a pixel whose neighbours are uneven, as at edges, in penumbrae and in
-    /// glass; no more than --spp: every pixel has those [default: by --quality, 16; --spp where
-    /// that is given, or without final gathering]
+    #[arg(help = format!(
+        "Camera samples of a pixel whose neighbours are uneven, as at edges, in penumbrae and in glass; no more than \
+         --spp: every pixel has those [default: by --quality, {}; --spp where that is given, or without final gathering]",
+        normal().picture.spp + normal().picture.extra_samples()
+    ))]
     #[arg(long, value_name = "N", value_parser = whole(PictureSettings::SPP), help_heading = "Picture")]
     pub max_spp: Option<u32>,
 
-    /// Rays of final gathering per visible point: light over other surfaces is what these see of
-    /// direct light and the maps; 0 takes it from the photons around the point itself [default: by
-    /// --quality, 64; 0 in other modes than hybrid and indirect-photons, with --raw-estimate, and
-    /// with other searches than the grid]
+    #[arg(help = format!(
+        "Rays of final gathering per visible point: light over other surfaces is what these see of direct light and the \
+         maps; 0 takes it from the photons around the point itself [default: by --quality, {}; 0 in other modes than \
+         hybrid and indirect-photons, with --raw-estimate, and with other searches than the grid]",
+        normal().photons.final_gather
+    ))]
     #[arg(long, value_name = "N", value_parser = whole(PhotonSettings::FINAL_GATHER))]
     #[arg(help_heading = "Estimate")]
     pub final_gather: Option<u32>,
@@ -149,15 +158,17 @@ pub struct RenderArgs {
     pub irradiance_cells: f32,
 
     #[arg(help = format!(
-        "Pixels between the points of final gathering, {}; samples take the light of those around them; 0 gathers at every sample [default: by --quality, 2]",
-        EstimateSettings::GATHER_SPACING
+        "Pixels between the points of final gathering, {}; samples take the light of those around them; 0 gathers at every sample [default: by --quality, {}]",
+        EstimateSettings::GATHER_SPACING,
+        normal().estimate.gather_spacing
     ))]
     #[arg(long, value_name = "N", value_parser = whole(EstimateSettings::GATHER_SPACING), help_heading = "Estimate")]
     pub gather_spacing: Option<u32>,
 
     #[arg(help = format!(
-        "Radius around a sample from which it takes that light, pixels, {} [default: by --quality, 8]",
-        EstimateSettings::GATHER_RADIUS
+        "Radius around a sample from which it takes that light, pixels, {} [default: by --quality, {}]",
+        EstimateSettings::GATHER_RADIUS,
+        normal().estimate.gather_radius
     ))]
     #[arg(long, value_name = "R", value_parser = gather_radius, help_heading = "Estimate")]
     pub gather_radius: Option<f32>,

@@ -281,6 +281,14 @@ fn help_and_version_go_to_stdout() {
         assert!(of_render.contains(option), "{option}");
     }
     assert!(!of_render.contains("--sharpen"));
+    let words = of_render.split_whitespace().collect::<Vec<_>>().join(" ");
+    let default_of = |option: &str| {
+        words.split(option).nth(1).and_then(|after| after.split("--quality, ").nth(1)).expect("it says so")
+    };
+    assert!(
+        default_of("--max-spp <N>").starts_with("64;") && default_of("--final-gather <N>").starts_with("64;"),
+        "{words}"
+    );
 }
 
 #[cfg(target_os = "linux")]
