@@ -95,6 +95,10 @@ pub fn status(args: &StatusArgs) -> Result<()> {
         line("pixels", &format!("{rectangle}: passes {} in {} parts", passes.join(", "), parts.parts.len()));
     }
     missing.iter().for_each(|missing| line("missing", missing));
+    if !found.around_crop().is_empty() {
+        let around: Vec<_> = found.around_crop().into_iter().map(|crop| format!("--crop {}", words(crop))).collect();
+        line("around this crop", &format!("no part has {}", around.join(", ")));
+    }
     found.overlaps.iter().for_each(|overlap| line("twice", overlap));
     found.devices.iter().for_each(|(device, driver)| line("device", &format!("{device} ({driver})")));
     print(&text)
@@ -113,6 +117,7 @@ fn report(found: &Survey, missing: &[String]) -> serde_json::Value {
         "size": found.whole,
         "windows": windows,
         "missing": missing,
+        "around": found.around_crop(),
         "overlaps": found.overlaps,
         "devices": devices,
     })

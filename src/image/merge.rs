@@ -194,6 +194,12 @@ impl Survey {
         passes.chain(crops).collect()
     }
 
+    /// Rectangles of pixels around a single crop: all that is wanted, or a part of it.
+    #[must_use]
+    pub fn around_crop(&self) -> Vec<Crop> {
+        if self.windows.len() == 1 { self.missing_pixels() } else { Vec::new() }
+    }
+
     /// Rectangles of pixels that no part holds.
     fn missing_pixels(&self) -> Vec<Crop> {
         let (width, height) = self.whole;
@@ -381,10 +387,16 @@ mod tests {
         assert_eq!(found.missing(PassRange { first: 2, end: 12 }), [missing(None, 3, 5), missing(None, 9, 12)]);
         assert!(found.missing(PassRange { first: 5, end: 9 }).is_empty());
         assert_eq!(found.overlaps, [""; 0]);
+        assert!(found.around_crop().is_empty());
         let crop = Crop { column: 1, row: 1, width: 2, height: 1 };
         let c = write(&file("c"), crop, 0..2, "1");
         let d = write(&file("d"), Crop { row: 2, ..crop }, 0..2, "1");
+        let found = survey(std::slice::from_ref(&c)).unwrap();
+        assert!(found.missing(found.passes()).is_empty(), "a crop may be all that is wanted");
+        let around = [[0, 0, 4, 1], [0, 1, 1, 1], [3, 1, 1, 1], [0, 2, 4, 1]];
+        assert_eq!(found.around_crop(), around.map(|[column, row, width, height]| Crop { column, row, width, height }));
         let found = survey(&[c, d]).unwrap();
+        assert!(found.around_crop().is_empty(), "they are missing");
         let expected = [[0, 0, 4, 1], [0, 1, 1, 2], [3, 1, 1, 2]]
             .map(|[column, row, width, height]| missing(Some(Crop { column, row, width, height }), 0, 2));
         assert_eq!(found.missing(found.passes()), expected);

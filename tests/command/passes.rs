@@ -71,6 +71,8 @@ fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
     succeeds(folder, &small("--passes 5 --crop 5,0,11,16 --part right.exr"));
     succeeds(folder, "merge left.exr right.exr -o crops.exr -q");
     assert!(bytes(folder, "crops.exr") == bytes(folder, "one.exr"), "pixels");
+    assert!(succeeds(folder, "status left.exr").contains("\naround this crop: no part has --crop 5,0,11,16\n"));
+    assert!(!succeeds(folder, "status left.exr right.exr").contains("around"), "control");
     let attributes = read_exr_attributes(&folder.join("one.exr")).expect("it reads");
     assert_eq!((attributes["passes"].as_str(), attributes["alpha"].starts_with("0.66")), ("0..5", true));
     // Two samples a pixel: a single one of a single picture lies at the pixel's centre.
