@@ -86,7 +86,7 @@ impl From<Counters> for StepCount {
 
 /// Visible points for which a tile has room: those of a batch of the device, with final gathering
 /// twice as many since each step of its rays waits for the device; or those of the whole picture
-/// and some of their rays.
+/// and some of their rays; and at least those of the smallest tile.
 pub(super) fn room_for(view: &CameraTile, batch: u64, final_rays: u32) -> u64 {
     let pixels = u64::from(view.width) * u64::from(view.height);
     let points = pixels * u64::from(view.branches) * u64::from(view.spp);
@@ -94,7 +94,7 @@ pub(super) fn room_for(view: &CameraTile, batch: u64, final_rays: u32) -> u64 {
     let most = if final_rays > 0 { 2 * batch } else { batch };
     let smallest = u64::from(MIN_TILE_PIXELS * view.branches * view.spp.min(PIXEL_SAMPLES));
     let least = MIN_ROOM.min((MIN_ROOM_PER_PIXEL * pixels).max(smallest).next_power_of_two());
-    (points * rays).next_power_of_two().clamp(least.min(most), most)
+    (points * rays).next_power_of_two().clamp(least.min(most), most).max(smallest)
 }
 
 /// Pixels along the sides of each tile, powers of 2.
@@ -134,6 +134,23 @@ pub(super) fn margin_cells((width, height): (u32, u32)) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_tile_has_room_for_its_points() {
+        for (side, branches, spp) in [1, 16, 33, 4096]
+            .into_iter()
+            .flat_map(|side| [1, 4, 8, 16].map(|branches| (side, branches)))
+            .flat_map(|(side, branches)| [1, 4, 128, 160, 256, 5000].map(|spp| (side, branches, spp)))
+        {
+            let view = CameraTile { width: side, height: side, branches, spp, ..Default::default() };
+            for (batch, final_rays) in [(1 << 16, 0), (1 << 16, 16), (1 << 20, 0)] {
+                let room = room_for(&view, batch, final_rays);
+                let (width, height) = tile_sides(&view, room);
+                let points = u64::from(width * height) * u64::from(branches * spp.min(PIXEL_SAMPLES));
+                assert!(points <= room, "{points} points, room for {room}: {side} {branches} {spp} {final_rays}");
+            }
+        }
+    }
 
     #[test]
     fn numbers_and_places_are_inverse() {
