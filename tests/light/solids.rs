@@ -6,6 +6,7 @@
 //! | plate on water, photons | three interfaces with all reflections between them | without the water |
 //! | blocks | two blocks that share a face are one block | a gap between them |
 //! | bubble | an ior-1 ball in glass is a cavity, in an exact sphere too | solid |
+//! | a closed vessel that its liquid overlaps | that of one which it touches | a gap |
 //! | slab thinner than rounding | it reflects as a slab | two of them |
 //! | turned, doubled | the picture of the clean ball | another index |
 //! | chains | a cut diamond loses nothing | |
@@ -176,6 +177,27 @@ fn unclean_solids_look_as_the_clean_one() {
     assert!(difference(&bubble, &in_sphere(small.clone().turned(), 0)) < 1e-3, "cavity of a sphere");
     assert!(difference(&bubble, &in_sphere(small.clone(), 0)) > 0.1, "control: the same glass in a sphere");
     assert!(difference(&clean, &of(&[(ball, 2)])) > 0.05, "control: another index");
+}
+
+#[test]
+fn what_fills_a_closed_vessel_may_reach_into_its_wall() {
+    let glasses = [1.5, 1.33].map(glass_of);
+    let ball = |radius: f32| Mesh::ball(Vec3::ZERO, radius, 24);
+    let filled = |radius: f32| scene_of(&[(ball(1.0).with(&ball(0.7).turned()), 0), (ball(radius), 1)], &glasses);
+    let seen = |scene: &Scene| {
+        let mut scene = scene.clone();
+        scene.cameras = vec![camera(vec3(0.0, 0.6, 4.0), Vec3::ZERO, 40.0)];
+        let pixels = [[[0.2; 3]; 4], [[1.0; 3]; 4]].concat();
+        scene.environment = Some(Environment { width: 4, height: 2, pixels, ..Environment::uniform(Vec3::ONE) });
+        render_scene(&scene, &quick().with(|s| s.picture.spp = 16)).frame.radiance().to_vec()
+    };
+    let right = seen(&filled(0.7));
+    let mean_difference = |scene: &Scene| {
+        let pairs = seen(scene).into_iter().zip(&right).map(|(a, b)| (a[1] - b[1]).abs());
+        pairs.sum::<f32>() / right.len() as f32
+    };
+    let (found, control) = (mean_difference(&filled(0.7001)), mean_difference(&filled(0.6)));
+    assert!(found < 0.1 * control, "the liquid reaches into the wall: {found}, control with a gap: {control}");
 }
 
 #[test]

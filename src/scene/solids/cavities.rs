@@ -28,8 +28,8 @@ impl Shells {
     }
 
     /// Notes for each shell with faces inwards the solid that it lies in: the smallest closed one
-    /// or sphere, else the nearest cover. Those that lie in none are taken to face outwards, and
-    /// are returned.
+    /// of its own mesh and material, else of all and of spheres, else the nearest cover. Those that
+    /// lie in none are taken to face outwards, and are returned.
     pub(super) fn find_cavities(
         &mut self,
         triangles: &[Triangle],
@@ -72,8 +72,9 @@ impl Shells {
         alone
     }
 
-    /// The smallest shell with faces outwards, or sphere, that a shell lies in; `boxes` are those
-    /// of all shells, then of spheres.
+    /// The smallest shell with faces outwards, or sphere, that a shell lies in, of its own group
+    /// rather than of another: what fills a vessel may reach into its wall. `boxes` are those of
+    /// all shells, then of spheres.
     fn closed_around(
         &self,
         triangles: &[Triangle],
@@ -83,13 +84,13 @@ impl Shells {
     ) -> Option<u32> {
         let inner = &self.shells[inner];
         let corner: Vec3 = triangles[inner.triangles[0] as usize].positions[0];
-        let mut found: Option<(f64, u32)> = None;
+        let mut found: Option<(bool, f64, u32)> = None;
         boxes.near(&Bounds { min: corner, max: corner }, |i| {
-            let (volume, solid) = match self.shells.get(i) {
-                Some(shell) => (shell.volume, i as u32),
+            let (is_other, volume, solid) = match self.shells.get(i) {
+                Some(shell) => (shell.group != inner.group, shell.volume, i as u32),
                 None => {
                     let (k, sphere) = spheres[i - self.shells.len()];
-                    (4.0 / 3.0 * std::f64::consts::PI * f64::from(sphere.radius).powi(3), k | SPHERE_BIT)
+                    (true, 4.0 / 3.0 * std::f64::consts::PI * f64::from(sphere.radius).powi(3), k | SPHERE_BIT)
                 }
             };
             let holds = || match self.shells.get(i) {
@@ -104,12 +105,14 @@ impl Shells {
                     sphere.center.distance(corner) < sphere.radius
                 }
             };
-            let is_smaller = found.is_none_or(|(other, at)| volume.total_cmp(&other).then(solid.cmp(&at)).is_lt());
-            if is_smaller && volume > inner.volume.abs() && holds() {
-                found = Some((volume, solid));
+            let is_better = found.is_none_or(|(other, least, at)| {
+                is_other.cmp(&other).then(volume.total_cmp(&least)).then(solid.cmp(&at)).is_lt()
+            });
+            if is_better && volume > inner.volume.abs() && holds() {
+                found = Some((is_other, volume, solid));
             }
             true
         });
-        found.map(|(_, solid)| solid)
+        found.map(|(.., solid)| solid)
     }
 }

@@ -16,6 +16,8 @@ use crate::scene::{Bounds, Triangle, vertex_bits};
 pub(super) struct Shell {
     /// Indices of its triangles.
     pub triangles: Vec<u32>,
+    /// The group that they are of, by its index.
+    pub group: usize,
     pub bounds: Bounds,
     /// Enclosed volume, m³; negative if the faces look inwards.
     pub volume: f64,
@@ -53,8 +55,8 @@ impl Shells {
     /// The shells of the triangles of each group.
     pub(super) fn new(triangles: &[Triangle], groups: &[Vec<u32>]) -> Self {
         let mut found = Self { shells: Vec::new(), triangles: triangles.len() };
-        for group in groups {
-            found.shells.extend(connected(triangles, group).into_iter().map(|part| measure(triangles, part)));
+        for (index, group) in groups.iter().enumerate() {
+            found.shells.extend(connected(triangles, group).into_iter().map(|part| measure(triangles, part, index)));
         }
         found
     }
@@ -72,7 +74,8 @@ impl Shells {
                 left.into_iter().partition(|part| alike(first, triangles[part[0] as usize].material));
             left = rest;
             for part in connected(triangles, &group.concat()) {
-                let whole = measure(triangles, part);
+                let first = of_first.get(&part[0]).map_or(0, |i| open[*i].group);
+                let whole = measure(triangles, part, first);
                 if whole.is_closed() {
                     self.shells.push(whole);
                 } else {
@@ -196,8 +199,8 @@ fn find(parent: &mut [u32], mut i: u32) -> u32 {
     i
 }
 
-/// Volume and holes of a connected part.
-fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
+/// Volume and holes of a connected part of a group.
+fn measure(triangles: &[Triangle], part: Vec<u32>, group: usize) -> Shell {
     let origin = triangles[part[0] as usize].positions[0].as_dvec3();
     let (mut volume, mut area) = (0.0, 0.0);
     let bounds = part.iter().map(|i| Bounds::from(&triangles[*i as usize])).fold(Bounds::EMPTY, Bounds::union);
@@ -224,6 +227,7 @@ fn measure(triangles: &[Triangle], part: Vec<u32>) -> Shell {
     let missing: f64 = loops.iter().map(|(vector, _)| vector.length()).sum();
     Shell {
         triangles: part,
+        group,
         bounds,
         volume,
         openness: missing / area.max(f64::MIN_POSITIVE),
