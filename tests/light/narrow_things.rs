@@ -169,6 +169,19 @@ fn rods_and_bars_have_the_light_of_a_path_tracer() {
 }
 
 #[test]
+fn few_photons_on_rods_are_no_sparks() {
+    let settings = asked(50_000).with(|s| {
+        s.photons.mode = Mode::IndirectPhotons;
+        s.photons.final_gather = 0;
+        s.estimate.neighbors = 20;
+        s.estimate.share_reach = 0.0;
+        s.picture.size = Some((96, 96));
+    });
+    let (mean, most) = found(&rods(0.012, 10, 0.8), &settings, 3);
+    assert!(mean > 0.0 && most < 30.0 * mean, "a pixel of {most}, the mean is {mean}");
+}
+
+#[test]
 fn wires_and_leaves_have_the_light_that_final_gathering_finds() {
     for (name, things) in [("wires", rods(0.003, 20, 0.12)), ("leaves", leaves())] {
         let right = found(&things, &asked(200_000).with(|s| s.photons.final_gather = 12), 1);
