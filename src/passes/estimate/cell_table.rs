@@ -25,6 +25,10 @@ const PILOT_QUANTILE: f64 = 0.9;
 /// that have no entry of their own.
 const SUBSTITUTE: f32 = 0.5;
 
+/// Ratio of the irradiances of cells beside each other above which both are split: a wall may stand
+/// in them, whose other side is another room.
+const CONTRAST: f32 = 4.0;
+
 /// Computes the irradiance, W/m², and the radius of its estimate, metres, at points.
 pub(super) type Irradiances<'a> = dyn FnMut(&[VisiblePoint]) -> Result<Vec<([f32; 3], f32)>> + 'a;
 
@@ -40,8 +44,9 @@ pub(super) struct CellTable {
 
 impl CellTable {
     /// Chooses a point for each surface in each cell that has a mark, and keeps the irradiance
-    /// there. A cell is at most `spacing` times as wide as the radius of its estimate; where it is
-    /// wider, cells of the next level replace it. `None` without marks.
+    /// there. A cell is at most `spacing` times as wide as the radius of its estimate, and as
+    /// bright as those beside it but for a factor; others are replaced by cells of the next level.
+    /// `None` without marks.
     pub fn build(marks: &[VisiblePoint], spacing: f32, irradiances: &mut Irradiances) -> Result<Option<Self>> {
         let pilots: Vec<_> = marks.iter().step_by(marks.len().div_ceil(PILOTS) | 1).copied().collect();
         let mut radii: Vec<f32> = irradiances(&pilots)?.iter().map(|(_, radius)| *radius).collect();
@@ -60,10 +65,16 @@ impl CellTable {
             }
             let points: Vec<_> = surfaces.iter().map(|surface| *surface.marks[0]).collect();
             open.clear();
-            for (surface, (irradiance, radius)) in surfaces.into_iter().zip(irradiances(&points)?) {
+            let found = irradiances(&points)?;
+            let contrasts = contrasts(&surfaces, &found, per_metre);
+            for ((surface, (irradiance, radius)), contrasts) in surfaces.into_iter().zip(found).zip(contrasts) {
                 let cells = radius * spacing * per_metre;
-                let split =
-                    [WIDE_CELL, SPLIT_CELL, WHOLE_CELL][usize::from(cells >= SUBSTITUTE) + usize::from(cells >= 1.0)];
+                let split = match cells {
+                    _ if contrasts => WIDE_CELL,
+                    1.0.. => WHOLE_CELL,
+                    SUBSTITUTE.. => SPLIT_CELL,
+                    _ => WIDE_CELL,
+                };
                 let Surface { coordinates, marks } = surface;
                 let VisiblePoint { position, ng: normal, .. } = *marks[0];
                 let level = level + 1;
@@ -120,6 +131,29 @@ fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> Vec<Surface<'a>> 
         }
     }
     surfaces
+}
+
+/// Whether each surface is much brighter or darker than the same one in a cell beside its own.
+fn contrasts(surfaces: &[Surface], found: &[([f32; 3], f32)], per_metre: f32) -> Vec<bool> {
+    let light: Vec<f32> = found.iter().map(|(irradiance, _)| irradiance.iter().sum()).collect();
+    // Surfaces of a cell follow each other, cells by their coordinates.
+    let in_cell = |coordinates: [i32; 3]| {
+        let first = surfaces.partition_point(|surface| surface.coordinates < coordinates);
+        (first..surfaces.len()).take_while(move |i| surfaces[*i].coordinates == coordinates)
+    };
+    let mut contrasts = vec![false; surfaces.len()];
+    for (i, surface) in surfaces.iter().enumerate() {
+        for axis in 0..3 {
+            let mut beside = surface.coordinates;
+            beside[axis] += 1;
+            for j in in_cell(beside).filter(|j| is_flat(surface.marks[0], surfaces[*j].marks[0], per_metre)) {
+                let differ = light[i].max(light[j]) > CONTRAST * light[i].min(light[j]);
+                contrasts[i] |= differ;
+                contrasts[j] |= differ;
+            }
+        }
+    }
+    contrasts
 }
 
 /// Whether `point` takes the irradiance at `mark`.
@@ -186,6 +220,22 @@ mod tests {
         let narrow = kept.iter().filter(|e| e.position[0] < 50.0).count();
         assert!(narrow > 300 && kept.len() - narrow < 40, "{narrow} of {}", kept.len());
         assert!(table.slots.len() >= 2 * kept.len());
+    }
+
+    #[test]
+    fn cells_are_narrow_where_irradiance_leaps() {
+        let split_between = |ratio: f32| {
+            let mut found = |points: &[VisiblePoint]| {
+                let light = |p: &VisiblePoint| if p.position[0] % 100.0 < 0.55 { 1.0 } else { ratio };
+                Ok(points.iter().map(|p| ([light(p); 3], 0.4)).collect())
+            };
+            let table = CellTable::build(&marks(), 0.5, &mut found).unwrap().unwrap();
+            table.slots.iter().filter(|entry| entry.level > 1).map(|entry| entry.position[0]).collect::<Vec<_>>()
+        };
+        let narrow = split_between(0.02);
+        assert!(narrow.iter().any(|x| (x - 0.55).abs() < 0.03), "{narrow:?}");
+        assert!(narrow.iter().all(|x| (x % 100.0 - 0.55).abs() < 0.4), "{narrow:?}");
+        assert_eq!(split_between(0.5), [0.0_f32; 0], "control: it changes little");
     }
 
     #[test]
