@@ -156,20 +156,21 @@ impl<'a> MapGatherer<'a> {
 impl Gatherer for MapGatherer<'_> {
     /// Fills the cache of irradiance about the ends of the preview's final-gather rays, and finds
     /// bright places among them.
-    fn prepare(&mut self, preview: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
-        let (marks, rays) = ends_of_rays(preview, stats, progress)?;
+    fn prepare(&mut self, preview: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<bool> {
+        let ends = ends_of_rays(preview, stats, progress)?;
         let pixels = f64::from(preview.size.0) * f64::from(preview.size.1);
-        self.rays_per_pixel = Some(rays as f64 / pixels);
+        self.rays_per_pixel = Some(ends.rays as f64 / pixels);
         let Self { maps, search, estimate, .. } = self;
         let mut irradiances = |points: &[VisiblePoint]| {
             let points: Vec<_> = points.iter().map(bare).collect();
             search.estimates(preview, maps, estimate, &points, progress)
         };
-        let fill = || IrradianceCache::build(preview.gpu, &marks, estimate.irradiance_cells, &mut irradiances);
+        let fill = || IrradianceCache::build(preview.gpu, &ends.marks, estimate.irradiance_cells, &mut irradiances);
         self.cache = timed(&mut stats.seconds.gather, fill)?;
-        let Some(cache) = &self.cache else { return Ok(()) };
-        self.bright = bright_places(preview, (&marks, rays), cache, stats)?;
-        Ok(())
+        let Some(cache) = &self.cache else { return Ok(false) };
+        let (bright, is_uneven) = bright_places(preview, &ends, cache, stats)?;
+        self.bright = bright;
+        Ok(is_uneven)
     }
 
     fn bright_places(&self) -> BrightPlaces {
@@ -240,7 +241,9 @@ impl Gatherer for MapGatherer<'_> {
             footprint: filter_footprint(self.estimate.gather_radius, spacing),
         };
         let radius = |position| reach * coarse.tracer.scale_at(position);
-        let records = taken.finish(self.estimate.gather_reach, radius);
+        let obstacles = coarse.obstacles;
+        let between = |from, to| obstacles.first_between(from, to);
+        let records = timed(&mut stats.seconds.gather, || taken.finish(self.estimate.gather_reach, radius, between));
         self.records = Some(IrradianceRecords::new(coarse.gpu, &records, grid)?);
         Ok(())
     }

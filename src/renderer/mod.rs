@@ -7,6 +7,7 @@ mod film_layers;
 mod gatherer;
 mod light_groups;
 mod maps;
+mod obstacles;
 mod power_classes;
 mod preview;
 mod progressive;

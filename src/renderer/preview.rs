@@ -1,11 +1,13 @@
 //! What a small version of a picture tells before the picture: where rays of final gathering end,
 //! and which places there are bright.
 
+use glam::Vec3;
+
 use super::{tally, tiles::CameraPass};
 use crate::{
     error::Result,
     layout::VisiblePoint,
-    passes::{BrightPlaces, IrradianceCache, RayEnd, StepCount, wavefront::LEAST_QUEUE},
+    passes::{BrightPlaces, IrradianceCache, RayEnd, StepCount, is_uneven, wavefront::LEAST_QUEUE},
     progress::{Progress, Stage},
     stats::{Stats, timed},
 };
@@ -18,18 +20,42 @@ pub fn bare(point: &VisiblePoint) -> VisiblePoint {
     VisiblePoint { weight: [1.0; 3], above: 0, ..*point }
 }
 
-/// The ends of all final-gather rays of a pass, weighed as if all that it sees were white, and the
-/// number of its rays.
-pub fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<(Vec<VisiblePoint>, u64)> {
-    let (mut ends, mut count_of_rays) = (Vec::new(), 0);
+/// The beginning of a ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Leg {
+    start: Vec3,
+    direction: Vec3,
+    /// Metres to the first surface.
+    length: f32,
+}
+
+/// The ends of final-gather rays, weighed as if all that is seen were white, and how the rays
+/// begin.
+#[derive(Debug, Default)]
+pub struct Ends {
+    pub marks: Vec<VisiblePoint>,
+    legs: Vec<Leg>,
+    /// Number of all rays.
+    pub rays: u64,
+}
+
+/// The ends of all final-gather rays of a pass.
+pub fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<Ends> {
+    let mut ends = Ends::default();
     pass.for_each_tile(Some(Stage::Cells), stats, progress, &mut |tile, stats| {
         let gather = || {
             let points: Vec<_> = pass.points(tile)?.iter().map(bare).collect();
             pass.set_points(&points);
-            pass.gather_finally(tile, progress, &mut |gather, rays, _| {
-                let found: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
-                count_of_rays += u64::from(rays.all());
-                ends.extend(found.into_iter().filter(|point| point.next_map != 0));
+            pass.gather_finally(tile, progress, &mut |gather, rays, chosen| {
+                let (marks, legs) = gather.legs(pass.gpu, rays)?;
+                ends.rays += u64::from(rays.all());
+                for ((ray, mark), (direction, length)) in (0..).zip(marks).zip(legs) {
+                    if mark.next_map != 0 {
+                        let start = points[chosen[(ray / rays.count) as usize] as usize].position.into();
+                        ends.marks.push(mark);
+                        ends.legs.push(Leg { start, direction, length });
+                    }
+                }
                 Ok(StepCount::default())
             })
         };
@@ -38,18 +64,19 @@ pub fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progres
         tally::add_step(stats, count);
         Ok(())
     })?;
-    Ok((ends, count_of_rays))
+    Ok(ends)
 }
 
-/// Finds bright places by the light of some of the ends of so many rays.
+/// Finds bright places by the light of some of the ends, and says whether more ends tell more.
 pub fn bright_places(
     preview: &CameraPass,
-    (marks, rays): (&[VisiblePoint], u64),
+    ends: &Ends,
     cache: &IrradianceCache,
     stats: &mut Stats,
-) -> Result<BrightPlaces> {
-    let some: Vec<_> = marks.iter().step_by(marks.len().div_ceil(LIT_ENDS) | 1).copied().collect();
-    let fraction = some.len() as f64 / marks.len() as f64;
+) -> Result<(BrightPlaces, bool)> {
+    let step = ends.marks.len().div_ceil(LIT_ENDS) | 1;
+    let some: Vec<_> = ends.marks.iter().step_by(step).copied().collect();
+    let fraction = some.len() as f64 / ends.marks.len() as f64;
     let (gpu, count) = (preview.gpu, some.len() as u32);
     let points = gpu.storage_with("ends of the preview's rays", &some)?;
     let radiance = gpu.storage_with("light of the preview's rays", &vec![[0.0_f32; 4]; some.len()])?;
@@ -61,11 +88,15 @@ pub fn bright_places(
     let light: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into())?;
     // Each ray carries π over their number.
     let scale = f64::from(preview.final_rays()) / std::f64::consts::PI;
-    let end = |(mark, light): (&VisiblePoint, &[f32; 4])| RayEnd {
+    let end = |((mark, leg), light): ((&VisiblePoint, &Leg), &[f32; 4])| RayEnd {
+        start: leg.start,
+        direction: leg.direction,
+        first: leg.length,
         position: mark.position.into(),
         normal: mark.ng.into(),
         radiance: scale * light[..3].iter().map(|x| f64::from(*x)).sum::<f64>(),
     };
-    let ends: Vec<_> = some.iter().zip(&light).map(end).collect();
-    Ok(BrightPlaces::find(&ends, fraction * rays as f64, cache.width()))
+    let lit: Vec<_> = some.iter().zip(ends.legs.iter().step_by(step)).zip(&light).map(end).collect();
+    let rays = fraction * ends.rays as f64;
+    Ok((BrightPlaces::find(&lit, rays, cache.width()), is_uneven(&lit, rays)))
 }

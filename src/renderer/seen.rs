@@ -3,26 +3,22 @@
 
 use glam::Vec3;
 
+use super::obstacles::Obstacles;
 use crate::{
-    bvh::Bvh,
     error::Result,
     gpu::Gpu,
     layout::{Photon, from_octahedral},
     passes::RawMap,
-    scene::{Alpha, Camera, Material, Projection, Scene},
+    scene::{Camera, Projection},
     stats::SeenStats,
 };
 
 /// Photons of a map that are looked at, at most.
 const SAMPLE: u32 = 1 << 13;
-/// Surfaces that a ray to the camera passes at most.
-const MAX_PASSED: usize = 64;
-
 /// What a camera sees of a scene in a picture of some size, the whole of it whatever the crop.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Viewer<'a> {
-    pub scene: &'a Scene,
-    pub bvh: &'a Bvh,
+    pub obstacles: Obstacles<'a>,
     pub camera: &'a Camera,
     pub size: (u32, u32),
 }
@@ -55,23 +51,8 @@ impl Viewer<'_> {
         }
         // From the near plane on, surfaces hide what lies behind them.
         let reach = to_camera.length() * (1.0 - camera.near / depth).clamp(0.0, 1.0);
-        let (mut origin, direction) = (point, to_camera.normalize());
-        for _ in 0..MAX_PASSED {
-            let Some(hit) = self.bvh.nearest_hit(origin, direction) else { return true };
-            if hit.position.distance(point) >= reach {
-                return true;
-            }
-            if hides(&self.scene.materials[hit.material as usize]) {
-                return false;
-            }
-            origin = hit.position;
-        }
-        false
+        self.obstacles.first_between(point, point + reach * to_camera.normalize()).is_none()
     }
-}
-
-fn hides(material: &Material) -> bool {
-    !material.surface.transmits() && material.alpha == Alpha::Opaque
 }
 
 #[cfg(test)]
@@ -79,7 +60,10 @@ mod tests {
     use glam::vec3;
 
     use super::*;
-    use crate::scene::{Bounds, Sphere, Surface};
+    use crate::{
+        bvh::Bvh,
+        scene::{Bounds, Material, Scene, Sphere, Surface},
+    };
 
     #[test]
     fn what_is_hidden_or_outside_of_the_picture_is_not_seen() {
@@ -101,7 +85,8 @@ mod tests {
             ..Camera::framing(Bounds { min: Vec3::ZERO, max: Vec3::ONE })
         };
         let sees = |camera: &Camera, point: Vec3, normal: Vec3| {
-            Viewer { scene: &scene, bvh: &bvh, camera, size: (64, 64) }.sees(point, normal)
+            let obstacles = Obstacles { scene: &scene, bvh: &bvh };
+            Viewer { obstacles, camera, size: (64, 64) }.sees(point, normal)
         };
         assert!(sees(&view, vec3(0.0, 0.0, 0.5), Vec3::Z), "through the pane");
         assert!(!sees(&view, vec3(0.0, 0.0, -0.5), Vec3::NEG_Z), "its back");

@@ -8,6 +8,7 @@ use std::sync::{
 use super::{
     gatherer::{MapGatherer, Observer},
     maps::{PhotonMaps, trace_maps},
+    obstacles::Obstacles,
     searches::gather_for,
     seen::Viewer,
     size::picture_size,
@@ -37,9 +38,9 @@ use crate::{
 /// Samples of each pixel of a grid.
 const GRID_SAMPLES: u32 = 4;
 /// Rays of final gathering that the preview of a picture traces at most, in all and for each pixel
-/// of the picture.
+/// of the picture: first, and where few of them bring most of the light.
 const PREVIEW_RAYS: f64 = (1 << 17) as f64;
-const PREVIEW_RAYS_PER_PIXEL: f64 = 2.0;
+const PREVIEW_RAYS_PER_PIXEL: [f64; 2] = [2.0, 16.0];
 
 /// A finished render.
 #[derive(Clone, Debug)]
@@ -59,8 +60,9 @@ pub struct Session<'a> {
     buffers: SceneBuffers,
     /// Media that contain each of the scene's cameras.
     camera_media: Vec<Media>,
-    /// The hierarchy, and what pictures show of the scene, where photons that are seen are counted.
-    viewed: Option<(Arc<Bvh>, PictureSettings)>,
+    bvh: Arc<Bvh>,
+    /// What pictures show of the scene, where photons that are seen are counted.
+    viewed: Option<PictureSettings>,
     stats: Stats,
     /// Number among the sessions of the process.
     id: u64,
@@ -109,7 +111,7 @@ impl<'a> Session<'a> {
         };
         gpu.memory.restart_peak();
         progress.report(Stage::Bvh, 0, 1);
-        let bvh = timed(&mut stats.seconds.bvh, || Bvh::build_watched(scene, progress))?;
+        let bvh = Arc::new(timed(&mut stats.seconds.bvh, || Bvh::build_watched(scene, progress))?);
         // They are those of the whole light in each of its groups.
         let contacts = Arc::new(timed(&mut stats.seconds.bvh, || contacts(scene, &bvh)));
         let lit = |group: &String| scene.lit_by(group);
@@ -129,12 +131,12 @@ impl<'a> Session<'a> {
         let probe = MediaProbe::new(scene, &bvh, solids);
         let camera_media: Vec<Media> =
             scene.cameras.iter().map(|camera| probe.at(camera.position.as_dvec3())).collect();
-        let viewed = viewed.map(|picture| (Arc::new(bvh), picture.clone()));
         let session = |buffers: SceneBuffers| {
             let mut stats = stats.clone();
             stats.warnings.extend(buffers.lights.warnings.iter().cloned());
             let id = SESSIONS.fetch_add(1, Ordering::Relaxed);
-            Self { gpu, scene, buffers, camera_media: camera_media.clone(), viewed: viewed.clone(), stats, id }
+            let (bvh, viewed) = (Arc::clone(&bvh), viewed.cloned());
+            Self { gpu, scene, buffers, camera_media: camera_media.clone(), bvh, viewed, stats, id }
         };
         Ok(buffers.into_iter().map(session).collect())
     }
@@ -186,9 +188,13 @@ impl<'a> Session<'a> {
     }
 
     fn viewer(&self) -> Result<Option<Viewer<'_>>> {
-        let Some((bvh, picture)) = &self.viewed else { return Ok(None) };
+        let Some(picture) = &self.viewed else { return Ok(None) };
         let camera = self.scene.camera(picture.camera.as_deref())?;
-        Ok(Some(Viewer { scene: self.scene, bvh, camera, size: picture_size(camera, picture)? }))
+        Ok(Some(Viewer { obstacles: self.obstacles(), camera, size: picture_size(camera, picture)? }))
+    }
+
+    fn obstacles(&self) -> Obstacles<'_> {
+        Obstacles { scene: self.scene, bvh: &self.bvh }
     }
 
     /// Second pass: camera rays, direct light and the radiance estimate, tile by tile. Mode,
@@ -252,7 +258,7 @@ impl<'a> Session<'a> {
     ) -> Result<CameraPass<'_>> {
         let number = self.scene.camera_number(picture.camera.as_deref())?;
         let camera = (&self.scene.cameras[number], self.camera_media[number]);
-        let scene = (self.scene, &self.buffers);
+        let scene = (self.obstacles(), &self.buffers);
         let pass = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, picture)?;
         pass.of_pass(picture, maps.first_sample)
     }
@@ -295,17 +301,24 @@ impl<'a> Session<'a> {
         }
         let number = self.scene.camera_number(picture.camera.as_deref())?;
         let camera = (&self.scene.cameras[number], self.camera_media[number]);
-        let scene = (self.scene, &self.buffers);
+        let scene = (self.obstacles(), &self.buffers);
         let pass = self.pass(maps, estimate, picture)?;
         let mut stats = maps.stats().clone();
         if estimate.keeps_irradiance() && pass.final_rays() > 0 && !maps.maps().is_empty() {
-            let small = preview_of(picture, pass.size, maps.settings().final_gather);
-            let preview = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &small)?;
             // The preview of each pass looks at points of its own; that of the first is a single
             // picture's.
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
-            let preview = preview.of_pass(&small, index)?;
-            gatherer.prepare(&preview, &mut stats, progress)?;
+            let mut sizes = PREVIEW_RAYS_PER_PIXEL
+                .map(|per_pixel| preview_of(picture, pass.size, (maps.settings().final_gather, per_pixel)))
+                .to_vec();
+            sizes.dedup();
+            for small in sizes {
+                let preview = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &small)?;
+                let preview = preview.of_pass(&small, index)?;
+                if !gatherer.prepare(&preview, &mut stats, progress)? {
+                    break;
+                }
+            }
         }
         if estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty() {
             let coarse = coarser(picture, &pass, estimate);
@@ -349,9 +362,9 @@ fn coarser(picture: &PictureSettings, pass: &CameraPass, estimate: &EstimateSett
 
 /// Settings of a small version of the whole picture, with about as many rays of final gathering as
 /// the constants say. It does not depend on the data window.
-fn preview_of(picture: &PictureSettings, size: (u32, u32), rays: u32) -> PictureSettings {
+fn preview_of(picture: &PictureSettings, size: (u32, u32), (rays, per_pixel): (u32, f64)) -> PictureSettings {
     let pixels = f64::from(size.0) * f64::from(size.1);
-    let most = PREVIEW_RAYS.min(PREVIEW_RAYS_PER_PIXEL * pixels);
+    let most = PREVIEW_RAYS.min(per_pixel * pixels);
     let scale = (most / f64::from(rays) / pixels).min(0.25).sqrt();
     let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(1);
     PictureSettings { size: Some((side(size.0), side(size.1))), spp: 1, max_spp: None, crop: None, ..picture.clone() }

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use super::{
+    obstacles::Obstacles,
     ray_start::ray_start,
     size::picture_size,
     tally,
@@ -36,9 +37,9 @@ pub(crate) trait Gatherer {
     ) -> Result<()>;
 
     /// Receives a pass over a small version of the whole picture, before the picture. The default
-    /// does nothing with it.
-    fn prepare(&mut self, _preview: &CameraPass, _stats: &mut Stats, _progress: &dyn Progress) -> Result<()> {
-        Ok(())
+    /// does nothing with it. Returns whether a larger version would tell more.
+    fn prepare(&mut self, _preview: &CameraPass, _stats: &mut Stats, _progress: &dyn Progress) -> Result<bool> {
+        Ok(false)
     }
 
     /// Width of what is seen blurred from which on this gatherer has light for it, metres; 0: none.
@@ -94,6 +95,7 @@ pub(crate) struct CameraPass<'a> {
     /// Direct light comes from shadow rays.
     direct: bool,
     pub(super) geometry: &'a Scene,
+    pub(super) obstacles: Obstacles<'a>,
     /// Sums of the tile's pixels when the last component of the light was finished.
     pub(super) finished: RefCell<Vec<[f32; 4]>>,
     /// Layers that the film has besides.
@@ -103,15 +105,17 @@ pub(crate) struct CameraPass<'a> {
 }
 
 impl<'a> CameraPass<'a> {
-    /// `media` are those around the middle of the camera; `geometry` is the scene in the buffers.
+    /// `media` are those around the middle of the camera; `obstacles` are of the scene in the
+    /// buffers.
     pub fn new(
         gpu: &'a Gpu,
-        (geometry, scene): (&'a Scene, &'a SceneBuffers),
+        (obstacles, scene): (Obstacles<'a>, &'a SceneBuffers),
         (camera, media): (&Camera, Media),
         photons: &PhotonSettings,
         estimate: &EstimateSettings,
         picture: &PictureSettings,
     ) -> Result<Self> {
+        let geometry = obstacles.scene;
         let size = picture_size(camera, picture)?;
         let shares = estimate.share_reach > 0.0 && photons.mode.traces_photons();
         let start = ray_start((geometry, &scene.solids), (camera, media), size);
@@ -133,6 +137,7 @@ impl<'a> CameraPass<'a> {
             doublings: picture.doublings(),
             direct: photons.mode.direct_by_rays(),
             geometry,
+            obstacles,
             finished: RefCell::default(),
             layers: picture.layers.clone(),
             hashes: [

@@ -4,25 +4,36 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::layout::BrightPatch;
 
 /// Patches at most: every ray reads them all.
-const MAX_PATCHES: usize = 8;
+const MAX_PATCHES: usize = 64;
 /// Radiance of a bright end, in units of the mean over all rays.
 const BRIGHT: f64 = 8.0;
 /// Fraction of the rays' variance that bright ends must cause for any ray to be aimed.
 const LEAST_PART: f64 = 0.3;
 /// Widths of cells that are tried, in units of the narrowest: few ends are spread over few wide
-/// cells.
+/// cells. The narrowest is taken that has this part of the most that any has.
 const WIDTHS: [f32; 4] = [1.0, 2.0, 4.0, 8.0];
+const NEAR_MOST: f64 = 0.9;
+/// Mean square of the radiance over the square of its mean, above which few rays bring most of the
+/// light: more rays tell more about where they find it.
+const UNEVEN: f64 = 30.0;
 /// Ends that make a patch.
-const MIN_ENDS: f64 = 3.0;
+const MIN_ENDS: usize = 3;
+/// Length of a way, as a fraction of what is straight, from which on it has a corner.
+const STRAIGHT: f32 = 1.0001;
 
 /// The end of a ray that was drawn by the cosine.
 #[derive(Clone, Copy, Debug)]
 pub struct RayEnd {
+    /// Where the ray starts, and a unit vector.
+    pub start: Vec3,
+    pub direction: Vec3,
+    /// Metres to the first surface. There, mirrors and glass may send the ray another way.
+    pub first: f32,
     /// Metres.
     pub position: Vec3,
     /// Geometric.
@@ -38,15 +49,22 @@ pub struct BrightPlaces {
     pub other_light: f32,
 }
 
-/// Sums over the bright ends of a cell, with their radiance as the weight.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    ends: f64,
-    light: f64,
-    squares: f64,
+/// A place at which rays can be aimed to meet the end of one.
+#[derive(Clone, Copy, Debug)]
+struct Aim {
     position: Vec3,
+    /// 0: it looks the same from all sides.
     normal: Vec3,
-    spread: f32,
+}
+
+/// Bright ends in a cell.
+#[derive(Clone, Debug, Default)]
+struct Cell {
+    /// Index of the end, and where it is aimed at.
+    ends: Vec<(usize, Aim)>,
+    /// Sum of the squares of their radiance, and their number, without those of patches.
+    squares: f64,
+    left: usize,
 }
 
 impl BrightPlaces {
@@ -54,56 +72,105 @@ impl BrightPlaces {
     /// picture; those that met nothing are left out.
     #[must_use]
     pub fn find(ends: &[RayEnd], rays: f64, width: f32) -> Self {
-        WIDTHS.iter().find_map(|factor| Self::in_cells(ends, rays, width * factor)).unwrap_or_default()
+        let found: Vec<(f64, Self)> = WIDTHS.iter().map(|factor| Self::in_cells(ends, rays, width * factor)).collect();
+        let most = found.iter().map(|(part, _)| *part).fold(LEAST_PART, f64::max);
+        found.into_iter().find(|(part, _)| *part > NEAR_MOST * most).map(|(_, places)| places).unwrap_or_default()
     }
 
-    /// The same by cells of one width; `None` if too little of the light comes from the places.
-    fn in_cells(ends: &[RayEnd], rays: f64, width: f32) -> Option<Self> {
+    /// The same by cells of one width, and the fraction of the variance that the places cause.
+    fn in_cells(ends: &[RayEnd], rays: f64, width: f32) -> (f64, Self) {
         let mean = ends.iter().map(|end| end.radiance).sum::<f64>() / rays.max(1.0);
-        let is_bright = |end: &&RayEnd| end.radiance > BRIGHT * mean;
-        let mut cells: BTreeMap<[i32; 4], Sums> = BTreeMap::new();
-        for end in ends.iter().filter(is_bright) {
-            // Surfaces that face other ways are other patches.
-            let axis = end.normal.abs().max_position();
-            let side = 2 * axis as i32 + i32::from(end.normal[axis] < 0.0);
-            let [x, y, z] = (end.position / width).floor().as_ivec3().to_array();
-            let sums = cells.entry([x, y, z, side]).or_default();
-            let weight = end.radiance / (sums.light + end.radiance);
-            let step = end.position - sums.position;
-            sums.position += weight as f32 * step;
-            sums.spread = (1.0 - weight as f32) * (sums.spread + weight as f32 * step.length_squared());
-            sums.normal += end.radiance as f32 * end.normal;
-            sums.ends += 1.0;
-            sums.light += end.radiance;
-            sums.squares += end.radiance.powi(2);
+        let mut cells: Vec<Cell> = Vec::new();
+        let mut of_keys: BTreeMap<[i32; 5], usize> = BTreeMap::new();
+        let mut of_ends: Vec<[Option<usize>; 2]> = vec![[None; 2]; ends.len()];
+        for (i, end) in ends.iter().enumerate().filter(|(_, end)| end.radiance > BRIGHT * mean) {
+            for ((kind, aim), own) in (0..).zip(end.aims()).zip(&mut of_ends[i]) {
+                let Some(aim) = aim else { continue };
+                // Surfaces that face other ways are other patches.
+                let axis = aim.normal.abs().max_position();
+                let side = 2 * axis as i32 + i32::from(aim.normal[axis] < 0.0);
+                let side = if aim.normal == Vec3::ZERO { -1 } else { side };
+                let [x, y, z] = (aim.position / width).floor().as_ivec3().to_array();
+                let cell = *of_keys.entry([x, y, z, side, kind]).or_insert(cells.len());
+                *own = Some(cell);
+                cells.resize_with(cells.len().max(cell + 1), Cell::default);
+                cells[cell].ends.push((i, aim));
+                cells[cell].squares += end.radiance.powi(2);
+                cells[cell].left += 1;
+            }
         }
-        let mut cells: Vec<Sums> = cells.into_values().filter(|sums| sums.ends >= MIN_ENDS).collect();
-        cells.sort_by(|a, b| b.squares.total_cmp(&a.squares));
-        cells.truncate(MAX_PATCHES);
-        let of_patches = |of: fn(&Sums) -> f64| cells.iter().map(of).sum::<f64>();
+        let (mut patches, mut light, mut squares) = (Vec::new(), 0.0, 0.0);
+        let mut is_left = vec![true; ends.len()];
+        while patches.len() < MAX_PATCHES {
+            let brightest = (0..cells.len())
+                .filter(|i| cells[*i].left >= MIN_ENDS)
+                .max_by(|a, b| cells[*a].squares.total_cmp(&cells[*b].squares).then(b.cmp(a)));
+            let Some(brightest) = brightest else { break };
+            let taken: Vec<(usize, Aim)> =
+                std::mem::take(&mut cells[brightest].ends).into_iter().filter(|(i, _)| is_left[*i]).collect();
+            for (i, _) in &taken {
+                is_left[*i] = false;
+                light += ends[*i].radiance;
+                squares += ends[*i].radiance.powi(2);
+                for cell in of_ends[*i].iter().flatten() {
+                    cells[*cell].left -= 1;
+                    cells[*cell].squares -= ends[*i].radiance.powi(2);
+                }
+            }
+            patches.extend(patch(&taken.iter().map(|(i, aim)| (*aim, ends[*i].radiance)).collect::<Vec<_>>()));
+        }
         let all = ends.iter().map(|end| end.radiance.powi(2)).sum::<f64>();
-        if of_patches(|sums| sums.squares) <= LEAST_PART * all {
-            return None;
-        }
-        let other = mean - of_patches(|sums| sums.light) / rays;
-        Some(Self {
-            patches: cells.iter().filter_map(Sums::patch).collect(),
-            other_light: (std::f64::consts::PI * other.max(0.0)) as f32,
-        })
+        let other = mean - light / rays;
+        let places = Self { patches, other_light: (std::f64::consts::PI * other.max(0.0)) as f32 };
+        (if all > 0.0 { squares / all } else { 0.0 }, places)
     }
 }
 
-impl Sums {
-    fn patch(&self) -> Option<BrightPatch> {
-        // The mean square of the distance from the middle of an even disc is half of its squared
-        // radius. Twice that is taken, for what is darker at the rim.
-        let radius = 2.0 * (self.spread * (1.0 + 1.0 / self.ends as f32)).sqrt();
-        let area = 2.0 * std::f64::consts::PI * f64::from(self.spread);
-        let power = (self.light / self.ends * area) as f32;
-        let normal = self.normal.try_normalize()?.to_array();
-        Some(BrightPatch { position: self.position.to_array(), radius, normal, power })
-            .filter(|patch| patch.radius > 0.0 && patch.power.is_finite())
+/// Whether few of so many rays bring most of the light.
+#[must_use]
+pub fn is_uneven(ends: &[RayEnd], rays: f64) -> bool {
+    let mean_of = |of: &dyn Fn(f64) -> f64| ends.iter().map(|end| of(end.radiance)).sum::<f64>() / rays.max(1.0);
+    mean_of(&|radiance| radiance * radiance) > UNEVEN * mean_of(&|radiance| radiance).powi(2)
+}
+
+impl RayEnd {
+    /// Where other rays are aimed to meet what is there. By way of a plane mirror or of a pane,
+    /// that is its image, as far behind the mirror as the way goes on; a ball shows it in itself.
+    fn aims(&self) -> [Option<Aim>; 2] {
+        let corner = self.start + self.first * self.direction;
+        let after = self.position - corner;
+        let length = self.first + after.length();
+        let straight = Aim { position: self.position, normal: self.normal };
+        if length <= STRAIGHT * self.position.distance(self.start) {
+            return [Some(straight), None];
+        }
+        // The reflection that turns the way back into one line turns the surface as well.
+        let turned = match (self.direction - after.normalize_or_zero()).try_normalize() {
+            Some(mirror) => self.normal - 2.0 * self.normal.dot(mirror) * mirror,
+            None => self.normal,
+        };
+        let image = Aim { position: self.start + length * self.direction, normal: turned };
+        [Some(image), Some(Aim { position: corner, normal: Vec3::ZERO })]
     }
+}
+
+/// The disc about what is aimed at, by radiance.
+fn patch(ends: &[(Aim, f64)]) -> Option<BrightPatch> {
+    let light: f64 = ends.iter().map(|(_, radiance)| radiance).sum();
+    let mean = |of: &dyn Fn(&Aim) -> Vec3| {
+        ends.iter().map(|(aim, radiance)| of(aim).as_dvec3() * (radiance / light)).sum::<DVec3>().as_vec3()
+    };
+    let position = mean(&|aim| aim.position);
+    let spread: f64 =
+        ends.iter().map(|(aim, radiance)| f64::from(aim.position.distance_squared(position)) * radiance / light).sum();
+    let count = ends.len() as f64;
+    // The mean square of the distance from the middle of an even disc is half of its squared
+    // radius. Twice that is taken, for what is darker at the rim.
+    let radius = 2.0 * (spread * (1.0 + 1.0 / count)).sqrt() as f32;
+    let power = (light / count * 2.0 * std::f64::consts::PI * spread) as f32;
+    let normal = mean(&|aim| aim.normal).normalize_or_zero().to_array();
+    Some(BrightPatch { position: position.to_array(), radius, normal, power })
+        .filter(|patch| patch.radius > 0.0 && patch.power.is_finite())
 }
 
 #[cfg(test)]
@@ -114,7 +181,15 @@ mod tests {
     fn ends(bright: f64) -> Vec<RayEnd> {
         let at = |i: u32| Vec3::new((i % 100) as f32 / 50.0 - 1.0, 0.0, (i / 100) as f32 / 50.0 - 1.0);
         let radiance = |p: Vec3| if (p - Vec3::new(0.31, 0.0, 0.29)).length() < 0.1 { bright } else { 1.0 };
-        let end = |p: Vec3| RayEnd { position: p, normal: Vec3::Y, radiance: radiance(p) };
+        let start = Vec3::new(0.0, 1.0, 0.0);
+        let end = |p: Vec3| RayEnd {
+            start,
+            direction: (p - start).normalize(),
+            first: p.distance(start),
+            position: p,
+            normal: Vec3::Y,
+            radiance: radiance(p),
+        };
         (0..10_000).map(|i| end(at(i))).collect()
     }
 
@@ -128,6 +203,47 @@ mod tests {
         assert!((bright.other_light / std::f32::consts::PI - 1.0).abs() < 0.02, "{bright:?}");
         let narrow = BrightPlaces::find(&ends(500.0), 10_000.0, 0.1).patches;
         assert!(narrow.len() > 3 && narrow.len() <= MAX_PATCHES, "{narrow:?}");
+    }
+
+    #[test]
+    fn what_mirrors_and_balls_show_is_aimed_at_in_them() {
+        // A lamp at x = 1.1, seen in a mirror at x = -1.
+        let lamp = |i: usize| Vec3::new(1.1, 0.01 * (i % 5) as f32, 0.01 * (i / 5) as f32);
+        let end = |start: Vec3, corner: Vec3, position: Vec3| RayEnd {
+            start,
+            direction: (corner - start).normalize(),
+            first: corner.distance(start),
+            position,
+            normal: Vec3::NEG_X,
+            radiance: 1.0,
+        };
+        let start = |i: usize| Vec3::new(0.2 * (i % 3) as f32, -1.0, 0.1 * i as f32);
+        let in_mirror: Vec<RayEnd> = (0..25)
+            .map(|i| {
+                let image = Vec3::new(-2.0 - lamp(i).x, lamp(i).y, lamp(i).z);
+                let part = (-1.0 - start(i).x) / (image.x - start(i).x);
+                end(start(i), start(i).lerp(image, part), lamp(i))
+            })
+            .collect();
+        let bright = BrightPlaces::find(&in_mirror, 10_000.0, 0.5);
+        let [patch] = bright.patches[..] else { panic!("one image: {bright:?}") };
+        assert!((Vec3::from(patch.position) - Vec3::new(-3.1, 0.02, 0.02)).length() < 0.01, "{patch:?}");
+        assert!((Vec3::from(patch.normal) - Vec3::X).length() < 1e-3, "{patch:?}");
+        // By way of a small ball, whose images lie anywhere.
+        let in_ball: Vec<RayEnd> = (0..25)
+            .map(|i| end(start(i), Vec3::new(0.01 * (i % 4) as f32, 2.0, 0.01 * (i % 7) as f32), lamp(i)))
+            .collect();
+        let bright = BrightPlaces::find(&in_ball, 10_000.0, 0.5);
+        let [patch] = bright.patches[..] else { panic!("the ball: {bright:?}") };
+        assert!((Vec3::from(patch.position) - Vec3::new(0.015, 2.0, 0.03)).length() < 0.01, "{patch:?}");
+        assert_eq!(patch.normal, [0.0; 3], "it faces all sides");
+    }
+
+    #[test]
+    fn light_of_few_rays_is_uneven() {
+        // A place of a fourhundredth of the floor.
+        assert!(is_uneven(&ends(500.0), 10_000.0));
+        assert!(!is_uneven(&ends(10.0), 10_000.0) && !is_uneven(&[], 0.0));
     }
 
     #[test]

@@ -2,6 +2,8 @@
 //! "Realistic Image Synthesis Using Photon Mapping", section 8.2). Kernels: `start_final_gather`,
 //! `trace_camera`, `light_lobes`, `sum_final_gather`.
 
+use glam::Vec3;
+
 use super::{
     bright_places::BrightPlaces,
     camera_tracer::CameraTracer,
@@ -13,7 +15,7 @@ use super::{
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{ArrivingLight, BrightPatch, CameraTile, FinalStep, VisiblePoint},
+    layout::{ArrivingLight, BrightPatch, CameraTile, FinalStep, VisiblePoint, from_octahedral},
     passes::wavefront::Step,
     reference::mix,
     settings::Sampler,
@@ -181,6 +183,19 @@ impl FinalGather {
             &Step { kernel: &self.kernels.trace, buffers: &followed },
             (self.kernels.lobes.as_ref(), &self.found),
         )
+    }
+
+    /// The ends of the rays of a step, and of each ray its direction and the distance to its first
+    /// surface, metres.
+    ///
+    /// # Errors
+    /// Faults of the driver.
+    pub fn legs(&self, gpu: &Gpu, rays: FinalRays) -> Result<(Vec<VisiblePoint>, Vec<(Vec3, f32)>)> {
+        let count = rays.all().into();
+        let directions: Vec<[u32; 2]> = gpu.read(&self.directions, 0, count)?;
+        let found: Vec<[f32; 4]> = gpu.read(&self.found, 0, count)?;
+        let leg = |([direction, _], [.., first]): ([u32; 2], [f32; 4])| (from_octahedral(direction), first);
+        Ok((gpu.read(&self.ends, 0, count)?, directions.into_iter().zip(found).map(leg).collect()))
     }
 
     /// Adds direct light at the ends of rays to what they found.

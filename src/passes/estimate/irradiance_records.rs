@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use super::record_walls::wall_distances;
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
@@ -102,18 +103,21 @@ impl Records {
         self.distances[slot] = rays as f32 / arriving.nearness;
     }
 
-    /// All records, with their reach: that fraction of the distance to what is around each.
-    /// `radius`: that of the filter at a position, metres.
+    /// All records, with their reach: that fraction of the distance to what is around each, and no
+    /// farther than to a wall on its surface. `radius`: that of the filter at a position, metres;
+    /// `between`: metres from one point to what hides another from it.
     #[must_use]
     pub fn finish(
         mut self,
         fraction: f32,
         radius: impl Fn(Vec3) -> f32,
+        between: impl Fn(Vec3, Vec3) -> Option<f32> + Sync,
     ) -> (Vec<IrradianceRecord>, Vec<LightDirections>) {
-        for slot in 0..self.records.len() {
+        let walls = wall_distances(&self.records, (self.columns, self.branches), between);
+        for (slot, wall) in walls.into_iter().enumerate() {
             let distance = self.distance(slot);
             let record = &mut self.records[slot];
-            let reach = fraction * distance / radius(record.position.into());
+            let reach = (fraction * distance).min(wall) / radius(record.position.into());
             record.reach = reach.clamp(1e-3, MAX_REACH);
         }
         // All that lies beyond the grid has the slot behind all others.
@@ -209,7 +213,7 @@ mod tests {
                 records.put(place, 0, &point, [1.0; 4], &light(nearness), 1);
             }
             // What is near at one limits the other: the distance is 1.5 units, or a hundredth.
-            records.finish(1.5, |_| 3.0).0[4].reach
+            records.finish(1.5, |_| 3.0, |_, _| None).0[4].reach
         };
         assert_eq!(reach((1, 0)), 0.005, "above and beside it");
         assert_eq!(reach((3, 0)), 0.5, "control: the end of the row before");

@@ -7,6 +7,7 @@ mod gather_kernels;
 pub mod irradiance_cache;
 pub mod irradiance_records;
 mod query_order;
+mod record_walls;
 pub mod share_estimates;
 
 #[doc(hidden)]
