@@ -36,13 +36,15 @@ pub struct IrradianceRecord {
 /// The directions from which the light of an [`IrradianceRecord`] comes, of each colour four
 /// numbers of eight bits, signed and normalised. The first three are v/(1 + |v|), where v is the
 /// vector ∫ L ω dω along the surface, over the irradiance E; the last one is E/∫ L dω, the mean
-/// cosine.
+/// cosine. And what is asked of the nearest record alone.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct LightDirections {
     pub red: u32,
     pub green: u32,
     pub blue: u32,
+    /// As [`IrradianceRecord::reach`], whatever walls are near.
+    pub open_reach: f32,
 }
 
 /// Arguments of `filter_irradiance`: records by rows of a grid that is coarser than the picture,

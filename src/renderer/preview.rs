@@ -47,7 +47,8 @@ pub fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progres
             let points: Vec<_> = pass.points(tile)?.iter().map(bare).collect();
             pass.set_points(&points);
             pass.gather_finally(tile, progress, &mut |gather, rays, chosen| {
-                let (marks, legs) = gather.legs(pass.gpu, rays)?;
+                let marks: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
+                let legs = gather.legs(pass.gpu, rays)?;
                 ends.rays += u64::from(rays.all());
                 for ((ray, mark), (direction, length)) in (0..).zip(marks).zip(legs) {
                     if mark.next_map != 0 {

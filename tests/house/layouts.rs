@@ -66,7 +66,7 @@ fn twins() -> Vec<Twin> {
         CellGrid { per_metre, levels, mask, points, next_map, pad0, pad1, pad2 }
         ArrivingLight { red, green, blue, fluence, nearness }
         IrradianceRecord { position, ng, irradiance, reach }
-        LightDirections { red, green, blue }
+        LightDirections { red, green, blue, open_reach }
         RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, footprint }
         IrradianceCell { coordinates, level, position, split, normal, pad0, irradiance, pad1 }
         FirstHit { normal, depth, albedo, alpha, position, id, uv, instance, material }

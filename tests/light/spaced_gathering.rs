@@ -199,7 +199,7 @@ fn spaced_points_light_every_sample() {
     for (name, scene) in scenes() {
         // Noise of the right picture adds to both errors, which differ least in the slit.
         // Few rays find its light, so that it has as many as the default.
-        let (rays, spaced_rays) = if name == "a slit" { (128, 64) } else { (64, 32) };
+        let (rays, spaced_rays) = if name == "a slit" { (256, 64) } else { (64, 32) };
         let right = render_scene(&scene, &converged(rays));
         let spaced = render_scene(&scene, &gathering(spaced_rays, 2));
         let (found, control) = (error(&spaced, &right), error(&render_scene(&scene, &plain()), &right));

@@ -8,8 +8,9 @@ use glam::{DVec3, Vec3};
 
 use crate::layout::BrightPatch;
 
-/// Patches at most: every ray reads them all.
-const MAX_PATCHES: usize = 64;
+/// Patches at most, and where light is uneven: every ray reads them all.
+const MAX_PATCHES: usize = 8;
+const MAX_PATCHES_OF_UNEVEN: usize = 64;
 /// Radiance of a bright end, in units of the mean over all rays.
 const BRIGHT: f64 = 8.0;
 /// Fraction of the rays' variance that bright ends must cause for any ray to be aimed.
@@ -99,9 +100,10 @@ impl BrightPlaces {
                 cells[cell].left += 1;
             }
         }
+        let most = if is_uneven(ends, rays) { MAX_PATCHES_OF_UNEVEN } else { MAX_PATCHES };
         let (mut patches, mut light, mut squares) = (Vec::new(), 0.0, 0.0);
         let mut is_left = vec![true; ends.len()];
-        while patches.len() < MAX_PATCHES {
+        while patches.len() < most {
             let brightest = (0..cells.len())
                 .filter(|i| cells[*i].left >= MIN_ENDS)
                 .max_by(|a, b| cells[*a].squares.total_cmp(&cells[*b].squares).then(b.cmp(a)));
@@ -202,7 +204,7 @@ mod tests {
         assert!((patch.power / (500.0 * 0.01 * std::f32::consts::PI) - 1.0).abs() < 0.1, "{patch:?}");
         assert!((bright.other_light / std::f32::consts::PI - 1.0).abs() < 0.02, "{bright:?}");
         let narrow = BrightPlaces::find(&ends(500.0), 10_000.0, 0.1).patches;
-        assert!(narrow.len() > 3 && narrow.len() <= MAX_PATCHES, "{narrow:?}");
+        assert!(narrow.len() > 3 && narrow.len() <= MAX_PATCHES_OF_UNEVEN, "{narrow:?}");
     }
 
     #[test]

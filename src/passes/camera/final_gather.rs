@@ -185,17 +185,15 @@ impl FinalGather {
         )
     }
 
-    /// The ends of the rays of a step, and of each ray its direction and the distance to its first
-    /// surface, metres.
+    /// Of each ray of a step its direction and the distance to its first surface, metres.
     ///
     /// # Errors
     /// Faults of the driver.
-    pub fn legs(&self, gpu: &Gpu, rays: FinalRays) -> Result<(Vec<VisiblePoint>, Vec<(Vec3, f32)>)> {
-        let count = rays.all().into();
-        let directions: Vec<[u32; 2]> = gpu.read(&self.directions, 0, count)?;
-        let found: Vec<[f32; 4]> = gpu.read(&self.found, 0, count)?;
+    pub fn legs(&self, gpu: &Gpu, rays: FinalRays) -> Result<Vec<(Vec3, f32)>> {
+        let directions: Vec<[u32; 2]> = gpu.read(&self.directions, 0, rays.all().into())?;
+        let found: Vec<[f32; 4]> = gpu.read(&self.found, 0, rays.all().into())?;
         let leg = |([direction, _], [.., first]): ([u32; 2], [f32; 4])| (from_octahedral(direction), first);
-        Ok((gpu.read(&self.ends, 0, count)?, directions.into_iter().zip(found).map(leg).collect()))
+        Ok(directions.into_iter().zip(found).map(leg).collect())
     }
 
     /// Adds direct light at the ends of rays to what they found.

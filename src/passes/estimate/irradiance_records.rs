@@ -99,6 +99,7 @@ impl Records {
             red: direction(arriving.red, red),
             green: direction(arriving.green, green),
             blue: direction(arriving.blue, blue),
+            open_reach: 0.0,
         };
         self.distances[slot] = rays as f32 / arriving.nearness;
     }
@@ -117,8 +118,10 @@ impl Records {
         for (slot, wall) in walls.into_iter().enumerate() {
             let distance = self.distance(slot);
             let record = &mut self.records[slot];
-            let reach = (fraction * distance).min(wall) / radius(record.position.into());
-            record.reach = reach.clamp(1e-3, MAX_REACH);
+            let radius = radius(record.position.into());
+            let reach = |metres: f32| (metres / radius).clamp(1e-3, MAX_REACH);
+            record.reach = reach(wall.min(fraction * distance));
+            self.directions[slot].open_reach = reach(fraction * distance);
         }
         // All that lies beyond the grid has the slot behind all others.
         self.records.push(NO_RECORD);
