@@ -12,8 +12,10 @@ use crate::{
     stats::{Stats, timed},
 };
 
-/// Ends of the preview's rays at most by whose light bright places are found.
-const LIT_ENDS: usize = LEAST_QUEUE as usize;
+/// Ends of the preview's rays at most by whose light bright places are found, and those that are
+/// lit at once.
+const LIT_ENDS: usize = 8 * LIT_AT_ONCE;
+const LIT_AT_ONCE: usize = LEAST_QUEUE as usize;
 
 /// A point whose radiance is its irradiance.
 pub fn bare(point: &VisiblePoint) -> VisiblePoint {
@@ -78,15 +80,18 @@ pub fn bright_places(
     let step = ends.marks.len().div_ceil(LIT_ENDS) | 1;
     let some: Vec<_> = ends.marks.iter().step_by(step).copied().collect();
     let fraction = some.len() as f64 / ends.marks.len() as f64;
-    let (gpu, count) = (preview.gpu, some.len() as u32);
-    let points = gpu.storage_with("ends of the preview's rays", &some)?;
-    let radiance = gpu.storage_with("light of the preview's rays", &vec![[0.0_f32; 4]; some.len()])?;
-    let direct = || preview.light_ends_directly((&points, &radiance, count));
-    let done = timed(&mut stats.seconds.direct, direct)?;
-    stats.non_finite.direct += done.non_finite;
-    tally::add_step(stats, done);
-    cache.light(gpu, &points, count, &radiance);
-    let light: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into())?;
+    let mut light: Vec<[f32; 4]> = Vec::with_capacity(some.len());
+    for some in some.chunks(LIT_AT_ONCE) {
+        let (gpu, count) = (preview.gpu, some.len() as u32);
+        let points = gpu.storage_with("ends of the preview's rays", some)?;
+        let radiance = gpu.storage_with("light of the preview's rays", &vec![[0.0_f32; 4]; some.len()])?;
+        let direct = || preview.light_ends_directly((&points, &radiance, count));
+        let done = timed(&mut stats.seconds.direct, direct)?;
+        stats.non_finite.direct += done.non_finite;
+        tally::add_step(stats, done);
+        cache.light(gpu, &points, count, &radiance);
+        light.extend(gpu.read::<[f32; 4]>(&radiance, 0, count.into())?);
+    }
     // Each ray carries π over their number.
     let scale = f64::from(preview.final_rays()) / std::f64::consts::PI;
     let end = |((mark, leg), light): ((&VisiblePoint, &Leg), &[f32; 4])| RayEnd {

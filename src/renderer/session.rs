@@ -39,8 +39,7 @@ use crate::{
 const GRID_SAMPLES: u32 = 4;
 /// Rays of final gathering that the preview of a picture traces at most, in all and for each pixel
 /// of the picture: first, and where few of them bring most of the light.
-const PREVIEW_RAYS: f64 = (1 << 17) as f64;
-const PREVIEW_RAYS_PER_PIXEL: [f64; 2] = [2.0, 16.0];
+const PREVIEW_RAYS: [(f64, f64); 2] = [((1 << 17) as f64, 2.0), ((1 << 19) as f64, 16.0)];
 
 /// A finished render.
 #[derive(Clone, Debug)]
@@ -308,11 +307,8 @@ impl<'a> Session<'a> {
             // The preview of each pass looks at points of its own; that of the first is a single
             // picture's.
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
-            let mut sizes = PREVIEW_RAYS_PER_PIXEL
-                .map(|per_pixel| preview_of(picture, pass.size, (maps.settings().final_gather, per_pixel)))
-                .to_vec();
-            sizes.dedup();
-            for small in sizes {
+            for most in PREVIEW_RAYS {
+                let small = preview_of(picture, pass.size, maps.settings().final_gather, most);
                 let preview = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &small)?;
                 let preview = preview.of_pass(&small, index)?;
                 if !gatherer.prepare(&preview, &mut stats, progress)? {
@@ -362,9 +358,9 @@ fn coarser(picture: &PictureSettings, pass: &CameraPass, estimate: &EstimateSett
 
 /// Settings of a small version of the whole picture, with about as many rays of final gathering as
 /// the constants say. It does not depend on the data window.
-fn preview_of(picture: &PictureSettings, size: (u32, u32), (rays, per_pixel): (u32, f64)) -> PictureSettings {
+fn preview_of(picture: &PictureSettings, size: (u32, u32), rays: u32, most: (f64, f64)) -> PictureSettings {
     let pixels = f64::from(size.0) * f64::from(size.1);
-    let most = PREVIEW_RAYS.min(per_pixel * pixels);
+    let most = most.0.min(most.1 * pixels);
     let scale = (most / f64::from(rays) / pixels).min(0.25).sqrt();
     let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(1);
     PictureSettings { size: Some((side(size.0), side(size.1))), spp: 1, max_spp: None, crop: None, ..picture.clone() }

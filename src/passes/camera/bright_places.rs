@@ -16,7 +16,8 @@ const BRIGHT: f64 = 8.0;
 /// Fraction of the rays' variance that bright ends must cause for any ray to be aimed.
 const LEAST_PART: f64 = 0.3;
 /// Widths of cells that are tried, in units of the narrowest: few ends are spread over few wide
-/// cells. The narrowest is taken that has this part of the most that any has.
+/// cells. The narrowest is taken that has enough; where light is uneven, this part of the most that
+/// any has.
 const WIDTHS: [f32; 4] = [1.0, 2.0, 4.0, 8.0];
 const NEAR_MOST: f64 = 0.9;
 /// Mean square of the radiance over the square of its mean, above which few rays bring most of the
@@ -74,8 +75,9 @@ impl BrightPlaces {
     #[must_use]
     pub fn find(ends: &[RayEnd], rays: f64, width: f32) -> Self {
         let found: Vec<(f64, Self)> = WIDTHS.iter().map(|factor| Self::in_cells(ends, rays, width * factor)).collect();
-        let most = found.iter().map(|(part, _)| *part).fold(LEAST_PART, f64::max);
-        found.into_iter().find(|(part, _)| *part > NEAR_MOST * most).map(|(_, places)| places).unwrap_or_default()
+        let most = found.iter().map(|(part, _)| *part).fold(0.0, f64::max);
+        let least = if is_uneven(ends, rays) { LEAST_PART.max(NEAR_MOST * most) } else { LEAST_PART };
+        found.into_iter().find(|(part, _)| *part > least).map(|(_, places)| places).unwrap_or_default()
     }
 
     /// The same by cells of one width, and the fraction of the variance that the places cause.
