@@ -8,8 +8,7 @@ pub mod photons;
 pub mod wavefront;
 
 pub use camera::{
-    BrightPlaces, CameraKernels, CameraTracer, FinalGather, FinalRays, RayEnd, StepCount, Tile, is_uneven,
-    morton_number,
+    BrightPlaces, CameraKernels, CameraTracer, FinalGather, FinalRays, Leg, RayEnd, StepCount, Tile, morton_number,
 };
 pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,

@@ -60,7 +60,7 @@ impl CameraPass<'_> {
         for (i, mut sums) in (0..).zip(all.iter().copied()) {
             if let Some(pixel) = self.tracer.pixel(tile, i) {
                 // Positions are relative to the centre on the device.
-                let center = self.geometry.center.as_vec3() * sums[HITS.0][HITS.1];
+                let center = self.obstacles.scene.center.as_vec3() * sums[HITS.0][HITS.1];
                 (0..3).for_each(|c| sums[POSITIONS.0][POSITIONS.1 + c] += center[c]);
                 film.add(pixel, &sums, tile.samples);
             }
@@ -73,7 +73,7 @@ impl CameraPass<'_> {
 
     /// Adds to the mattes what the tile's samples see first.
     fn add_mattes(&self, tile: &Tile, film: &mut Film) -> Result<()> {
-        let Scene { triangles, spheres, instances, .. } = self.geometry;
+        let Scene { triangles, spheres, instances, .. } = self.obstacles.scene;
         let object = |hit: &FirstHit| {
             let instance = (hit.instance as usize).checked_sub(1).and_then(|at| instances.get(at));
             let triangle = || triangles.get(hit.id as usize).map(|triangle| triangle.object);

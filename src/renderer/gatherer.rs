@@ -168,9 +168,8 @@ impl Gatherer for MapGatherer<'_> {
         let fill = || IrradianceCache::build(preview.gpu, &ends.marks, estimate.irradiance_cells, &mut irradiances);
         self.cache = timed(&mut stats.seconds.gather, fill)?;
         let Some(cache) = &self.cache else { return Ok(false) };
-        let (bright, is_uneven) = bright_places(preview, &ends, cache, stats)?;
-        self.bright = bright;
-        Ok(is_uneven)
+        self.bright = bright_places(preview, &ends, cache, stats)?;
+        Ok(self.bright.is_uneven)
     }
 
     fn bright_places(&self) -> BrightPlaces {

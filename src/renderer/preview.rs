@@ -1,13 +1,11 @@
 //! What a small version of a picture tells before the picture: where rays of final gathering end,
 //! and which places there are bright.
 
-use glam::Vec3;
-
 use super::{tally, tiles::CameraPass};
 use crate::{
     error::Result,
     layout::VisiblePoint,
-    passes::{BrightPlaces, IrradianceCache, RayEnd, StepCount, is_uneven, wavefront::LEAST_QUEUE},
+    passes::{BrightPlaces, IrradianceCache, Leg, RayEnd, StepCount, wavefront::LEAST_QUEUE},
     progress::{Progress, Stage},
     stats::{Stats, timed},
 };
@@ -20,15 +18,6 @@ const LIT_AT_ONCE: usize = LEAST_QUEUE as usize;
 /// A point whose radiance is its irradiance.
 pub fn bare(point: &VisiblePoint) -> VisiblePoint {
     VisiblePoint { weight: [1.0; 3], above: 0, ..*point }
-}
-
-/// The beginning of a ray.
-#[derive(Clone, Copy, Debug)]
-pub struct Leg {
-    start: Vec3,
-    direction: Vec3,
-    /// Metres to the first surface.
-    length: f32,
 }
 
 /// The ends of final-gather rays, weighed as if all that is seen were white, and how the rays
@@ -70,13 +59,13 @@ pub fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progres
     Ok(ends)
 }
 
-/// Finds bright places by the light of some of the ends, and says whether more ends tell more.
+/// Finds bright places by the light of some of the ends.
 pub fn bright_places(
     preview: &CameraPass,
     ends: &Ends,
     cache: &IrradianceCache,
     stats: &mut Stats,
-) -> Result<(BrightPlaces, bool)> {
+) -> Result<BrightPlaces> {
     let step = ends.marks.len().div_ceil(LIT_ENDS) | 1;
     let some: Vec<_> = ends.marks.iter().step_by(step).copied().collect();
     let fraction = some.len() as f64 / ends.marks.len() as f64;
@@ -95,14 +84,11 @@ pub fn bright_places(
     // Each ray carries π over their number.
     let scale = f64::from(preview.final_rays()) / std::f64::consts::PI;
     let end = |((mark, leg), light): ((&VisiblePoint, &Leg), &[f32; 4])| RayEnd {
-        start: leg.start,
-        direction: leg.direction,
-        first: leg.length,
+        leg: *leg,
         position: mark.position.into(),
         normal: mark.ng.into(),
         radiance: scale * light[..3].iter().map(|x| f64::from(*x)).sum::<f64>(),
     };
     let lit: Vec<_> = some.iter().zip(ends.legs.iter().step_by(step)).zip(&light).map(end).collect();
-    let rays = fraction * ends.rays as f64;
-    Ok((BrightPlaces::find(&lit, rays, cache.width()), is_uneven(&lit, rays)))
+    Ok(BrightPlaces::find(&lit, fraction * ends.rays as f64, cache.width()))
 }

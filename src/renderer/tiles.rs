@@ -17,7 +17,7 @@ use crate::{
     layout::{ArrivingLight, PixelSums, VisiblePoint},
     passes::{BrightPlaces, CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile, morton_number},
     progress::{Progress, Stage},
-    scene::{Camera, Scene},
+    scene::Camera,
     settings::{Crop, EstimateSettings, ExtraLayers, PhotonSettings, PictureSettings, PixelGrid},
     stats::{Stats, timed},
     upload::SceneBuffers,
@@ -94,7 +94,6 @@ pub(crate) struct CameraPass<'a> {
     doublings: u32,
     /// Direct light comes from shadow rays.
     direct: bool,
-    pub(super) geometry: &'a Scene,
     pub(super) obstacles: Obstacles<'a>,
     /// Sums of the tile's pixels when the last component of the light was finished.
     pub(super) finished: RefCell<Vec<[f32; 4]>>,
@@ -136,7 +135,6 @@ impl<'a> CameraPass<'a> {
             spp: picture.spp,
             doublings: picture.doublings(),
             direct: photons.mode.direct_by_rays(),
-            geometry,
             obstacles,
             finished: RefCell::default(),
             layers: picture.layers.clone(),

@@ -133,16 +133,18 @@ fn meshes_that_are_no_clean_solids_are_named_and_never_too_bright() {
     }
 }
 
+/// The pixels of a picture over a horizon.
+fn over_horizon(scene: &Scene, spp: u32) -> Vec<[f32; 3]> {
+    let mut scene = scene.clone();
+    let pixels = [[[0.2; 3]; 4], [[1.0; 3]; 4]].concat();
+    scene.environment = Some(Environment { width: 4, height: 2, pixels, ..Environment::uniform(Vec3::ONE) });
+    scene.cameras = vec![camera(vec3(0.0, 0.6, 4.0), Vec3::ZERO, 40.0)];
+    render_scene(&scene, &quick().with(|s| s.picture.spp = spp)).frame.radiance().to_vec()
+}
+
 /// Largest difference between pixels of two pictures over a horizon.
 fn difference(a: &Scene, b: &Scene) -> f32 {
-    let picture = |scene: &Scene| {
-        let mut scene = scene.clone();
-        let pixels = [[[0.2; 3]; 4], [[1.0; 3]; 4]].concat();
-        scene.environment = Some(Environment { width: 4, height: 2, pixels, ..Environment::uniform(Vec3::ONE) });
-        scene.cameras = vec![camera(vec3(0.0, 0.6, 4.0), Vec3::ZERO, 40.0)];
-        render_scene(&scene, &quick()).frame.radiance().to_vec()
-    };
-    let pairs = picture(a).into_iter().zip(picture(b));
+    let pairs = over_horizon(a, 2).into_iter().zip(over_horizon(b, 2));
     pairs.flat_map(|(a, b)| [0, 1, 2].map(|i| (a[i] - b[i]).abs())).fold(0.0, f32::max)
 }
 
@@ -184,16 +186,9 @@ fn what_fills_a_closed_vessel_may_reach_into_its_wall() {
     let glasses = [1.5, 1.33].map(glass_of);
     let ball = |radius: f32| Mesh::ball(Vec3::ZERO, radius, 24);
     let filled = |radius: f32| scene_of(&[(ball(1.0).with(&ball(0.7).turned()), 0), (ball(radius), 1)], &glasses);
-    let seen = |scene: &Scene| {
-        let mut scene = scene.clone();
-        scene.cameras = vec![camera(vec3(0.0, 0.6, 4.0), Vec3::ZERO, 40.0)];
-        let pixels = [[[0.2; 3]; 4], [[1.0; 3]; 4]].concat();
-        scene.environment = Some(Environment { width: 4, height: 2, pixels, ..Environment::uniform(Vec3::ONE) });
-        render_scene(&scene, &quick().with(|s| s.picture.spp = 16)).frame.radiance().to_vec()
-    };
-    let right = seen(&filled(0.7));
+    let right = over_horizon(&filled(0.7), 16);
     let mean_difference = |scene: &Scene| {
-        let pairs = seen(scene).into_iter().zip(&right).map(|(a, b)| (a[1] - b[1]).abs());
+        let pairs = over_horizon(scene, 16).into_iter().zip(&right).map(|(a, b)| (a[1] - b[1]).abs());
         pairs.sum::<f32>() / right.len() as f32
     };
     let (found, control) = (mean_difference(&filled(0.7001)), mean_difference(&filled(0.6)));

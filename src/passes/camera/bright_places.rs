@@ -28,14 +28,20 @@ const MIN_ENDS: usize = 3;
 /// Length of a way, as a fraction of what is straight, from which on it has a corner.
 const STRAIGHT: f32 = 1.0001;
 
+/// The first leg of a ray. At its end, mirrors and glass may send the ray another way.
+#[derive(Clone, Copy, Debug)]
+pub struct Leg {
+    pub start: Vec3,
+    /// Unit.
+    pub direction: Vec3,
+    /// Metres.
+    pub length: f32,
+}
+
 /// The end of a ray that was drawn by the cosine.
 #[derive(Clone, Copy, Debug)]
 pub struct RayEnd {
-    /// Where the ray starts, and a unit vector.
-    pub start: Vec3,
-    pub direction: Vec3,
-    /// Metres to the first surface. There, mirrors and glass may send the ray another way.
-    pub first: f32,
+    pub leg: Leg,
     /// Metres.
     pub position: Vec3,
     /// Geometric.
@@ -49,6 +55,8 @@ pub struct RayEnd {
 pub struct BrightPlaces {
     pub patches: Vec<BrightPatch>,
     pub other_light: f32,
+    /// Few of the rays bring most of the light: more of them tell more.
+    pub is_uneven: bool,
 }
 
 /// A place at which rays can be aimed to meet the end of one.
@@ -74,14 +82,17 @@ impl BrightPlaces {
     /// picture; those that met nothing are left out.
     #[must_use]
     pub fn find(ends: &[RayEnd], rays: f64, width: f32) -> Self {
-        let found: Vec<(f64, Self)> = WIDTHS.iter().map(|factor| Self::in_cells(ends, rays, width * factor)).collect();
+        let is_uneven = is_uneven(ends, rays);
+        let in_cells = |factor: &f32| Self::in_cells((ends, is_uneven), rays, width * factor);
+        let found: Vec<(f64, Self)> = WIDTHS.iter().map(in_cells).collect();
         let most = found.iter().map(|(part, _)| *part).fold(0.0, f64::max);
-        let least = if is_uneven(ends, rays) { LEAST_PART.max(NEAR_MOST * most) } else { LEAST_PART };
-        found.into_iter().find(|(part, _)| *part > least).map(|(_, places)| places).unwrap_or_default()
+        let least = if is_uneven { LEAST_PART.max(NEAR_MOST * most) } else { LEAST_PART };
+        let enough = found.into_iter().find(|(part, _)| *part > least).map(|(_, places)| places);
+        Self { is_uneven, ..enough.unwrap_or_default() }
     }
 
     /// The same by cells of one width, and the fraction of the variance that the places cause.
-    fn in_cells(ends: &[RayEnd], rays: f64, width: f32) -> (f64, Self) {
+    fn in_cells((ends, is_uneven): (&[RayEnd], bool), rays: f64, width: f32) -> (f64, Self) {
         let mean = ends.iter().map(|end| end.radiance).sum::<f64>() / rays.max(1.0);
         let mut cells: Vec<Cell> = Vec::new();
         let mut of_keys: BTreeMap<[i32; 5], usize> = BTreeMap::new();
@@ -92,7 +103,6 @@ impl BrightPlaces {
                 // Surfaces that face other ways are other patches.
                 let axis = aim.normal.abs().max_position();
                 let side = 2 * axis as i32 + i32::from(aim.normal[axis] < 0.0);
-                let side = if aim.normal == Vec3::ZERO { -1 } else { side };
                 let [x, y, z] = (aim.position / width).floor().as_ivec3().to_array();
                 let cell = *of_keys.entry([x, y, z, side, kind]).or_insert(cells.len());
                 *own = Some(cell);
@@ -102,7 +112,7 @@ impl BrightPlaces {
                 cells[cell].left += 1;
             }
         }
-        let most = if is_uneven(ends, rays) { MAX_PATCHES_OF_UNEVEN } else { MAX_PATCHES };
+        let most = if is_uneven { MAX_PATCHES_OF_UNEVEN } else { MAX_PATCHES };
         let (mut patches, mut light, mut squares) = (Vec::new(), 0.0, 0.0);
         let mut is_left = vec![true; ends.len()];
         while patches.len() < most {
@@ -125,14 +135,14 @@ impl BrightPlaces {
         }
         let all = ends.iter().map(|end| end.radiance.powi(2)).sum::<f64>();
         let other = mean - light / rays;
-        let places = Self { patches, other_light: (std::f64::consts::PI * other.max(0.0)) as f32 };
+        let other_light = (std::f64::consts::PI * other.max(0.0)) as f32;
+        let places = Self { patches, other_light, is_uneven };
         (if all > 0.0 { squares / all } else { 0.0 }, places)
     }
 }
 
 /// Whether few of so many rays bring most of the light.
-#[must_use]
-pub fn is_uneven(ends: &[RayEnd], rays: f64) -> bool {
+fn is_uneven(ends: &[RayEnd], rays: f64) -> bool {
     let mean_of = |of: &dyn Fn(f64) -> f64| ends.iter().map(|end| of(end.radiance)).sum::<f64>() / rays.max(1.0);
     mean_of(&|radiance| radiance * radiance) > UNEVEN * mean_of(&|radiance| radiance).powi(2)
 }
@@ -141,19 +151,20 @@ impl RayEnd {
     /// Where other rays are aimed to meet what is there. By way of a plane mirror or of a pane,
     /// that is its image, as far behind the mirror as the way goes on; a ball shows it in itself.
     fn aims(&self) -> [Option<Aim>; 2] {
-        let corner = self.start + self.first * self.direction;
+        let Leg { start, direction, length: first } = self.leg;
+        let corner = start + first * direction;
         let after = self.position - corner;
-        let length = self.first + after.length();
+        let length = first + after.length();
         let straight = Aim { position: self.position, normal: self.normal };
-        if length <= STRAIGHT * self.position.distance(self.start) {
+        if length <= STRAIGHT * self.position.distance(start) {
             return [Some(straight), None];
         }
         // The reflection that turns the way back into one line turns the surface as well.
-        let turned = match (self.direction - after.normalize_or_zero()).try_normalize() {
+        let turned = match (direction - after.normalize_or_zero()).try_normalize() {
             Some(mirror) => self.normal - 2.0 * self.normal.dot(mirror) * mirror,
             None => self.normal,
         };
-        let image = Aim { position: self.start + length * self.direction, normal: turned };
+        let image = Aim { position: start + length * direction, normal: turned };
         [Some(image), Some(Aim { position: corner, normal: Vec3::ZERO })]
     }
 }
@@ -187,9 +198,7 @@ mod tests {
         let radiance = |p: Vec3| if (p - Vec3::new(0.31, 0.0, 0.29)).length() < 0.1 { bright } else { 1.0 };
         let start = Vec3::new(0.0, 1.0, 0.0);
         let end = |p: Vec3| RayEnd {
-            start,
-            direction: (p - start).normalize(),
-            first: p.distance(start),
+            leg: Leg { start, direction: (p - start).normalize(), length: p.distance(start) },
             position: p,
             normal: Vec3::Y,
             radiance: radiance(p),
@@ -214,9 +223,7 @@ mod tests {
         // A lamp at x = 1.1, seen in a mirror at x = -1.
         let lamp = |i: usize| Vec3::new(1.1, 0.01 * (i % 5) as f32, 0.01 * (i / 5) as f32);
         let end = |start: Vec3, corner: Vec3, position: Vec3| RayEnd {
-            start,
-            direction: (corner - start).normalize(),
-            first: corner.distance(start),
+            leg: Leg { start, direction: (corner - start).normalize(), length: corner.distance(start) },
             position,
             normal: Vec3::NEG_X,
             radiance: 1.0,

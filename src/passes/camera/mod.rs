@@ -10,7 +10,7 @@ mod tiling;
 mod view;
 mod waiting_points;
 
-pub use bright_places::{BrightPlaces, RayEnd, is_uneven};
+pub use bright_places::{BrightPlaces, Leg, RayEnd};
 pub use camera_tracer::{CameraKernels, CameraTracer};
 pub use final_gather::{FinalGather, FinalRays};
 pub use tile::{StepCount, Tile, morton_number};
