@@ -43,7 +43,7 @@ fn seen(water: &Mesh, material: Value, eye: Vec3, lamp: bool) -> (f64, Vec<Strin
     scene.environment = (!lamp).then(|| Environment::uniform(Vec3::ONE));
     scene.lights = if lamp { vec![point_light(at(vec3(0.3, -0.6, -0.2)), 2.0)] } else { Vec::new() };
     scene.cameras = vec![camera(at(eye), at(vec3(0.0, -0.9, -0.3)), 40.0)];
-    let settings = settings(Mode::Hybrid, 30_000, 16).with(|s| s.photons.final_gather = 8);
+    let settings = settings(Mode::Hybrid, 20_000, 12).with(|s| s.photons.final_gather = 8);
     (mean(&render_scene(&scene, &settings)), scene.warnings)
 }
 
@@ -139,7 +139,7 @@ fn glass_that_an_opaque_part_closes_begins_at_its_own_front() {
         let lights = vec![point_light(place(vec3(0.0, lamp, 0.0)), 1.0)];
         let cameras = vec![camera(place(vec3(0.0, 0.3, 0.001)), place(Vec3::ZERO), 40.0)];
         (scene.lights, scene.cameras) = (lights, cameras);
-        mean(&render_scene(&scene, &settings(Mode::Hybrid, 100_000, 16).with(|s| s.photons.final_gather = 8)))
+        mean(&render_scene(&scene, &settings(Mode::Hybrid, 50_000, 16).with(|s| s.photons.final_gather = 8)))
     };
     for lamp in [1.3, 0.6] {
         let (found, right) = (lit(&open_block, lamp, glass_of(1.5)), lit(&block, lamp, glass_of(1.5)));

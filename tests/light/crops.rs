@@ -73,8 +73,8 @@ fn parts_are_the_whole(settings: &Settings, crops: &[Crop]) {
 fn parts_side_by_side_are_the_whole() {
     let settings = Quality::Normal.settings_for(SIZE).with(|s| {
         s.picture.size = Some(SIZE);
-        (s.photons.global, s.photons.caustic, s.photons.final_gather) = (20_000, 20_000, 16);
-        s.picture.max_spp = Some(16);
+        (s.photons.global, s.photons.caustic, s.photons.final_gather) = (10_000, 10_000, 8);
+        s.picture.max_spp = Some(8);
     });
     assert!(settings.photons.final_gather > 0 && settings.picture.max_spp.is_some(), "defaults");
     // Odd borders, that cut balls and tiles.
@@ -90,10 +90,10 @@ fn parts_side_by_side_are_the_whole() {
 fn parts_with_rays_at_every_sample_are_the_whole() {
     let settings = Quality::Draft.settings_for(SIZE).with(|s| {
         s.picture.size = Some(SIZE);
-        s.photons.final_gather = 3;
+        (s.photons.global, s.photons.caustic, s.photons.final_gather) = (10_000, 10_000, 2);
         s.estimate.gather_spacing = 0;
         s.estimate.irradiance_cells = 0.0;
-        (s.picture.spp, s.picture.max_spp) = (2, Some(5));
+        (s.picture.spp, s.picture.max_spp) = (2, Some(3));
     });
     parts_are_the_whole(&settings, &[Crop { column: 31, row: 17, width: 99, height: 50 }]);
 }

@@ -19,19 +19,6 @@ use support::*;
 const BLOCK: usize = 8;
 const SIZE: usize = 64;
 
-/// Means of the blocks of a square picture of that many pixels along a side of one.
-fn blocks(picture: &[[f32; 3]], of: usize) -> Vec<[f32; 3]> {
-    let side = picture.len().isqrt();
-    let mut sums = vec![[0.0; 3]; (side / of).pow(2)];
-    for (i, pixel) in picture.iter().enumerate() {
-        let block = &mut sums[i / side / of * (side / of) + i % side / of];
-        for (sum, value) in block.iter_mut().zip(pixel) {
-            *sum += value / of.pow(2) as f32;
-        }
-    }
-    sums
-}
-
 /// relMSE of blocks of a picture of `name`, with its materials as many times as rough, against the
 /// reference `reference`. The worst block does not count: it may have one bright sample.
 fn error(name: &str, reference: &str, options: &LoadOptions, rougher: f32) -> f64 {

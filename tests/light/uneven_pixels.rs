@@ -78,8 +78,8 @@ fn small_lights_keep_their_mean() {
     let of = |seed: u32, most: u32| {
         render_scene(&scene, &sampled(48, most).with(|s| (s.photons.seed, s.picture.light_samples) = (seed, 1)))
     };
-    let expected = mean(&render_scene(&scene, &sampled(48, 0).with(|s| s.picture.spp = 600)));
-    let adaptive = Estimate::over_seeds(8, |seed| mean(&of(seed, 16)));
+    let expected = mean(&render_scene(&scene, &sampled(48, 0).with(|s| s.picture.spp = 300)));
+    let adaptive = Estimate::over_seeds(6, |seed| mean(&of(seed, 16)));
     println!("{adaptive:?}, expected {expected}");
     assert!(adaptive.z(expected) < 4.0 && within(adaptive.mean, expected, 0.01), "{adaptive:?} and {expected}");
     // Control: where a pixel's own samples decide, and are counted in.

@@ -163,6 +163,19 @@ pub fn render_estimates(scene: &Scene, settings: &Settings, estimates: &[Estimat
     estimates.iter().map(picture).collect()
 }
 
+/// Means of the blocks of a square picture of that many pixels along a side of one.
+pub fn blocks(picture: &[[f32; 3]], of: usize) -> Vec<[f32; 3]> {
+    let side = picture.len().isqrt();
+    let mut sums = vec![[0.0; 3]; (side / of).pow(2)];
+    for (i, pixel) in picture.iter().enumerate() {
+        let block = &mut sums[i / side / of * (side / of) + i % side / of];
+        for (sum, value) in block.iter_mut().zip(pixel) {
+            *sum += value / of.pow(2) as f32;
+        }
+    }
+    sums
+}
+
 /// Mean of all pixels and channels.
 pub fn mean(render: &Render) -> f64 {
     let sum: f64 = render.frame.radiance().iter().flatten().map(|&x| f64::from(x)).sum();
