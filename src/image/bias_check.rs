@@ -61,7 +61,7 @@ impl BiasCheck {
             let closer = f64::from(self.sums[3 * i + c]) / passes;
             let apart = f64::from(radiance[3 * place + c]) - closer;
             let variance = f64::from(self.deviations[3 * i + c]) / (passes - 1.0) / passes;
-            Checked { closer, square: apart * apart - variance }
+            Checked { closer, error: variance.sqrt(), square: apart * apart - variance }
         };
         let of_pixel = move |(i, place)| (place, [0, 1, 2].map(|c| number(i, place, c)));
         (self.passes > 1).then(|| PixelGrid::of(whole).places(window).enumerate().map(of_pixel))
@@ -73,6 +73,8 @@ impl BiasCheck {
 pub(super) struct Checked {
     /// Mean of the closer estimates.
     pub closer: f64,
+    /// Standard error of that mean.
+    pub error: f64,
     /// Estimate of the squared error: the squared distance to that mean, less the variance of that.
     pub square: f64,
 }

@@ -59,11 +59,13 @@ impl ErrorEstimate {
             (mean_square(&biases) - ratio * ratio * noise).max(0.0)
         };
         // Squared error beyond the noise, of one pixel. The square of the right number is the
-        // product of two independent estimates of it, of which a closer one is the noisier.
+        // product of two independent estimates of it, of which a closer one is the noisier. Where it
+        // is low by chance its distance is great: its noise is added, not to weigh such more.
         let beyond = |(place, checked): (usize, [Checked; 3])| {
             let of_channel = |c: usize| {
                 let (x, error) = (f64::from(radiance[3 * place + c]).max(0.0), f64::from(errors[3 * place + c]));
-                relative(checked[c].square - error * error, x * checked[c].closer.clamp(LEAST_RIGHT * x, x))
+                let closer = (checked[c].closer + checked[c].error).clamp(LEAST_RIGHT * x, x);
+                relative(checked[c].square - error * error, x * closer)
             };
             (0..3).map(of_channel).sum::<f64>() / 3.0
         };
@@ -172,13 +174,14 @@ mod tests {
         let is_near = |a: f64, b: f64| (a - b).abs() < 1e-5;
         // The mean of the closer ones is 1, its variance 0.02/(3 · 4).
         let (even, around) = ([1.3; 4], [0.9, 1.1, 1.0, 1.0]);
+        let right = 1.3 * (1.0 + (0.02_f64 / 12.0).sqrt());
         let estimate = merged(even, around);
-        assert!(estimate.noise == 0.0 && is_near(estimate.bias, relative(0.09 - 0.02 / 12.0, 1.3)), "{estimate:?}");
+        assert!(estimate.noise == 0.0 && is_near(estimate.bias, relative(0.09 - 0.02 / 12.0, right)), "{estimate:?}");
         // Noise of the picture is a part of that error.
         let noisy = [1.1, 1.5, 1.3, 1.3];
         let (noise, variance) = (merged(noisy, around), 0.08 / 12.0);
         assert!(is_near(noise.noise, relative(variance, 1.69 - variance)), "{noise:?}");
-        assert!(is_near(noise.bias, relative(0.09 - 0.02 / 12.0 - variance, 1.3)), "{noise:?}");
+        assert!(is_near(noise.bias, relative(0.09 - 0.02 / 12.0 - variance, right)), "{noise:?}");
         // Passes that err oppositely: closer estimates say that their mean is right.
         let opposite = merged(noisy, [1.3; 4]);
         assert!(
