@@ -57,7 +57,8 @@ fn warn_of_faults(stats: &mut Stats) {
 /// Warning for light that camera paths lost in mirrors and glass, as a fraction of all paths.
 pub(super) fn lost_in_chains(fraction: f64) -> Option<String> {
     (fraction > 1e-4).then(|| {
-        let percent = 100.0 * fraction;
+        // Paths at the rims of tiles, beyond the picture, count too.
+        let percent = 100.0 * fraction.min(1.0);
         format!("{percent:.2} % of the camera's paths met {CHAIN_LIMIT} mirrors and glasses and ended there, dark")
     })
 }

@@ -191,6 +191,8 @@ impl<'a> CameraPass<'a> {
     ) -> Result<Vec<Film>> {
         let film = Film::new(self.size, self.window, self.spp).with_layers(&self.layers).with_doublings(self.doublings);
         let mut films = vec![film; gatherer.pictures()];
+        // Previews have lost paths of their own.
+        let lost_before = stats.lost_camera_paths;
         self.for_each_tile(Some(stage), stats, progress, &mut |tile, stats| {
             let sums = self.light(tile, gatherer, &mut films, stats, progress)?;
             if self.doublings == 0 {
@@ -209,8 +211,9 @@ impl<'a> CameraPass<'a> {
         })?;
         stats.extra_samples += films.iter().map(Film::extra_samples).sum::<u64>();
         stats.non_finite.film += films.iter().map(Film::non_finite).sum::<u64>();
-        let paths = f64::from(self.window.width) * f64::from(self.window.height) * f64::from(self.spp);
-        stats.warnings.extend(tally::lost_in_chains(stats.lost_camera_paths / paths));
+        let of_all_pixels = f64::from(self.window.width) * f64::from(self.window.height) * f64::from(self.spp);
+        let paths = of_all_pixels + films.first().map_or(0, Film::extra_samples) as f64;
+        stats.warnings.extend(tally::lost_in_chains((stats.lost_camera_paths - lost_before) / paths));
         Ok(films)
     }
 
