@@ -180,6 +180,7 @@ mod tests {
             radius_squared: estimate.radius_squared,
             count: summed.len() as u32,
             fingerprint: fingerprint(summed),
+            narrow: 0,
         };
         let [r, g, b] = estimate.radiance.map(|x| x as f32);
         let answer = GridAnswer { gathered: vec![gathered], radiance: vec![[r, g * factor, b, 0.0]] };

@@ -44,6 +44,8 @@ pub struct Gathered {
     pub count: u32,
     /// Hash of the set of photons, see `GatherOptions::fingerprint`.
     pub fingerprint: u32,
+    /// Whether its disc is narrow: 0 or 1.
+    pub narrow: u32,
 }
 
 /// Pixels along the side of a cell of a tile's margin; see `shaders/lib/camera/margin.wesl`.

@@ -80,10 +80,11 @@ pub struct IrradianceCell {
     /// [`WIDE_CELL`].
     pub split: u32,
     pub normal: [f32; 3],
-    pub pad0: u32,
+    /// Whether the disc of its estimate is narrow: 0 or 1.
+    pub narrow: u32,
     /// Irradiance at the point, W/m².
     pub irradiance: [f32; 3],
-    pub pad1: u32,
+    pub pad: u32,
 }
 
 /// The cell is not split; it is, and speaks for cells in it without an entry; it is, and is too
@@ -96,3 +97,6 @@ pub const WIDE_CELL: u32 = 2;
 /// point takes its irradiance.
 pub const CELL_FLATNESS: f32 = 0.25;
 pub const CELL_COSINE: f32 = 0.9;
+/// The same cosine, where the disc of the entry's estimate is narrow, and no entry is on the
+/// point's surface.
+pub const NARROW_COSINE: f32 = 0.25;

@@ -12,7 +12,7 @@ pub use camera::{
 };
 pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
-    Records, SharedPoints, filter_footprint, record_spacing,
+    PointEstimate, Records, SharedPoints, filter_footprint, record_spacing,
 };
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
 pub use photons::{PathRange, PathRanges, PhotonTracer, RawMap, TracedPhotons};

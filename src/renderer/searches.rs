@@ -5,7 +5,7 @@ use crate::{
     error::Result,
     gpu::{Buffer, Gpu},
     layout::{Gathered, VisiblePoint},
-    passes::{EstimateRequest, Gather, GatherOptions, PhotonMap, Tile},
+    passes::{EstimateRequest, Gather, GatherOptions, PhotonMap, PointEstimate, Tile},
     progress::Progress,
     reference::{Estimate, KdMap},
     settings::{EstimateSettings, Search},
@@ -43,14 +43,13 @@ impl<'a> Searches<'a> {
         settings: &EstimateSettings,
         points: &[VisiblePoint],
         progress: &dyn Progress,
-    ) -> Result<Vec<([f32; 3], f32)>> {
+    ) -> Result<Vec<PointEstimate>> {
         let count = points.len() as u32;
         let points = pass.gpu.storage_with("single points", points)?;
         self.estimates_at(pass, maps, settings, (&points, count), progress)
     }
 
-    /// Radiance by all maps, and the radius of the narrowest estimate, at each of the first points
-    /// of a buffer.
+    /// Estimates by all maps at each of the first points of a buffer.
     fn estimates_at(
         &mut self,
         pass: &CameraPass,
@@ -58,19 +57,22 @@ impl<'a> Searches<'a> {
         settings: &EstimateSettings,
         (points, count): (&Buffer, u32),
         progress: &dyn Progress,
-    ) -> Result<Vec<([f32; 3], f32)>> {
+    ) -> Result<Vec<PointEstimate>> {
         let gpu = pass.gpu;
-        let mut found = vec![([0.0; 3], f32::INFINITY); count as usize];
+        let mut found = vec![PointEstimate::default(); count as usize];
         let radiance = gpu.storage_with("radiance of single points", &vec![[0.0_f32; 4]; found.len()])?;
         let gathered = gpu.storage::<Gathered>("gathered at single points", count.into())?;
         for index in 0..maps.maps().len() {
             let request = EstimateRequest { points, count, map_number: 1, radiance: &radiance, gathered: &gathered };
             self.answer(pass, maps, index, settings, &request, progress)?;
             let all: Vec<Gathered> = gpu.read(&gathered, 0, count.into())?;
-            found.iter_mut().zip(all).for_each(|((_, radius), one)| *radius = radius.min(one.radius_squared.sqrt()));
+            for (estimate, one) in found.iter_mut().zip(all) {
+                estimate.radius = estimate.radius.min(one.radius_squared.sqrt());
+                estimate.is_narrow |= one.narrow != 0;
+            }
         }
         let sums: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into())?;
-        found.iter_mut().zip(sums).for_each(|((light, _), [r, g, b, _])| *light = [r, g, b]);
+        found.iter_mut().zip(sums).for_each(|(estimate, [r, g, b, _])| estimate.light = [r, g, b]);
         Ok(found)
     }
 
@@ -86,8 +88,8 @@ impl<'a> Searches<'a> {
     ) -> Result<()> {
         let found = self.estimates_at(pass, maps, settings, (ends, indices.len() as u32), progress)?;
         let mut radiance = pass.radiance(tile)?;
-        for (&index, (light, _)) in indices.iter().zip(found) {
-            (0..3).for_each(|c| radiance[index][c] += light[c]);
+        for (&index, estimate) in indices.iter().zip(found) {
+            (0..3).for_each(|c| radiance[index][c] += estimate.light[c]);
         }
         pass.set_radiance(&radiance);
         Ok(())
@@ -130,7 +132,7 @@ fn kd_estimates(
         if points[i].next_map != 0 {
             (0..3).for_each(|c| radiance[i][c] += estimate.radiance[c] as f32);
             let Estimate { radius_squared, count, fingerprint, .. } = estimate;
-            gathered[i] = Gathered { radius_squared, count, fingerprint };
+            gathered[i] = Gathered { radius_squared, count, fingerprint, narrow: 0 };
         }
     }
     gpu.write(request.radiance, 0, &radiance);

@@ -68,7 +68,7 @@ fn twins() -> Vec<Twin> {
         IrradianceRecord { position, ng, irradiance, reach }
         LightDirections { red, green, blue, open_reach }
         RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, footprint }
-        IrradianceCell { coordinates, level, position, split, normal, pad0, irradiance, pad1 }
+        IrradianceCell { coordinates, level, position, split, normal, narrow, irradiance, pad }
         FirstHit { normal, depth, albedo, alpha, position, id, uv, instance, material }
         DirectLight { light, pad0, pad1, pad2 }
         EmitterSample { sample, samples, roots, pad }
@@ -77,7 +77,7 @@ fn twins() -> Vec<Twin> {
         PhotonFlux { flux, normal }
         MapInfo { count, levels, split, pad }
         GatherInfo { count, first, neighbors, fixed_radius, max_radius_squared, per_path, stride, kernel_mean, kernel, kernel_fifth, map_number, pad0, pad1 }
-        Gathered { radius_squared, count, fingerprint }
+        Gathered { radius_squared, count, fingerprint, narrow }
         ShareRound { cells, cell_pixels, samples, candidates, step, margin, branches, reach_squared, points, map_number, is_listed }
         SortStep { count, shift, stride, pad }
         BoundStep { count, first_box }
@@ -197,6 +197,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         WIDE_CELL,
         CELL_FLATNESS,
         CELL_COSINE,
+        NARROW_COSINE,
         GLOBAL_MAP,
         CAUSTIC_MAP,
         MAP_KINDS,

@@ -29,8 +29,26 @@ const SUBSTITUTE: f32 = 0.5;
 /// in them, whose other side is another room.
 const CONTRAST: f32 = 4.0;
 
-/// Computes the irradiance, W/m², and the radius of its estimate, metres, at points.
-pub(super) type Irradiances<'a> = dyn FnMut(&[VisiblePoint]) -> Result<Vec<([f32; 3], f32)>> + 'a;
+/// Light at a point by photon maps.
+#[derive(Clone, Copy, Debug)]
+pub struct PointEstimate {
+    /// Radiance, or irradiance, W/m², as the point's weight says.
+    pub light: [f32; 3],
+    /// Radius of the narrowest of the estimates, metres.
+    pub radius: f32,
+    /// Whether the disc of one of them is narrow.
+    pub is_narrow: bool,
+}
+
+impl Default for PointEstimate {
+    /// No light, by no estimate.
+    fn default() -> Self {
+        Self { light: [0.0; 3], radius: f32::INFINITY, is_narrow: false }
+    }
+}
+
+/// Computes the irradiance at points.
+pub(super) type Irradiances<'a> = dyn FnMut(&[VisiblePoint]) -> Result<Vec<PointEstimate>> + 'a;
 
 /// Entries by cell.
 #[derive(Debug, PartialEq)]
@@ -49,7 +67,7 @@ impl CellTable {
     /// `None` without marks.
     pub fn build(marks: &[VisiblePoint], spacing: f32, irradiances: &mut Irradiances) -> Result<Option<Self>> {
         let pilots: Vec<_> = marks.iter().step_by(marks.len().div_ceil(PILOTS) | 1).copied().collect();
-        let mut radii: Vec<f32> = irradiances(&pilots)?.iter().map(|(_, radius)| *radius).collect();
+        let mut radii: Vec<f32> = irradiances(&pilots)?.iter().map(|estimate| estimate.radius).collect();
         radii.sort_by(f32::total_cmp);
         let Some(radius) = radii.get((radii.len() as f64 * PILOT_QUANTILE) as usize).filter(|r| **r > 0.0) else {
             return Ok(None);
@@ -67,8 +85,8 @@ impl CellTable {
             open.clear();
             let found = irradiances(&points)?;
             let contrasts = contrasts(&surfaces, &found, per_metre);
-            for ((surface, (irradiance, radius)), contrasts) in surfaces.into_iter().zip(found).zip(contrasts) {
-                let cells = radius * spacing * per_metre;
+            for ((surface, estimate), contrasts) in surfaces.into_iter().zip(found).zip(contrasts) {
+                let cells = estimate.radius * spacing * per_metre;
                 let split = match cells {
                     _ if contrasts => WIDE_CELL,
                     1.0.. => WHOLE_CELL,
@@ -84,9 +102,9 @@ impl CellTable {
                     position,
                     split,
                     normal,
-                    irradiance,
-                    pad0: 0,
-                    pad1: 0,
+                    narrow: estimate.is_narrow.into(),
+                    irradiance: estimate.light,
+                    pad: 0,
                 });
                 if split != WHOLE_CELL {
                     open.extend(marks);
@@ -134,8 +152,8 @@ fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> Vec<Surface<'a>> 
 }
 
 /// Whether each surface is much brighter or darker than the same one in a cell beside its own.
-fn contrasts(surfaces: &[Surface], found: &[([f32; 3], f32)], per_metre: f32) -> Vec<bool> {
-    let light: Vec<f32> = found.iter().map(|(irradiance, _)| irradiance.iter().sum()).collect();
+fn contrasts(surfaces: &[Surface], found: &[PointEstimate], per_metre: f32) -> Vec<bool> {
+    let light: Vec<f32> = found.iter().map(|estimate| estimate.light.iter().sum()).collect();
     // Surfaces of a cell follow each other, cells by their coordinates.
     let in_cell = |coordinates: [i32; 3]| {
         let first = surfaces.partition_point(|surface| surface.coordinates < coordinates);
@@ -202,9 +220,13 @@ mod tests {
             .collect()
     }
 
-    /// Estimates that are narrow about x = 0.
-    fn found(points: &[VisiblePoint]) -> Result<Vec<([f32; 3], f32)>> {
-        let of = |p: &VisiblePoint| ([p.position[0]; 3], if p.position[0] < 50.0 { 0.1 } else { 0.8 });
+    fn even(light: f32, radius: f32) -> PointEstimate {
+        PointEstimate { light: [light; 3], radius, is_narrow: false }
+    }
+
+    /// Estimates that have a small radius about x = 0.
+    fn found(points: &[VisiblePoint]) -> Result<Vec<PointEstimate>> {
+        let of = |p: &VisiblePoint| even(p.position[0], if p.position[0] < 50.0 { 0.1 } else { 0.8 });
         Ok(points.iter().map(of).collect())
     }
 
@@ -227,7 +249,7 @@ mod tests {
         let split_between = |ratio: f32| {
             let mut found = |points: &[VisiblePoint]| {
                 let light = |p: &VisiblePoint| if p.position[0] % 100.0 < 0.55 { 1.0 } else { ratio };
-                Ok(points.iter().map(|p| ([light(p); 3], 0.4)).collect())
+                Ok(points.iter().map(|p| even(light(p), 0.4)).collect())
             };
             let table = CellTable::build(&marks(), 0.5, &mut found).unwrap().unwrap();
             table.slots.iter().filter(|entry| entry.level > 1).map(|entry| entry.position[0]).collect::<Vec<_>>()
@@ -242,7 +264,7 @@ mod tests {
     fn surfaces_of_a_cell_have_irradiances_of_their_own() {
         let at = |y: f32, ng: [f32; 3]| VisiblePoint { position: [0.3, y, 0.3], ng, next_map: 1, ..Default::default() };
         let marks = [at(0.1, [0.0, 1.0, 0.0]), at(0.1, [0.0, -1.0, 0.0]), at(0.6, [0.0, 1.0, 0.0])];
-        let mut found = |points: &[VisiblePoint]| Ok(points.iter().map(|_| ([1.0; 3], 2.0)).collect());
+        let mut found = |points: &[VisiblePoint]| Ok(points.iter().map(|_| even(1.0, 2.0)).collect());
         let table = CellTable::build(&marks, 0.5, &mut found).unwrap().unwrap();
         assert_eq!(table.slots.iter().filter(|e| e.level == 1).count(), 3);
     }

@@ -66,3 +66,46 @@ impl IrradianceCache {
         gpu.submit(encoder);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::passes::PointEstimate;
+
+    /// Lights points of those normals by marks of others in the same cell, each as bright as its
+    /// normal points up. `None` for a point that still waits.
+    fn lit(is_narrow: bool, marks: &[[f32; 3]], normals: &[[f32; 3]]) -> Vec<Option<f32>> {
+        let gpu = &Gpu::open(None).expect("a device");
+        let at = |position: [f32; 3], ng: &[f32; 3]| VisiblePoint {
+            position,
+            ng: *ng,
+            ns: *ng,
+            weight: [1.0; 3],
+            next_map: 1,
+            ..VisiblePoint::default()
+        };
+        let marks: Vec<_> = marks.iter().zip(1..).map(|(ng, i)| at([0.1 * i as f32, 0.5, 0.5], ng)).collect();
+        let mut found = |points: &[VisiblePoint]| {
+            let of = |p: &VisiblePoint| PointEstimate { light: [2.0 + p.ng[1]; 3], radius: 2.0, is_narrow };
+            Ok(points.iter().map(of).collect())
+        };
+        let cache = IrradianceCache::build(gpu, &marks, 0.5, &mut found).expect("a table").expect("marks");
+        let points: Vec<_> = normals.iter().map(|ng| at([0.9, 0.9, 0.9], ng)).collect();
+        let buffer = gpu.storage_with("points", &points).expect("points");
+        let radiance = gpu.storage_with("radiance", &vec![[0.0_f32; 4]; points.len()]).expect("radiance");
+        cache.light(gpu, &buffer, points.len() as u32, &radiance);
+        let after: Vec<VisiblePoint> = gpu.read(&buffer, 0, points.len() as u64).expect("points");
+        let light: Vec<[f32; 4]> = gpu.read(&radiance, 0, points.len() as u64).expect("radiance");
+        after.iter().zip(light).map(|(point, light)| (point.next_map == 0).then_some(light[0])).collect()
+    }
+
+    #[test]
+    fn clutter_takes_the_light_of_the_most_similar_normal() {
+        let (up, down, aside) = ([0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]);
+        let leaning = [0.6, 0.8, 0.0];
+        assert_eq!(lit(true, &[up, down], &[leaning, up, down]), [Some(3.0), Some(3.0), Some(1.0)]);
+        assert_eq!(lit(true, &[up, aside], &[[0.8, 0.6, 0.0]]), [Some(2.0)], "the nearer one of two");
+        assert_eq!(lit(true, &[up], &[down, aside]), [None, None], "none is similar");
+        assert_eq!(lit(false, &[up, down], &[leaning, up, down]), [None; 3], "control: a flat surface is not there");
+    }
+}

@@ -11,7 +11,7 @@ mod record_walls;
 pub mod share_estimates;
 
 #[doc(hidden)]
-pub use cell_table::cell_hash;
+pub use cell_table::{PointEstimate, cell_hash};
 pub use gather::{Gather, GatherOptions, GatherSettings};
 pub use irradiance_cache::IrradianceCache;
 pub use irradiance_records::{IrradianceRecords, Records, filter_footprint, record_spacing};
