@@ -60,7 +60,7 @@ impl ErrorEstimate {
         };
         // Squared error beyond the noise, of one pixel. The square of the right number is the
         // product of two independent estimates of it, of which a closer one is the noisier. Where
-        // it is low by chance its distance is great: its noise is added, not to weigh such more.
+        // it is low by chance its distance is great: its noise is added, lest such weigh more.
         let beyond = |(place, checked): (usize, [Checked; 3])| {
             let of_channel = |c: usize| {
                 let (x, error) = (f64::from(radiance[3 * place + c]).max(0.0), f64::from(errors[3 * place + c]));
