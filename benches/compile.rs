@@ -42,7 +42,7 @@ fn main() {
             .iter()
             .filter(|b| !matches!(b.kind, BindingKind::Table | BindingKind::LayeredTable))
             .map(|b| match b.kind {
-                BindingKind::Uniform => (b.name, gpu.uniform("zeros", &[0_u32; 256])),
+                BindingKind::Uniform => (b.name, gpu.uniform("zeros", &[0_u32; 1024])),
                 _ => (b.name, gpu.storage::<u8>("zeros", BYTES).expect("a small buffer fits")),
             })
             .collect();

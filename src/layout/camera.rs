@@ -134,9 +134,11 @@ pub struct CameraTile {
     /// numbers, pixels in Morton order; 0: the samples of each pixel are a set. Those from
     /// [`Self::spp`] on always are.
     pub square_bits: u32,
+    /// Bright patches that rays are aimed at.
+    pub patches: u32,
+    /// Irradiance by all but these patches on average, in the units of [`BrightPatch::power`].
+    pub other_light: f32,
     pub pad0: u32,
-    pub pad1: u32,
-    pub pad2: u32,
 }
 
 /// Veils, surfaces of an opacity between 0 and 1, that a camera path passes at most before it draws
@@ -187,12 +189,13 @@ pub struct FinalStep {
     pub chosen: u32,
     /// Of the directions in which they start.
     pub seed: u32,
-    /// Bright patches that rays are aimed at.
-    pub patches: u32,
-    /// Irradiance by all but these patches on average, in the units of [`BrightPatch::power`].
-    pub other_light: f32,
     pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
+
+/// Bright patches of a picture at most.
+pub const MAX_PATCHES: usize = 64;
 
 /// A small part of a surface from which much light comes: a disc.
 #[repr(C)]

@@ -322,10 +322,10 @@ impl<'a> Session<'a> {
             let records = CameraPass::new(self.gpu, scene, camera, maps.settings(), &single, &coarse)?;
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
             let records = records.of_pass(&coarse, index)?.with_joint_rays().seeing_by_cells(gatherer.blur());
-            let records = records.aiming_at(&gatherer.bright_places())?;
+            let records = records.aiming_at(&gatherer.bright_places());
             gatherer.keep_records(&records, pass.size, &mut stats, progress)?;
         }
-        let pass = pass.seeing_by_cells(gatherer.blur()).aiming_at(&gatherer.bright_places())?;
+        let pass = pass.seeing_by_cells(gatherer.blur()).aiming_at(&gatherer.bright_places());
         let films = pass.render(gatherer, stage, &mut stats, progress)?;
         Ok((films, stats))
     }

@@ -174,10 +174,9 @@ impl<'a> CameraPass<'a> {
         Self { final_gather: self.final_gather.map(FinalGather::joint), ..self }
     }
 
-    /// Aims a part of the rays of final gathering at bright places.
-    pub fn aiming_at(mut self, bright: &BrightPlaces) -> Result<Self> {
-        self.final_gather = self.final_gather.map(|gather| gather.aimed(self.gpu, bright)).transpose()?;
-        Ok(self)
+    /// Aims a part of the rays at bright places.
+    pub fn aiming_at(self, bright: &BrightPlaces) -> Self {
+        Self { tracer: self.tracer.aiming_at(self.gpu, bright), ..self }
     }
 
     /// Renders tile by tile: camera rays to visible points, direct light, the light of photons,
@@ -193,22 +192,36 @@ impl<'a> CameraPass<'a> {
         let mut films = vec![film; gatherer.pictures()];
         // Previews have lost paths of their own.
         let lost_before = stats.lost_camera_paths;
-        self.for_each_tile(Some(stage), stats, progress, &mut |tile, stats| {
+        let tiles = self.tracer.tiles();
+        let mut further = 0;
+        for (done, tile) in tiles.iter().enumerate() {
+            // Tiles to come are expected to have as many further ones as those before.
+            let report = |further: usize, of: usize| {
+                let total = tiles.len() + (further + of) * tiles.len() / (done + 1);
+                progress.report(stage, (done + further) as u64, total as u64);
+            };
+            progress.check()?;
+            report(further, 0);
+            self.trace(tile, stats)?;
             let sums = self.light(tile, gatherer, &mut films, stats, progress)?;
             if self.doublings == 0 {
-                return Ok(());
+                continue;
             }
             let doubled = self.doubled_pixels(tile, &sums);
-            for extra in self.tracer.extra_tiles(tile, &doubled) {
+            let extra_tiles = self.tracer.extra_tiles(tile, &doubled);
+            for (i, extra) in extra_tiles.iter().enumerate() {
                 progress.check()?;
-                self.trace(&extra, stats)?;
-                self.light(&extra, gatherer, &mut films, stats, progress)?;
+                report(further + i, extra_tiles.len() - i);
+                self.trace(extra, stats)?;
+                self.light(extra, gatherer, &mut films, stats, progress)?;
             }
+            further += extra_tiles.len();
             for (pixel, at) in (0..tile.pixels).filter_map(|pixel| Some((pixel, self.tracer.pixel(tile, pixel)?))) {
                 films.iter_mut().for_each(|film| film.weigh(at, doubled[pixel as usize]));
             }
-            Ok(())
-        })?;
+        }
+        let all = (tiles.len() + further) as u64;
+        progress.report(stage, all, all);
         stats.extra_samples += films.iter().map(Film::extra_samples).sum::<u64>();
         stats.non_finite.film += films.iter().map(Film::non_finite).sum::<u64>();
         let of_all_pixels = f64::from(self.window.width) * f64::from(self.window.height) * f64::from(self.spp);

@@ -1,5 +1,6 @@
 //! Pictures and photon maps against closed forms, against references, and modes against each other.
 
+mod aimed_lobes;
 mod analytic;
 mod contacts;
 mod covers;

@@ -2,15 +2,18 @@
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
+//! | progress | tiles of further samples are counted before they are done | every pixel's samples alone have fewer |
 //! | edges | edges, also in mirrors and glass, and penumbrae have the error of many samples | the samples that every pixel has alone |
 //! | small lights | lights smaller than a pixel keep their mean | pixels whose own samples decide get darker |
 //! | crop | a crop has the bits of the whole | another seed |
 //! | layers | mattes cover what alpha says, in finer steps than every pixel's samples make | these alone |
 //! | passes | passes have further samples of their own, and merge to the same mean | one pass alone |
 
+use std::sync::Mutex;
+
 use caustica::{
     image::difference::rel_mse,
-    progress::Silent,
+    progress::{Progress, Silent, Stage},
     renderer::{Progressive, Session, render},
     scene::{Scene, Surface},
     settings::{Crop, ExtraLayers, Mode, PassSettings, Settings},
@@ -38,6 +41,37 @@ fn room() -> Scene {
     scene.spheres.push(sphere(vec3(0.0, -0.75, 0.3), 0.25, 2));
     scene.cameras.push(camera(vec3(0.0, 0.1, 0.95), vec3(0.0, -0.3, 0.0), 70.0));
     scene
+}
+
+/// Tiles of the camera that were done, and of how many, as reported.
+#[derive(Default)]
+struct CameraReports(Mutex<Vec<(u64, u64)>>);
+
+impl Progress for CameraReports {
+    fn report(&self, stage: Stage, done: u64, total: u64) {
+        if stage == Stage::Camera {
+            self.0.lock().unwrap().push((done, total));
+        }
+    }
+    fn stop_requested(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn progress_counts_the_tiles_of_further_samples() {
+    let reported = |most: u32| {
+        let reports = CameraReports::default();
+        render(gpu(), &room(), &sampled(32, most), &reports).unwrap();
+        reports.0.into_inner().unwrap()
+    };
+    let (even, more) = (reported(4), reported(64));
+    assert!(more.len() > even.len() + 3, "{even:?}, {more:?}");
+    for reports in [even, more] {
+        assert!(reports.is_sorted_by_key(|(done, _)| *done), "{reports:?}");
+        let (last, before) = reports.split_last().unwrap();
+        assert!(last.0 == last.1 && before.iter().all(|(done, total)| done < total), "{reports:?}");
+    }
 }
 
 #[test]

@@ -6,11 +6,11 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3};
 
-use crate::layout::BrightPatch;
+use crate::layout::{BrightPatch, MAX_PATCHES};
 
 /// Patches at most, and where light is uneven: every ray reads them all.
-const MAX_PATCHES: usize = 8;
-const MAX_PATCHES_OF_UNEVEN: usize = 64;
+const PATCHES: usize = 8;
+const PATCHES_OF_UNEVEN: usize = MAX_PATCHES;
 /// Radiance of a bright end, in units of the mean over all rays.
 const BRIGHT: f64 = 8.0;
 /// Fraction of the rays' variance that bright ends must cause for any ray to be aimed.
@@ -112,7 +112,7 @@ impl BrightPlaces {
                 cells[cell].left += 1;
             }
         }
-        let most = if is_uneven { MAX_PATCHES_OF_UNEVEN } else { MAX_PATCHES };
+        let most = if is_uneven { PATCHES_OF_UNEVEN } else { PATCHES };
         let (mut patches, mut light, mut squares) = (Vec::new(), 0.0, 0.0);
         let mut is_left = vec![true; ends.len()];
         while patches.len() < most {
@@ -215,7 +215,7 @@ mod tests {
         assert!((patch.power / (500.0 * 0.01 * std::f32::consts::PI) - 1.0).abs() < 0.1, "{patch:?}");
         assert!((bright.other_light / std::f32::consts::PI - 1.0).abs() < 0.02, "{bright:?}");
         let narrow = BrightPlaces::find(&ends(500.0), 10_000.0, 0.1).patches;
-        assert!(narrow.len() > 3 && narrow.len() <= MAX_PATCHES_OF_UNEVEN, "{narrow:?}");
+        assert!(narrow.len() > 3 && narrow.len() <= PATCHES_OF_UNEVEN, "{narrow:?}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::{
+    bright_places::BrightPlaces,
     direct_light::DirectLighting,
     tile::{StepCount, Tile, margin_cells, room_for, tile_sides},
     view::{UNCLIPPED, view},
@@ -13,7 +14,10 @@ use crate::{
     bvh::Media,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{self, CameraTile, Counters, FirstHit, Gathered, LobePoint, MARGIN_SAMPLES, PixelSums, VisiblePoint},
+    layout::{
+        self, BrightPatch, CameraTile, Counters, FirstHit, Gathered, LobePoint, MARGIN_SAMPLES, MAX_PATCHES, PixelSums,
+        VisiblePoint,
+    },
     passes::{
         estimate::SharedPoints,
         wavefront::{Step, Wavefront},
@@ -86,6 +90,8 @@ pub struct CameraTracer {
     /// Sums over the samples of each pixel, [`LAYER_ROWS`] + 1 rows a pixel.
     pixel_rows: Buffer,
     filter_table: Buffer,
+    /// The bright patches that rays are aimed at.
+    patches: Buffer,
     pub(super) view: CameraTile,
     pub(super) window: Crop,
     /// Index of the first sample beyond those that every pixel has.
@@ -138,6 +144,7 @@ impl CameraTracer {
             lobe_points: gpu.storage::<LobePoint>("lit lobes", if scene.materials.has_rough { slots } else { 1 })?,
             pixel_rows: gpu.storage::<PixelSums>("sums of pixels", room / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
+            patches: gpu.uniform("bright patches", &[BrightPatch::default(); MAX_PATCHES]),
             first_extra: first_extra_sample(photons, picture),
             extra: picture.extra_samples(),
             view: CameraTile { margin, square_bits: square_bits(photons, picture), ..view },
@@ -152,6 +159,17 @@ impl CameraTracer {
     pub fn starting_at(self, depth: f32) -> Self {
         let near_depth = if self.view.near_depth == UNCLIPPED { 0.0 } else { self.view.near_depth };
         Self { view: CameraTile { start_depth: depth, near_depth, ..self.view }, ..self }
+    }
+
+    /// Aims a part of the rays of final gathering, and of those that rough lobes send on, at bright
+    /// places.
+    #[must_use]
+    pub fn aiming_at(self, gpu: &Gpu, bright: &BrightPlaces) -> Self {
+        let mut patches = [BrightPatch::default(); MAX_PATCHES];
+        let count = bright.patches.len();
+        patches[..count].copy_from_slice(&bright.patches);
+        let view = CameraTile { patches: count as u32, other_light: bright.other_light, ..self.view };
+        Self { patches: gpu.uniform("bright patches", &patches), view, ..self }
     }
 
     /// Has points wait for irradiance kept in cells, [`layout::BY_CELL`], where what a sample sees
@@ -272,7 +290,12 @@ impl CameraTracer {
     ) -> Result<StepCount> {
         let most_paths = (u64::from(invocations) * u64::from(self.view.branches))
             .min(self.room + u64::from(self.view.margin * self.view.branches));
-        let tile = [("first_hits", &self.first_hits), ("radiance", radiance), ("lobe_points", &self.lobe_points)];
+        let tile = [
+            ("first_hits", &self.first_hits),
+            ("radiance", radiance),
+            ("lobe_points", &self.lobe_points),
+            ("patches", &self.patches),
+        ];
         let (started, followed) = ([start.buffers, &tile].concat(), [trace.buffers, &tile].concat());
         let start = Step { kernel: start.kernel, buffers: &started };
         let trace = Step { kernel: trace.kernel, buffers: &followed };

@@ -5,7 +5,6 @@
 use glam::Vec3;
 
 use super::{
-    bright_places::BrightPlaces,
     camera_tracer::CameraTracer,
     direct_light::DirectLighting,
     ray_keys::RaySets,
@@ -15,7 +14,7 @@ use super::{
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{ArrivingLight, BrightPatch, CameraTile, FinalStep, VisiblePoint, from_octahedral},
+    layout::{ArrivingLight, CameraTile, FinalStep, VisiblePoint, from_octahedral},
     passes::wavefront::Step,
     reference::mix,
     settings::Sampler,
@@ -61,10 +60,6 @@ pub struct FinalGather {
     pub ends: Buffer,
     /// Light that each ray finds, `vec4f`.
     pub found: Buffer,
-    /// Bright patches that rays are aimed at, their number, and the irradiance by all else.
-    patches: Buffer,
-    patch_count: u32,
-    other_light: f32,
     /// Direction of each ray, octahedral, and the bits of its weight.
     directions: Buffer,
     /// An [`ArrivingLight`] for each visible point. Rays add to what is there.
@@ -105,9 +100,6 @@ impl FinalGather {
             chosen: gpu.storage::<u32>("points of final gathering", tracer.room())?,
             ends: gpu.storage::<VisiblePoint>("ends of final-gather rays", tracer.room())?,
             found: gpu.storage::<[f32; 4]>("light of final-gather rays", tracer.room())?,
-            patches: gpu.storage::<BrightPatch>("bright patches", 1)?,
-            patch_count: 0,
-            other_light: 0.0,
             directions: gpu.storage::<[u32; 2]>("directions of final-gather rays", tracer.room())?,
             arriving: gpu.storage::<ArrivingLight>("arriving light", tracer.room())?,
             waiting: WaitingPoints::new(gpu, tracer.room())?,
@@ -124,18 +116,6 @@ impl FinalGather {
     #[must_use]
     pub fn joint(self) -> Self {
         Self { sets: RaySets::OfPicture, ..self }
-    }
-
-    /// Aims a part of the rays at bright patches.
-    ///
-    /// # Errors
-    /// Limits of the adapter.
-    pub fn aimed(self, gpu: &Gpu, bright: &BrightPlaces) -> Result<Self> {
-        if bright.patches.is_empty() {
-            return Ok(self);
-        }
-        let patches = gpu.storage_with("bright patches", &bright.patches)?;
-        Ok(Self { patches, patch_count: bright.patches.len() as u32, other_light: bright.other_light, ..self })
     }
 
     /// Rays of each visible point.
@@ -172,7 +152,6 @@ impl FinalGather {
             ("seen", &self.ends),
             ("chosen", &self.chosen),
             ("directions", &self.directions),
-            ("patches", &self.patches),
         ];
         let followed = [("tile", &own), ("points", &self.ends)];
         let start = Step { kernel: &self.kernels.start, buffers: &started };
@@ -265,8 +244,6 @@ impl FinalGather {
             rays: rays.each,
             chosen: rays.chosen,
             seed,
-            patches: self.patch_count,
-            other_light: self.other_light,
             ..Default::default()
         };
         gpu.uniform("final step", &step)

@@ -1,0 +1,72 @@
+//! Rough lobes that see a small bright place: a part of their rays is aimed at it.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | noise | a wall of rough metal shows a spot of light on the floor with little noise, and with the mean of many samples | without final gathering, nothing is aimed |
+//! | narrow | a narrow lobe finds the spot by itself, and loses few of its samples | the rough wall |
+
+use caustica::{
+    renderer::Render,
+    scene::{Light, LightKind, Material, Scene, Surface},
+    settings::{Mode, Settings},
+};
+use glam::{Vec3, vec3};
+use support::*;
+
+const SIDE: u32 = 48;
+
+/// A room of 2 m with a spot of light of 36 cm on the floor, and a wall of metal opposite the camera.
+fn room(roughness: f32) -> Scene {
+    let mut scene = scene(&[diffuse(0.3)]);
+    add_box(&mut scene, Vec3::ONE, Vec3::NEG_ONE, 0);
+    let surface = Surface::Layered { base: Vec3::splat(0.9), metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    scene.materials.push(Material { roughness, metallic: 1.0, ..Material::new("metal", surface) });
+    add_quad(&mut scene, vec3(-0.99, -0.99, -0.95), 1.98 * Vec3::X, 1.98 * Vec3::Y, 1);
+    scene.lights.push(Light {
+        kind: LightKind::Spot { inner: 0.08, outer: 0.1 },
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(300.0),
+        ..point_light(vec3(0.1, 0.9, -0.2), 1.0)
+    });
+    scene.cameras.push(camera(vec3(0.0, 0.1, 0.95), vec3(0.0, 0.0, -0.95), 45.0));
+    scene
+}
+
+/// Few samples, with final gathering or by the photons around each point.
+fn sampled(rays: u32, spp: u32) -> Settings {
+    settings(Mode::Hybrid, 30_000, SIDE).with(|s| {
+        s.photons.final_gather = rays;
+        s.estimate.neighbors = 50;
+        s.estimate.irradiance_cells = 1.0;
+        s.estimate.gather_spacing = if rays > 0 { 2 } else { 0 };
+        s.picture.spp = spp;
+        s.picture.max_spp = None;
+    })
+}
+
+/// Sum of squared differences over that of squares.
+fn error(found: &Render, right: &Render) -> f64 {
+    let pairs = || found.frame.radiance().iter().flatten().zip(right.frame.radiance().iter().flatten());
+    let sum = |of: &dyn Fn(f32, f32) -> f32| pairs().map(|(a, b)| f64::from(of(*a, *b))).sum::<f64>();
+    sum(&|a, b| (a - b).powi(2)) / sum(&|_, b| b * b)
+}
+
+#[test]
+fn rough_metal_shows_a_small_spot_of_light_without_noise() {
+    let scene = room(0.7);
+    let right = render_scene(&scene, &sampled(0, 512));
+    let (aimed, plain) = (render_scene(&scene, &sampled(16, 4)), render_scene(&scene, &sampled(0, 4)));
+    let (found, control) = (error(&aimed, &right), error(&plain, &right));
+    assert!(found < 0.1 * control, "{found}, and {control} where nothing is aimed");
+    let many = render_scene(&scene, &sampled(16, 64));
+    assert!(within(mean(&many), mean(&right), 0.01), "{} instead of {}", mean(&many), mean(&right));
+}
+
+#[test]
+fn narrow_lobes_keep_their_samples() {
+    let scene = room(0.15);
+    let right = render_scene(&scene, &sampled(0, 512));
+    let (aimed, plain) = (render_scene(&scene, &sampled(16, 4)), render_scene(&scene, &sampled(0, 4)));
+    let (found, control) = (error(&aimed, &right), error(&plain, &right));
+    assert!(found < 1.2 * control && found > 0.5 * control, "{found}, and {control} where nothing is aimed");
+}
