@@ -143,6 +143,8 @@ pub const BLEND_BIT: u32 = 4;
 pub const UNLIT_BIT: u32 = 8;
 /// What of it is glass casts caustics however rough it is.
 pub const SMALL_GLASS_BIT: u32 = 16;
+/// Flag of a pane that rays to lights pass, [`crate::scene::Material::is_clear_pane`].
+pub const CLEAR_PANE_BIT: u32 = 32;
 
 /// Factors of a material, and where its textures are.
 #[repr(C)]
@@ -161,7 +163,8 @@ pub struct MaterialRecord {
     pub metallic: f32,
     /// Fraction of the light within glass that is transmitted.
     pub transmission: f32,
-    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`UNLIT_BIT`], [`SMALL_GLASS_BIT`].
+    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`UNLIT_BIT`], [`SMALL_GLASS_BIT`],
+    /// [`CLEAR_PANE_BIT`].
     pub flags: u32,
     /// Reflectance of the coat along the normal, without its strength.
     pub f0: [f32; 3],

@@ -323,6 +323,18 @@ impl Material {
         !self.unlit && ((is_finished && is_opaque) || self.clearcoat > 0.0 || self.iridescence > 0.0)
     }
 
+    /// Whether the surface is a smooth pane, all of which is there and transmits: light that does
+    /// not turn in it goes straight on.
+    #[must_use]
+    pub fn is_clear_pane(&self) -> bool {
+        let Textures { transmission, normal, metallic_roughness, emission, .. } = &self.textures;
+        let is_even = [transmission, normal, metallic_roughness, emission].iter().all(|texture| texture.is_none());
+        let is_bare = self.transmission == 1.0 && self.metallic == 0.0 && !self.is_finished() && !self.unlit;
+        matches!(self.surface, Surface::Pane { .. })
+            && (is_even && is_bare && self.roughness < SHARP_ROUGHNESS)
+            && (self.alpha == Alpha::Opaque && self.emission == Vec3::ZERO)
+    }
+
     /// Medium inside the solid that the surface bounds.
     #[must_use]
     pub fn medium(&self) -> Option<Medium> {

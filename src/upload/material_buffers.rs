@@ -8,9 +8,9 @@ use crate::{
     error::{Error, Result},
     gpu::{Gpu, Table},
     layout::{
-        self, BLEND_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS, MaterialRecord,
-        SECOND_UV_BIT, SMALL_GLASS_BIT, SRGB_BIT, TEXTURE_ROLE_SHIFT, TEXTURE_TEXELS, TextureRecord, UNLIT_BIT,
-        WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
+        self, BLEND_BIT, CLEAR_PANE_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS,
+        MaterialRecord, SECOND_UV_BIT, SMALL_GLASS_BIT, SRGB_BIT, TEXTURE_ROLE_SHIFT, TEXTURE_TEXELS, TextureRecord,
+        UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
     },
     scene::{Alpha, Attributes, ImageValues, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
     settings::LightUnit,
@@ -36,6 +36,8 @@ pub struct MaterialBuffers {
     pub has_alpha: bool,
     /// Some surface is there in part.
     pub has_veils: bool,
+    /// Some material is a pane that rays to lights pass.
+    pub has_clear_panes: bool,
 }
 
 impl MaterialBuffers {
@@ -61,6 +63,7 @@ impl MaterialBuffers {
             has_rough: materials().any(is_rough),
             has_alpha: materials().any(|m| m.alpha != Alpha::Opaque),
             has_veils: materials().any(|m| may_be_veil(scene, m)),
+            has_clear_panes: materials().any(Material::is_clear_pane),
             materials: Table::new(gpu, "materials", &rows)?,
             attributes: Table::layered(gpu, "attributes of triangles", &attributes)?,
             texels: Table::layered(gpu, "texels", &texels.into_words())?,
@@ -89,7 +92,9 @@ fn rows(scene: &Scene, unit: LightUnit, texels: &mut Texels<'_>) -> Vec<[u32; 4]
     let mut textures = Vec::new();
     let record = |(material, small): (&Material, bool)| {
         let record = record(material, unit, first_row, &mut textures, texels);
-        MaterialRecord { flags: record.flags | if small { SMALL_GLASS_BIT } else { 0 }, ..record }
+        let small = if small { SMALL_GLASS_BIT } else { 0 };
+        let clear = if material.is_clear_pane() { CLEAR_PANE_BIT } else { 0 };
+        MaterialRecord { flags: record.flags | small | clear, ..record }
     };
     let records: Vec<MaterialRecord> = scene.materials.iter().zip(scene.small_glass()).map(record).collect();
     [bytemuck::cast_slice(&records), bytemuck::cast_slice(&textures)].concat()

@@ -19,7 +19,7 @@ use crate::{
         self, ALPHA_BIT, CONTACT_BIT, INSTANCE, INSTANCED_STACK, Primitive, RANK_SHIFT, SLOT_SHIFT, SPHERE_BIT,
         TRANSMITS_BIT,
     },
-    scene::{Alpha, Medium, Scene, Solids},
+    scene::{Alpha, Material, Medium, Scene, Solids},
     settings::{LightSettings, Sampler},
 };
 
@@ -61,6 +61,8 @@ pub struct SceneBuffers {
     pub lights: LightBuffers,
     /// Solids and the surfaces that bound them.
     pub solids: Solids,
+    /// Nothing but panes that rays to lights pass casts caustics.
+    pub only_clear_panes_cast: bool,
 }
 
 /// The `override` constant that selects a kernel's sampler: the source of its sample numbers.
@@ -132,6 +134,7 @@ impl SceneBuffers {
             is_listed_once: is_listed_once(scene, bvh),
             no_lists: Arc::new(gpu.storage::<u32>("no lists", 1)?),
             contacts,
+            only_clear_panes_cast: only_clear_panes_cast(scene),
             has_lobes: scene.has_lobes(),
             splits: scene
                 .materials
@@ -174,6 +177,12 @@ impl SceneBuffers {
         self.materials.has_veils
     }
 
+    /// Whether rays to lights pass some panes: they would lose light at each listing of one.
+    #[must_use]
+    pub fn has_clear_panes(&self) -> bool {
+        self.materials.has_clear_panes && self.is_listed_once
+    }
+
     /// Whether a ray may visit more than an invocation can.
     #[must_use]
     pub fn has_late_rays(&self, gpu: &Gpu) -> bool {
@@ -211,6 +220,7 @@ impl SceneBuffers {
             ("HAS_ALPHA", f64::from(u8::from(self.materials.has_alpha))),
             ("HAS_VEILS", f64::from(u8::from(self.has_veils()))),
             ("WEIGHS_VEILS", f64::from(u8::from(self.is_listed_once))),
+            ("HAS_CLEAR_PANES", f64::from(u8::from(self.has_clear_panes()))),
             ("HAS_ABSORPTION", f64::from(u8::from(self.has_absorption))),
             ("HAS_VARIED_LIGHTS", f64::from(u8::from(self.lights.table.is_varied))),
             ("WEIGHED_LIGHTS", f64::from(self.lights.table.weighed())),
@@ -258,6 +268,11 @@ impl Split {
     fn constant(&self) -> f64 {
         if self.at == 0 { f64::from(u32::MAX) } else { self.at as f64 }
     }
+}
+
+fn only_clear_panes_cast(scene: &Scene) -> bool {
+    let casting = scene.caustic_materials().into_iter().zip(&scene.materials).filter(|(casts, _)| *casts);
+    casting.map(|(_, material)| material).all(Material::is_clear_pane)
 }
 
 /// Whether the hierarchy lists each of the scene's primitives once.

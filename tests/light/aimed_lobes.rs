@@ -15,7 +15,8 @@ use support::*;
 
 const SIDE: u32 = 48;
 
-/// A room of 2 m with a spot of light of 36 cm on the floor, and a wall of metal opposite the camera.
+/// A room of 2 m with a spot of light of 36 cm on the floor, and a wall of metal opposite the
+/// camera.
 fn room(roughness: f32) -> Scene {
     let mut scene = scene(&[diffuse(0.3)]);
     add_box(&mut scene, Vec3::ONE, Vec3::NEG_ONE, 0);

@@ -2,6 +2,7 @@
 
 mod aimed_lobes;
 mod analytic;
+mod clear_panes;
 mod contacts;
 mod covers;
 mod crops;

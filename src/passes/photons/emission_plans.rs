@@ -161,6 +161,11 @@ impl EmissionPlan<'_> {
         settings.max_paths.is_none() && self.fills == [MapKind::Global] && !settings.mode.stores_direct()
     }
 
+    /// Whether its paths are traced for caustics alone, as many as it takes.
+    pub fn is_for_caustics(&self, settings: &PhotonSettings) -> bool {
+        settings.max_paths.is_none() && self.fills == [MapKind::Caustic]
+    }
+
     /// Settings that all batches of the emission share, and the rules for the maps that are still
     /// open.
     pub fn batch(&self, scene: &SceneBuffers, settings: &PhotonSettings, maps: &ByKind<bool>) -> PhotonBatch {

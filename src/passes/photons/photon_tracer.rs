@@ -36,6 +36,10 @@ const GROWTH_PATHS: u64 = 1 << 17;
 /// Paths for each photon that a map has room for, at most and at least.
 const PATHS_PER_PHOTON: u64 = 100;
 const MIN_PATHS_PER_PHOTON: f64 = 4.0;
+/// The same of photons for caustics where panes that rays to lights pass are among what they are aimed
+/// at: most go through these, and few of the others meet anything.
+const PATHS_PER_PHOTON_AT_PANES: u64 = 8;
+
 /// Result of the photon pass.
 #[derive(Debug)]
 pub struct TracedPhotons {
@@ -122,7 +126,9 @@ impl PhotonTracer {
         for plan in plans(scene, settings, caustics, paths, steered.as_ref()) {
             let enough =
                 paths_that_matter(scene.lights.enclosure, largest).filter(|_| plan.is_for_little_light(settings));
-            let max_paths = plan.paths.count.or(enough).unwrap_or(max_paths);
+            let at_panes = (plan.is_for_caustics(settings) && scene.has_clear_panes())
+                .then(|| max_paths.min(PATHS_PER_PHOTON_AT_PANES * u64::from(settings.caustic)));
+            let max_paths = plan.paths.count.or(enough).or(at_panes).unwrap_or(max_paths);
             self.run(gpu, scene, &plan, settings, (&buffers, batch_limit, max_paths), &mut traced, progress)?;
         }
         traced.of_lights = gpu.read(&buffers.light_photons, 0, named as u64)?;
@@ -175,7 +181,10 @@ impl PhotonTracer {
             lost_units += result.counters.all_lost();
             if plan.paths.count.is_none() && first_path.is_multiple_of(growth_paths) {
                 for &kind in plan.fills {
-                    traced.warnings.extend(traced.maps[kind].close_if_idle(kind.name(), growth_paths));
+                    let warning = traced.maps[kind].close_if_idle(kind.name(), growth_paths);
+                    // What windows alone reflect is little, and mostly out of the house.
+                    let is_expected = kind == MapKind::Caustic && scene.only_clear_panes_cast;
+                    traced.warnings.extend(warning.filter(|_| !is_expected));
                 }
             }
             let ByKind { global, caustic } = &traced.maps;

@@ -1,0 +1,191 @@
+//! Light through smooth panes, as of windows: it goes straight on, so that it is direct light.
+//!
+//! | test | claim | negative control |
+//! |---|---|---|
+//! | sun | a floor behind a tinted pane has the closed form of the pane's transmittance, up to the edge of a shadow | a rough pane, whose light comes by photons |
+//! | lamps and skies | lamps of all kinds and a sky light through a pane what they light by photons alone | no pane |
+//! | modes | all modes that show direct light show that through a pane | the mode that does not |
+//! | reflection | what a pane reflects is a caustic of the closed form | a pane of another index |
+//! | coats | rough metal and coats see a lamp behind a pane once | the lamp without a pane |
+
+use caustica::{
+    renderer::Render,
+    scene::{Environment, Light, LightKind, Material, Scene, Surface},
+    settings::{ExtraLayers, Mode, Settings},
+};
+use glam::{Vec3, vec3};
+use support::*;
+
+const TINT: Vec3 = Vec3::new(0.9, 0.6, 0.3);
+
+fn pane(tint: Vec3) -> Surface {
+    Surface::Pane { ior: 1.5, tint }
+}
+
+/// Reflectance of a pane: both faces, by Fresnel's equations.
+fn reflectance(cosine: f64, ior: f64) -> f64 {
+    let below = (1.0 - (1.0 - cosine * cosine) / (ior * ior)).sqrt();
+    let square = |a: f64, b: f64| ((a - b) / (a + b)).powi(2);
+    let face = 0.5 * (square(ior * cosine, below) + square(cosine, ior * below));
+    2.0 * face / (1.0 + face)
+}
+
+/// A floor of 4 m, and a pane of 4 m half a metre above it; the camera looks at the floor from between them.
+fn floor_below(surface: Surface, roughness: f32) -> Scene {
+    let mut scene = scene(&[diffuse(0.5)]);
+    scene.materials.push(Material { roughness, ..Material::new("pane", surface) });
+    add_quad(&mut scene, vec3(-2.0, 0.0, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z, 0);
+    add_quad(&mut scene, vec3(-2.0, 0.5, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z, 1);
+    scene.cameras.push(camera(vec3(0.0, 0.45, 0.9), vec3(0.0, 0.0, 0.0), 40.0));
+    scene
+}
+
+fn sun(direction: Vec3) -> Light {
+    Light { kind: LightKind::Directional, direction: direction.normalize(), ..point_light(Vec3::ZERO, 3.0) }
+}
+
+/// Few samples of direct light alone.
+fn direct(size: u32) -> Settings {
+    settings(Mode::DirectRays, 1000, size).with(|s| s.picture.spp = 4)
+}
+
+#[test]
+fn the_sun_through_a_window_has_the_closed_form_up_to_the_edge_of_a_shadow() {
+    let mut scene = floor_below(pane(TINT), 0.0);
+    let towards = vec3(0.4, -1.0, 0.0).normalize();
+    scene.lights.push(sun(towards));
+    // A board above the pane: its shadow ends at x = 0 on the floor.
+    let edge = -(towards.x / -towards.y) * 0.6;
+    add_quad(&mut scene, vec3(-1.9, 0.6, 1.9), (1.9 + edge) * Vec3::X, -3.8 * Vec3::Z, 0);
+    let render = render_scene(&scene, &direct(64));
+    let cosine = f64::from(-towards.y);
+    let bare = 3.0 * cosine * 0.5 / std::f64::consts::PI * (1.0 - reflectance(cosine, 1.5));
+    let at = |render: &Render, column: usize| render.frame.radiance()[40 * 64 + column].map(f64::from);
+    for (found, tint) in at(&render, 34).iter().zip(TINT.to_array()) {
+        assert!(within(*found, bare * f64::from(tint), 1e-3), "{found} instead of {}", bare * f64::from(tint));
+    }
+    assert_eq!(at(&render, 29), [0.0; 3], "in the shadow of the board");
+    scene.materials[1].roughness = 0.1;
+    let rough = render_scene(&scene, &direct(64));
+    assert_eq!(at(&rough, 34), [0.0; 3], "control: no ray to a light passes a rough pane");
+}
+
+/// A closed room, half of which a pane divides off, with a light in that half.
+fn divided(pane: Option<Surface>, light: impl FnOnce(&mut Scene)) -> Scene {
+    let mut scene = scene(&[diffuse(0.5)]);
+    add_box(&mut scene, Vec3::ONE, Vec3::NEG_ONE, 0);
+    light(&mut scene);
+    if let Some(pane) = pane {
+        scene.materials.push(Material::new("pane", pane));
+        let last = scene.materials.len() as u32 - 1;
+        add_quad(&mut scene, vec3(-1.0, -1.0, 0.1), 2.0 * Vec3::X, 2.0 * Vec3::Y, last);
+    }
+    scene.cameras.push(camera(vec3(0.0, 0.1, 0.95), vec3(0.0, -0.6, 0.3), 70.0));
+    scene
+}
+
+fn lamp(scene: &mut Scene) {
+    scene.materials.push(emissive("lamp", 0.0, 20.0, true));
+    let lamp = scene.materials.len() as u32 - 1;
+    add_quad(scene, vec3(-0.3, 0.2, -0.5), 0.5 * Vec3::X, 0.4 * Vec3::Z, lamp);
+}
+
+#[test]
+fn lamps_light_through_panes_what_their_photons_do() {
+    let bulb = |s: &mut Scene| s.lights.push(point_light(vec3(0.2, 0.5, -0.4), 3.0));
+    let many = |s: &mut Scene| {
+        let at = |i: u32| vec3(0.08 * (i % 20) as f32 - 0.8, 0.5, -0.1 - 0.04 * (i / 20) as f32);
+        s.lights.extend((0..300).map(|i| point_light(at(i), 0.01)));
+    };
+    let ball = |s: &mut Scene| {
+        s.materials.push(emissive("ball", 0.0, 20.0, false));
+        s.spheres.push(sphere(vec3(0.3, 0.0, -0.5), 0.2, 1));
+    };
+    let lights: [(&str, &dyn Fn(&mut Scene)); 4] =
+        [("a bulb", &bulb), ("many bulbs", &many), ("a lamp", &lamp), ("a ball", &ball)];
+    for (name, light) in lights {
+        let scene = divided(Some(pane(TINT)), light);
+        let rays = mean(&render_scene(&scene, &settings(Mode::Hybrid, 200_000, 32).with(|s| s.picture.spp = 16)));
+        let photons = mean(&render_scene(&scene, &settings(Mode::Photons, 400_000, 32).with(|s| s.picture.spp = 4)));
+        assert!(within(rays, photons, 0.01), "{name}: {rays} by rays, {photons} by photons");
+        let open = divided(None, light);
+        let open = mean(&render_scene(&open, &settings(Mode::Hybrid, 50_000, 32).with(|s| s.picture.spp = 16)));
+        assert!(rays < 0.8 * open, "control: {rays}, without a pane {open}");
+    }
+}
+
+#[test]
+fn the_sky_lights_a_room_through_its_window() {
+    let mut scene = divided(Some(pane(Vec3::ONE)), |_| {});
+    // Without the wall behind the pane.
+    scene.triangles.retain(|t| t.positions.iter().any(|p| p.z > -0.99));
+    scene.environment = Some(Environment::uniform(Vec3::ONE));
+    let rays = mean(&render_scene(&scene, &settings(Mode::Hybrid, 200_000, 32).with(|s| s.picture.spp = 16)));
+    let photons = mean(&render_scene(&scene, &settings(Mode::Photons, 400_000, 32).with(|s| s.picture.spp = 4)));
+    assert!(within(rays, photons, 0.01), "{rays} by rays, {photons} by photons");
+    scene.materials.pop();
+    scene.triangles.retain(|t| t.material == 0);
+    let open = mean(&render_scene(&scene, &settings(Mode::Hybrid, 50_000, 32).with(|s| s.picture.spp = 16)));
+    assert!(rays < 0.97 * open, "control: {rays}, without a pane {open}");
+}
+
+#[test]
+fn modes_that_show_direct_light_show_it_through_panes() {
+    let mut scene = floor_below(pane(TINT), 0.0);
+    scene.lights.push(sun(vec3(0.2, -1.0, 0.1)));
+    let of = |mode| mean(&render_scene(&scene, &settings(mode, 100_000, 32).with(|s| s.picture.spp = 4)));
+    let right = of(Mode::DirectRays);
+    for mode in [Mode::DirectPhotons, Mode::Photons, Mode::Hybrid] {
+        // The floor and the pane light each other a little.
+        let found = of(mode);
+        let most = if mode == Mode::DirectPhotons { 1.01 } else { 1.05 };
+        assert!((0.99 * right..most * right).contains(&found), "{mode:?}: {found} instead of {right}");
+    }
+    assert!(of(Mode::IndirectPhotons) < 0.05 * right, "control");
+}
+
+#[test]
+fn what_a_pane_reflects_is_a_caustic() {
+    // A lamp before an upright pane, whose image lies as far behind it.
+    let lit = |ior: f32| {
+        let mut scene = scene(&[diffuse(0.5)]);
+        scene.materials.push(Material::new("pane", Surface::Pane { ior, tint: Vec3::ONE }));
+        add_quad(&mut scene, vec3(-3.0, 0.0, 3.0), 6.0 * Vec3::X, -3.0 * Vec3::Z, 0);
+        add_quad(&mut scene, vec3(-3.0, -0.5, 0.0), 6.0 * Vec3::X, 3.0 * Vec3::Y, 1);
+        scene.lights.push(point_light(vec3(0.0, 1.0, 0.5), 3.0));
+        scene.cameras.push(camera(vec3(0.0, 2.0, 0.6), vec3(0.0, 0.0, 0.5), 5.0));
+        let settings = settings(Mode::Hybrid, 100_000, 8).with(|s| {
+            s.picture.layers = vec![ExtraLayers::Components];
+            s.photons.max_paths = Some(4_000_000);
+        });
+        let render = render_scene(&scene, &settings);
+        let layer = render.frame.layer("caustic");
+        layer.iter().map(|x| f64::from(*x)).sum::<f64>() / layer.len() as f64
+    };
+    // Below the lamp, at (0, 0, 0.5): from the image at (0, 1, -0.5).
+    let (squared, height, away): (f64, f64, f64) = (2.0, 1.0, 1.0);
+    let found = lit(1.5);
+    let right = 3.0 * height / squared.powf(1.5) * 0.5 / std::f64::consts::PI * reflectance(away / squared.sqrt(), 1.5);
+    assert!(within(found, right, 0.03), "{found} instead of {right}");
+    assert!(!within(lit(2.0), right, 0.3), "control");
+}
+
+#[test]
+fn rough_lobes_see_a_lamp_behind_a_pane_once() {
+    let surface = Surface::Layered { base: Vec3::ONE, metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    let metal = Material { roughness: 0.4, ..Material::new("metal", surface) };
+    let seen = |pane: Option<Surface>| {
+        let mut scene = divided(pane, lamp);
+        scene.materials.push(metal.clone());
+        let last = scene.materials.len() as u32 - 1;
+        // A mirror-like floor of metal, seen with the lamp in it.
+        add_quad(&mut scene, vec3(-0.95, -0.9, 0.9), 1.9 * Vec3::X, -0.7 * Vec3::Z, last);
+        let settings = settings(Mode::DirectRays, 1000, 32).with(|s| s.picture.spp = 256);
+        let render = render_scene(&scene, &settings);
+        let metal: Vec<f64> = render.frame.radiance()[20 * 32..28 * 32].iter().map(|p| f64::from(p[1])).collect();
+        metal.iter().sum::<f64>() / metal.len() as f64
+    };
+    let (through, open) = (seen(Some(pane(Vec3::ONE))), seen(None));
+    // The pane takes 8 % along its normal and somewhat more elsewhere; what it reflects is dark.
+    assert!((0.8..0.95).contains(&(through / open)), "{through} of {open}");
+}
