@@ -11,7 +11,7 @@
 use caustica::{
     renderer::Render,
     scene::{Environment, Light, LightKind, Material, Scene, Surface},
-    settings::{ExtraLayers, Mode, Settings},
+    settings::{Mode, Settings},
 };
 use glam::{Vec3, vec3};
 use support::*;
@@ -95,7 +95,7 @@ fn lamps_light_through_panes_what_their_photons_do() {
     let bulb = |s: &mut Scene| s.lights.push(point_light(vec3(0.2, 0.5, -0.4), 3.0));
     let many = |s: &mut Scene| {
         let at = |i: u32| vec3(0.08 * (i % 20) as f32 - 0.8, 0.5, -0.1 - 0.04 * (i / 20) as f32);
-        s.lights.extend((0..300).map(|i| point_light(at(i), 0.01)));
+        s.lights.extend((0..40).map(|i| point_light(at(i), 0.01)));
     };
     let ball = |s: &mut Scene| {
         s.materials.push(emissive("ball", 0.0, 20.0, false));
@@ -105,11 +105,11 @@ fn lamps_light_through_panes_what_their_photons_do() {
         [("a bulb", &bulb), ("many bulbs", &many), ("a lamp", &lamp), ("a ball", &ball)];
     for (name, light) in lights {
         let scene = divided(Some(pane(TINT)), light);
-        let rays = mean(&render_scene(&scene, &settings(Mode::Hybrid, 200_000, 32).with(|s| s.picture.spp = 16)));
-        let photons = mean(&render_scene(&scene, &settings(Mode::Photons, 400_000, 32).with(|s| s.picture.spp = 4)));
+        let rays = mean(&render_scene(&scene, &settings(Mode::Hybrid, 50_000, 24).with(|s| s.picture.spp = 8)));
+        let photons = mean(&render_scene(&scene, &settings(Mode::Photons, 200_000, 24)));
         assert!(within(rays, photons, 0.01), "{name}: {rays} by rays, {photons} by photons");
         let open = divided(None, light);
-        let open = mean(&render_scene(&open, &settings(Mode::Hybrid, 50_000, 32).with(|s| s.picture.spp = 16)));
+        let open = mean(&render_scene(&open, &settings(Mode::Hybrid, 20_000, 24).with(|s| s.picture.spp = 4)));
         assert!(rays < 0.8 * open, "control: {rays}, without a pane {open}");
     }
 }
@@ -120,13 +120,15 @@ fn the_sky_lights_a_room_through_its_window() {
     // Without the wall behind the pane.
     scene.triangles.retain(|t| t.positions.iter().any(|p| p.z > -0.99));
     scene.environment = Some(Environment::uniform(Vec3::ONE));
-    let rays = mean(&render_scene(&scene, &settings(Mode::Hybrid, 200_000, 32).with(|s| s.picture.spp = 16)));
-    let photons = mean(&render_scene(&scene, &settings(Mode::Photons, 400_000, 32).with(|s| s.picture.spp = 4)));
+    let mut open = scene.clone();
+    open.materials.pop();
+    open.triangles.retain(|t| t.material == 0);
+    // Photons alone are too bright in corners, with a pane and without.
+    let kept = |settings: &Settings| mean(&render_scene(&scene, settings)) / mean(&render_scene(&open, settings));
+    let rays = kept(&settings(Mode::Hybrid, 50_000, 24).with(|s| s.picture.spp = 16));
+    let photons = kept(&settings(Mode::Photons, 400_000, 24));
     assert!(within(rays, photons, 0.01), "{rays} by rays, {photons} by photons");
-    scene.materials.pop();
-    scene.triangles.retain(|t| t.material == 0);
-    let open = mean(&render_scene(&scene, &settings(Mode::Hybrid, 50_000, 32).with(|s| s.picture.spp = 16)));
-    assert!(rays < 0.97 * open, "control: {rays}, without a pane {open}");
+    assert!(rays < 0.97, "control: {rays}");
 }
 
 #[test]
@@ -154,13 +156,7 @@ fn what_a_pane_reflects_is_a_caustic() {
         add_quad(&mut scene, vec3(-3.0, -0.5, 0.0), 6.0 * Vec3::X, 3.0 * Vec3::Y, 1);
         scene.lights.push(point_light(vec3(0.0, 1.0, 0.5), 3.0));
         scene.cameras.push(camera(vec3(0.0, 2.0, 0.6), vec3(0.0, 0.0, 0.5), 5.0));
-        let settings = settings(Mode::Hybrid, 100_000, 8).with(|s| {
-            s.picture.layers = vec![ExtraLayers::Components];
-            s.photons.max_paths = Some(4_000_000);
-        });
-        let render = render_scene(&scene, &settings);
-        let layer = render.frame.layer("caustic");
-        layer.iter().map(|x| f64::from(*x)).sum::<f64>() / layer.len() as f64
+        mean(&render_scene(&scene, &settings(Mode::IndirectPhotons, 100_000, 8).with(|s| s.photons.max_bounces = 0)))
     };
     // Below the lamp, at (0, 0, 0.5): from the image at (0, 1, -0.5).
     let (squared, height, away): (f64, f64, f64) = (2.0, 1.0, 1.0);
