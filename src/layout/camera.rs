@@ -138,7 +138,8 @@ pub struct CameraTile {
     pub patches: u32,
     /// Irradiance by all but these patches on average, in the units of [`BrightPatch::power`].
     pub other_light: f32,
-    pub pad0: u32,
+    /// 1: paths that show them blurred see a base and what lies above it as one diffuse lobe.
+    pub merges_layers: u32,
 }
 
 /// Veils, surfaces of an opacity between 0 and 1, that a camera path passes at most before it draws

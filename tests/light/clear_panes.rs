@@ -30,7 +30,8 @@ fn reflectance(cosine: f64, ior: f64) -> f64 {
     2.0 * face / (1.0 + face)
 }
 
-/// A floor of 4 m, and a pane of 4 m half a metre above it; the camera looks at the floor from between them.
+/// A floor of 4 m, and a pane of 4 m half a metre above it; the camera looks at the floor from
+/// between them.
 fn floor_below(surface: Surface, roughness: f32) -> Scene {
     let mut scene = scene(&[diffuse(0.5)]);
     scene.materials.push(Material { roughness, ..Material::new("pane", surface) });

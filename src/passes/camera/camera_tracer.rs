@@ -127,6 +127,7 @@ impl CameraTracer {
             branches,
             filter_steps: offsets.len() as u32 - 1,
             media,
+            merges_layers: u32::from(photons.final_gather > 0),
             ..view(camera, size, photons, picture)?
         };
         let room = room_for(&view, gpu.batch, photons.final_gather);
@@ -192,7 +193,13 @@ impl CameraTracer {
     pub fn of_pass(self, gpu: &Gpu, picture: &PictureSettings, first: u32) -> Result<Self> {
         let offsets = picture.pixel_filter.offsets();
         let first_extra = self.first_extra + first / self.view.spp * self.extra;
-        let view = CameraTile { first_sample: first, filter_steps: offsets.len() as u32 - 1, ..self.view };
+        let view = CameraTile {
+            first_sample: first,
+            filter_steps: offsets.len() as u32 - 1,
+            // Its bias would stay over all passes.
+            merges_layers: if first == 0 { self.view.merges_layers } else { 0 },
+            ..self.view
+        };
         Ok(Self { filter_table: gpu.storage_with("pixel filter", &offsets)?, first_extra, view, ..self })
     }
 

@@ -36,8 +36,8 @@ const GROWTH_PATHS: u64 = 1 << 17;
 /// Paths for each photon that a map has room for, at most and at least.
 const PATHS_PER_PHOTON: u64 = 100;
 const MIN_PATHS_PER_PHOTON: f64 = 4.0;
-/// The same of photons for caustics where panes that rays to lights pass are among what they are aimed
-/// at: most go through these, and few of the others meet anything.
+/// The same of photons for caustics where panes that rays to lights pass are among what they are
+/// aimed at: most go through these, and few of the others meet anything.
 const PATHS_PER_PHOTON_AT_PANES: u64 = 8;
 
 /// Result of the photon pass.
