@@ -4,16 +4,17 @@
 //! |---|---|---|
 //! | sun | a floor behind a tinted pane has the closed form of the pane's transmittance, up to the edge of a shadow | a rough pane, whose light comes by photons |
 //! | lamps and skies | lamps of all kinds and a sky light through a pane what they light by photons alone | no pane |
+//! | globes, instances | a globe about a bulb, and instances, keep the same of it | the bulb alone |
 //! | modes | all modes that show direct light show that through a pane | the mode that does not |
 //! | reflection | what a pane reflects is a caustic of the closed form | a pane of another index |
 //! | coats | rough metal and coats see a lamp behind a pane once | the lamp without a pane |
 
 use caustica::{
     renderer::Render,
-    scene::{Environment, Light, LightKind, Material, Scene, Surface},
+    scene::{Environment, Instance, Light, LightKind, Material, Scene, SharedMesh, Surface},
     settings::{Mode, Settings},
 };
-use glam::{Vec3, vec3};
+use glam::{Mat3, Vec3, vec3};
 use support::*;
 
 const TINT: Vec3 = Vec3::new(0.9, 0.6, 0.3);
@@ -69,6 +70,30 @@ fn the_sun_through_a_window_has_the_closed_form_up_to_the_edge_of_a_shadow() {
     scene.materials[1].roughness = 0.1;
     let rough = render_scene(&scene, &direct(64));
     assert_eq!(at(&rough, 34), [0.0; 3], "control: no ray to a light passes a rough pane");
+}
+
+#[test]
+fn globes_and_instances_of_panes_let_light_through() {
+    let mut scene = floor_below(pane(TINT), 0.0);
+    scene.lights.push(sun(vec3(0.4, -1.0, 0.3)));
+    let mut shared = scene.clone();
+    let (panes, floor) = scene.triangles.iter().partition(|t| t.material == 1);
+    (shared.meshes, shared.triangles) = (vec![SharedMesh { triangles: panes }], floor);
+    // Stretched and tilted.
+    let linear = Mat3::from_rotation_z(0.2) * Mat3::from_diagonal(vec3(2.0, 0.5, 1.5));
+    shared.instances.push(Instance { mesh: 0, object: 0, linear, offset: vec3(0.0, 0.4, 0.0) });
+    let right = mean(&render_scene(&with_copies(&shared), &direct(16)));
+    let found = mean(&render_scene(&shared, &direct(16)));
+    assert!(within(found, right, 1e-4), "{found} instead of {right}");
+    // A bulb in the middle of a globe, in place of the pane.
+    scene.triangles.retain(|t| t.material == 0);
+    scene.lights = vec![point_light(vec3(0.0, 0.6, 0.0), 1.0)];
+    let bare = mean(&render_scene(&scene, &direct(16)));
+    scene.spheres.push(sphere(vec3(0.0, 0.6, 0.0), 0.1, 1));
+    let found = mean(&render_scene(&scene, &direct(16)));
+    let kept = f64::from(TINT.element_sum() / 3.0) * (1.0 - reflectance(1.0, 1.5));
+    assert!(within(found, kept * bare, 1e-3), "{found} instead of {}", kept * bare);
+    assert!(found < 0.6 * bare, "control: {found}, {bare}");
 }
 
 /// A closed room, half of which a pane divides off, with a light in that half.
