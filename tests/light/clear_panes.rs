@@ -127,9 +127,8 @@ fn lamps_light_through_panes_what_their_photons_do() {
         s.materials.push(emissive("ball", 0.0, 20.0, false));
         s.spheres.push(sphere(vec3(0.3, 0.0, -0.5), 0.2, 1));
     };
-    let lights: [(&str, &dyn Fn(&mut Scene)); 4] =
-        [("a bulb", &bulb), ("many bulbs", &many), ("a lamp", &lamp), ("a ball", &ball)];
-    for (name, light) in lights {
+    let lights: [fn(&mut Scene); 4] = [bulb, many, lamp, ball];
+    for (name, light) in ["a bulb", "many bulbs", "a lamp", "a ball"].into_iter().zip(lights) {
         let scene = divided(Some(pane(TINT)), light);
         let rays = mean(&render_scene(&scene, &settings(Mode::Hybrid, 50_000, 24).with(|s| s.picture.spp = 8)));
         let photons = mean(&render_scene(&scene, &settings(Mode::Photons, 200_000, 24)));
