@@ -94,6 +94,14 @@ fn globes_and_instances_of_panes_let_light_through() {
     let kept = f64::from(TINT.element_sum() / 3.0) * (1.0 - reflectance(1.0, 1.5));
     assert!(within(found, kept * bare, 1e-3), "{found} instead of {}", kept * bare);
     assert!(found < 0.6 * bare, "control: {found}, {bare}");
+    // The sun through the middle of the globe, which it passes twice.
+    scene.lights = vec![sun(Vec3::NEG_Y)];
+    scene.cameras = vec![camera(vec3(0.0, 0.3, 0.3), Vec3::ZERO, 2.0)];
+    let found = mean(&render_scene(&scene, &direct(16)));
+    let bare = 3.0 * 0.5 / std::f64::consts::PI;
+    let tints = f64::from((TINT * TINT).element_sum() / 3.0);
+    let right = bare * tints * (1.0 - reflectance(1.0, 1.5)).powi(2);
+    assert!(within(found, right, 1e-3), "{found} instead of {right}");
 }
 
 /// A closed room, half of which a pane divides off, with a light in that half.
