@@ -195,7 +195,7 @@ impl Gatherer for MapGatherer<'_> {
         let expected = (self.rays_per_pixel.unwrap_or(coarse.final_rays().into()) * pixels) as u64;
         let mut rays_done = 0;
         progress.report(Stage::Records, 0, expected);
-        coarse.for_each_tile(None, stats, progress, &mut |tile, stats| {
+        coarse.for_each_tile(None, stats, progress, &mut |tile, stats, _| {
             let (found, count) = timed(&mut stats.seconds.gather, || {
                 self.light_blurred(coarse, tile);
                 // Irradiance itself, by the geometric normal.

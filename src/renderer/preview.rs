@@ -33,7 +33,7 @@ pub struct Ends {
 /// The ends of all final-gather rays of a pass.
 pub fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<Ends> {
     let mut ends = Ends::default();
-    pass.for_each_tile(Some(Stage::Cells), stats, progress, &mut |tile, stats| {
+    pass.for_each_tile(Some(Stage::Cells), stats, progress, &mut |tile, stats, _| {
         let gather = || {
             let points: Vec<_> = pass.points(tile)?.iter().map(bare).collect();
             pass.set_points(&points);

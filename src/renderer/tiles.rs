@@ -103,6 +103,28 @@ pub(crate) struct CameraPass<'a> {
     pub(super) hashes: [Vec<u32>; 2],
 }
 
+/// Tiles of a stage that are done, with further ones for some of their pixels.
+pub(crate) struct TileCount<'p> {
+    progress: &'p dyn Progress,
+    stage: Option<Stage>,
+    /// All of them but further ones.
+    tiles: usize,
+    done: usize,
+    /// Further ones that are done.
+    further: usize,
+}
+
+impl TileCount<'_> {
+    /// Reports what is done, if there is a stage; `left` further tiles of this one are not. Tiles to
+    /// come are expected to have as many of them as those before.
+    fn report(&self, left: usize) {
+        let Some(stage) = self.stage else { return };
+        let begun = (self.done + 1).min(self.tiles).max(1);
+        let total = self.tiles + (self.further + left) * self.tiles / begun;
+        self.progress.report(stage, (self.done + self.further) as u64, total as u64);
+    }
+}
+
 impl<'a> CameraPass<'a> {
     /// `media` are those around the middle of the camera; `obstacles` are of the scene in the
     /// buffers.
@@ -192,36 +214,25 @@ impl<'a> CameraPass<'a> {
         let mut films = vec![film; gatherer.pictures()];
         // Previews have lost paths of their own.
         let lost_before = stats.lost_camera_paths;
-        let tiles = self.tracer.tiles();
-        let mut further = 0;
-        for (done, tile) in tiles.iter().enumerate() {
-            // Tiles to come are expected to have as many further ones as those before.
-            let report = |further: usize, of: usize| {
-                let total = tiles.len() + (further + of) * tiles.len() / (done + 1);
-                progress.report(stage, (done + further) as u64, total as u64);
-            };
-            progress.check()?;
-            report(further, 0);
-            self.trace(tile, stats)?;
+        self.for_each_tile(Some(stage), stats, progress, &mut |tile, stats, count| {
             let sums = self.light(tile, gatherer, &mut films, stats, progress)?;
             if self.doublings == 0 {
-                continue;
+                return Ok(());
             }
             let doubled = self.doubled_pixels(tile, &sums);
             let extra_tiles = self.tracer.extra_tiles(tile, &doubled);
             for (i, extra) in extra_tiles.iter().enumerate() {
                 progress.check()?;
-                report(further + i, extra_tiles.len() - i);
+                count.report(extra_tiles.len() - i);
                 self.trace(extra, stats)?;
                 self.light(extra, gatherer, &mut films, stats, progress)?;
+                count.further += 1;
             }
-            further += extra_tiles.len();
             for (pixel, at) in (0..tile.pixels).filter_map(|pixel| Some((pixel, self.tracer.pixel(tile, pixel)?))) {
                 films.iter_mut().for_each(|film| film.weigh(at, doubled[pixel as usize]));
             }
-        }
-        let all = (tiles.len() + further) as u64;
-        progress.report(stage, all, all);
+            Ok(())
+        })?;
         stats.extra_samples += films.iter().map(Film::extra_samples).sum::<u64>();
         stats.non_finite.film += films.iter().map(Film::non_finite).sum::<u64>();
         let of_all_pixels = f64::from(self.window.width) * f64::from(self.window.height) * f64::from(self.spp);
@@ -237,21 +248,18 @@ impl<'a> CameraPass<'a> {
         stage: Option<Stage>,
         stats: &mut Stats,
         progress: &dyn Progress,
-        work: &mut dyn FnMut(&Tile, &mut Stats) -> Result<()>,
+        work: &mut dyn FnMut(&Tile, &mut Stats, &mut TileCount) -> Result<()>,
     ) -> Result<()> {
         let tiles = self.tracer.tiles();
-        let report = |done: usize| {
-            if let Some(stage) = stage {
-                progress.report(stage, done as u64, tiles.len() as u64);
-            }
-        };
-        for (done, tile) in tiles.iter().enumerate() {
+        let mut count = TileCount { progress, stage, tiles: tiles.len(), done: 0, further: 0 };
+        for tile in &tiles {
             progress.check()?;
-            report(done);
+            count.report(0);
             self.trace(tile, stats)?;
-            work(tile, stats)?;
+            work(tile, stats, &mut count)?;
+            count.done += 1;
         }
-        report(tiles.len());
+        count.report(0);
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::{
     bright_places::BrightPlaces,
+    camera_kernels::CameraKernels,
     direct_light::DirectLighting,
     tile::{StepCount, Tile, margin_cells, room_for, tile_sides},
     view::{UNCLIPPED, view},
@@ -24,7 +25,7 @@ use crate::{
     },
     scene::Camera,
     settings::{Crop, PhotonSettings, PictureSettings, PixelGrid, first_extra_sample, square_bits},
-    upload::{SceneBuffers, sampler_constant},
+    upload::SceneBuffers,
 };
 
 /// Path slots per sample if the scene has dielectrics: reflection and refraction are both followed
@@ -39,39 +40,6 @@ const MANY_BRANCHES: u32 = 8;
 const DIRECT_STEPS_PER_READ: u32 = 1024;
 /// Surfaces before the near plane that a ray passes at most.
 const MAX_UNSEEN: u32 = 1 << 12;
-
-/// Kernels of the camera pass.
-#[derive(Debug)]
-pub struct CameraKernels {
-    start: Kernel,
-    trace: Kernel,
-    /// Direct light at rough lobes; `None` if there are none, or the picture shows no emitters.
-    lobes: Option<Kernel>,
-    direct: DirectLighting,
-    resolve: Kernel,
-}
-
-impl CameraKernels {
-    #[must_use]
-    pub fn new(gpu: &Gpu, scene: &SceneBuffers, photons: &PhotonSettings, light_samples: u32) -> Self {
-        let sampler = sampler_constant(photons.sampler);
-        let shows = photons.mode.sees_lights();
-        let sees_lights = ("SEES_LIGHTS", f64::from(u8::from(shows)));
-        let lobes = (scene.materials.has_rough && shows).then(|| scene.kernel_with(gpu, "light_lobes", &[sampler]));
-        Self {
-            start: scene.kernel_with(gpu, "start_camera", &[sampler]),
-            trace: scene.kernel_with(gpu, "trace_camera", &[sampler, sees_lights]),
-            lobes,
-            direct: DirectLighting::new(gpu, scene, photons.sampler, light_samples),
-            resolve: Kernel::new(gpu, "resolve", &[]),
-        }
-    }
-
-    /// Has the kernels compiled ahead of their use.
-    pub fn prefetch(gpu: &Gpu, scene: &SceneBuffers, photons: &PhotonSettings, light_samples: u32) {
-        let _ = Self::new(gpu, scene, photons, light_samples);
-    }
-}
 
 /// Kernels and buffers of the camera pass.
 #[derive(Debug)]
