@@ -115,8 +115,8 @@ pub(crate) struct TileCount<'p> {
 }
 
 impl TileCount<'_> {
-    /// Reports what is done, if there is a stage; `left` further tiles of this one are not. Tiles to
-    /// come are expected to have as many of them as those before.
+    /// Reports what is done, if there is a stage; `left` further tiles of this one are not. Tiles
+    /// to come are expected to have as many of them as those before.
     fn report(&self, left: usize) {
         let Some(stage) = self.stage else { return };
         let begun = (self.done + 1).min(self.tiles).max(1);
