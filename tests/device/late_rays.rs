@@ -48,7 +48,7 @@ fn rays_of_many_dispatches_find_the_same() {
     let short = Gpu::open(std::env::var("CAUSTICA_DEVICE").ok().as_deref()).expect("tests need an adapter");
     let short = short.with_trace_budget(16);
     for mode in [Mode::Hybrid, Mode::Photons] {
-        let settings = settings(mode, 2000, 16).with(|s| s.estimate.raw = true);
+        let settings = settings(mode, 500, 8).with(|s| s.estimate.raw = true);
         let whole = render_scene(&scene, &settings);
         let in_parts = render(&short, &scene, &settings, &Silent).expect("the scene renders");
         assert_eq!(in_parts.stats.unfinished_rays, 0);
@@ -78,7 +78,7 @@ fn sheets(count: u32) -> Scene {
 
 #[test]
 fn no_ray_is_given_up_in_a_crowd() {
-    let settings = settings(Mode::DirectRays, 1, 4);
+    let settings = settings(Mode::DirectRays, 1, 2);
     let scene = sheets(9000);
     let crowd = render_scene(&scene, &settings);
     assert_eq!(crowd.stats.unfinished_rays, 0);

@@ -138,8 +138,8 @@ fn lamps_light_through_panes_what_their_photons_do() {
     let lights: [fn(&mut Scene); 4] = [bulb, many, lamp, ball];
     for (name, light) in ["a bulb", "many bulbs", "a lamp", "a ball"].into_iter().zip(lights) {
         let scene = divided(Some(pane(TINT)), light);
-        let rays = mean(&render_scene(&scene, &settings(Mode::Hybrid, 50_000, 24).with(|s| s.picture.spp = 8)));
-        let photons = mean(&render_scene(&scene, &settings(Mode::Photons, 200_000, 24)));
+        let rays = mean(&render_scene(&scene, &settings(Mode::Hybrid, 30_000, 24).with(|s| s.picture.spp = 4)));
+        let photons = mean(&render_scene(&scene, &settings(Mode::Photons, 100_000, 24)));
         assert!(within(rays, photons, 0.01), "{name}: {rays} by rays, {photons} by photons");
         let open = divided(None, light);
         let open = mean(&render_scene(&open, &settings(Mode::Hybrid, 20_000, 24).with(|s| s.picture.spp = 4)));
@@ -159,7 +159,7 @@ fn the_sky_lights_a_room_through_its_window() {
     // Photons alone are too bright in corners, with a pane and without.
     let kept = |settings: &Settings| mean(&render_scene(&scene, settings)) / mean(&render_scene(&open, settings));
     let rays = kept(&settings(Mode::Hybrid, 50_000, 24).with(|s| s.picture.spp = 16));
-    let photons = kept(&settings(Mode::Photons, 400_000, 24));
+    let photons = kept(&settings(Mode::Photons, 200_000, 24));
     assert!(within(rays, photons, 0.01), "{rays} by rays, {photons} by photons");
     assert!(rays < 0.97, "control: {rays}");
 }

@@ -17,6 +17,8 @@ use glam::{Vec3, vec3};
 use support::*;
 
 const ALBEDO: f32 = 0.5;
+/// Pixels along a side of the pictures.
+const SIZE: u32 = 32;
 
 /// A floor of 6 m, a lamp of 10 W/sr a metre above it, and a camera that sees its middle.
 fn floor() -> Scene {
@@ -44,7 +46,7 @@ fn right(scene: &Scene, size: u32, heights: &[f64]) -> f64 {
 }
 
 fn asked(sampler: Sampler) -> Settings {
-    settings(Mode::Photons, 100_000, 48).with(|s| {
+    settings(Mode::Photons, 100_000, SIZE).with(|s| {
         s.photons.sampler = sampler;
         s.picture.spp = 2;
     })
@@ -61,7 +63,7 @@ fn constant(neighbors: u32) -> EstimateSettings {
 #[test]
 fn few_photons_are_as_bright_as_many() {
     let scene = floor();
-    let right = right(&scene, 48, &[1.0]);
+    let right = right(&scene, SIZE, &[1.0]);
     let others = [(DensityKernel::Cone, 3), (DensityKernel::Gaussian, 20), (DensityKernel::Silverman, 5)];
     let corrected = [1, 3, 10, 30, 100].map(constant).into_iter().chain(others.map(|(kernel, k)| estimate(kernel, k)));
     let mut estimates: Vec<_> = corrected.collect();
@@ -83,7 +85,7 @@ fn few_photons_of_a_caustic_are_as_bright_as_many() {
     let alone = Estimate::of_pictures(2, &scene, &asked(Sampler::Sobol), &[constant(10)])[0].mean;
     // Two metres above the floor; it faces down. The image of the lamp lies three metres above.
     add_quad(&mut scene, vec3(-6.0, 2.0, -6.0), Vec3::X * 12.0, Vec3::Z * 12.0, 1);
-    let right = right(&scene, 48, &[1.0, 3.0]);
+    let right = right(&scene, SIZE, &[1.0, 3.0]);
     let settings = asked(Sampler::Sobol).with(|s| s.photons.max_bounces = 1);
     let counts = [1, 3, 10, 30];
     for (k, found) in counts.into_iter().zip(Estimate::of_pictures(2, &scene, &settings, &counts.map(constant))) {

@@ -79,7 +79,7 @@ fn both(file: &Value) -> [Scene; 2] {
 }
 
 fn picture(scene: &Scene, mode: Mode) -> Vec<f64> {
-    let settings: Settings = settings(mode, 30_000, 64);
+    let settings: Settings = settings(mode, 30_000, 48);
     let render = render_scene(scene, &settings);
     assert_eq!(render.stats.unfinished_rays, 0);
     render.frame.radiance().iter().flatten().map(|x| f64::from(*x)).collect()

@@ -224,7 +224,7 @@ fn small_bright_places_leave_no_spots() {
         ("a strip below a shelf", with(shelf)),
         ("a small caustic", with(caustic)),
     ] {
-        let sized = |settings: Settings| settings.with(|s| s.picture.size = Some((128, 128)));
+        let sized = |settings: Settings| settings.with(|s| s.picture.size = Some((96, 96)));
         let right = render_scene(&scene, &sized(converged(64)));
         let spaced = render_scene(&scene, &sized(gathering(64, 2)));
         let classic = render_scene(&scene, &sized(plain()));
@@ -256,7 +256,7 @@ fn long_and_mirrored_bright_places_leave_no_spots() {
             Some(6e-4),
         ),
     ] {
-        let right = render_scene(&scene, &converged(256));
+        let right = render_scene(&scene, &converged(128));
         let (spaced, classic) = (render_scene(&scene, &gathering(64, 2)), render_scene(&scene, &plain()));
         let (found, control) = (error_of_blocks(&spaced, &right), error_of_blocks(&classic, &right));
         println!("{name}: {found} {control} {}", mean(&spaced) / mean(&right));
