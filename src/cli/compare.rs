@@ -1,9 +1,9 @@
 //! `caustica compare`.
 
-use std::{fs, time::Instant};
+use std::time::Instant;
 
 use caustica::{
-    Error, Result,
+    Result,
     compare::{FILES, Options, compare},
     gpu::Gpu,
     progress::{Progress, Stage},
@@ -13,7 +13,7 @@ use caustica::{
 
 use super::{
     args::CompareArgs,
-    files::Files,
+    files::{Files, make_folder},
     outlook::{Outlook, Plan},
     progress::Display,
     render::RAW_NOTE,
@@ -58,7 +58,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 /// Creates the folder and checks before the work that every file can be written there.
 fn prepare(args: &CompareArgs, scene: &Scene) -> Result<()> {
     let folder = &args.output;
-    fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
+    make_folder(folder)?;
     let mut files = Files::default();
     files.read_scene(scene)?;
     args.options.shared.environment.env.iter().try_for_each(|path| files.read(path, "the environment"))?;

@@ -1,7 +1,7 @@
 //! Protection of a run's inputs, and of its other outputs, from being overwritten.
 
 use std::{
-    io,
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -47,6 +47,21 @@ impl Files {
         self.written.push((identity, path.to_path_buf()));
         Ok(())
     }
+}
+
+/// Creates a folder for outputs, and those that it lies in, unless it is there.
+pub fn make_folder(path: &Path) -> Result<()> {
+    let is_file = |part: &&Path| part.exists() && !part.is_dir();
+    let source = match path.ancestors().find(is_file) {
+        Some(file) => {
+            io::Error::new(io::ErrorKind::NotADirectory, format!("{} is a file, not a folder", file.display()))
+        }
+        None => match fs::create_dir_all(path) {
+            Ok(()) => return Ok(()),
+            Err(error) => error,
+        },
+    };
+    Err(Error::Io { path: path.to_path_buf(), source })
 }
 
 fn refused(path: &Path, what: &str) -> Result<()> {

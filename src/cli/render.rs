@@ -2,7 +2,7 @@
 
 use std::{
     collections::HashSet,
-    fs, io,
+    io,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -23,7 +23,7 @@ use clap::{CommandFactory, error::ErrorKind};
 use super::{
     args::{Args, RenderArgs},
     bugs,
-    files::{Files, identity},
+    files::{Files, identity, make_folder},
     outlook::{Outlook, Plan},
     passes::{self, Inputs, Picture},
     progress::Display,
@@ -91,7 +91,7 @@ pub fn render(args: &RenderArgs) -> Result<()> {
     let display = Display::new(shared.quiet, shared.verbose);
     let (jobs, mut device) = (jobs(args), None);
     let Some(folder) = &args.output_dir else { return render_one(args, &jobs[0], &display, &mut device) };
-    fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
+    make_folder(folder)?;
     let mut failed = 0;
     for (done, job) in jobs.iter().enumerate() {
         display.note(&format!("scene {} of {}: {}", done + 1, jobs.len(), job.scene.display()));

@@ -17,7 +17,7 @@ use caustica::{
 };
 
 use super::{
-    files::Files,
+    files::{Files, make_folder},
     progress::Display,
     say::print,
     study_args::{PresetArg, ReferenceArg, StudyArgs},
@@ -138,7 +138,7 @@ fn plan(args: &StudyArgs) -> Result<Plan> {
 /// Creates the folder and checks before the work that files can be written there.
 fn prepare(args: &StudyArgs, plan: &Plan) -> Result<()> {
     let folder = &args.output;
-    std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
+    make_folder(folder)?;
     let mut files = Files::default();
     plan.subjects.iter().try_for_each(|subject| files.read_scene(&subject.scene))?;
     args.options.environment.env.iter().try_for_each(|path| files.read(path, "the environment"))?;

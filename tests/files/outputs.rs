@@ -190,6 +190,15 @@ fn places_that_cannot_be_written_are_refused_before_the_work() {
         let text = refusal(folder.path(), &format!("{QUICK} -q -o {output}"));
         assert!(text.contains(said), "{output}: {text}");
     }
+    for (line, said) in [
+        ("render scene.gltf --output-dir old.exr", "old.exr: old.exr is a file, not a folder"),
+        ("render scene.gltf --output-dir old.exr/there", "old.exr/there: old.exr is a file, not a folder"),
+        ("compare scene.gltf -o old.exr", "old.exr is a file, not a folder"),
+        ("study scene.gltf -o old.exr/there --photons 1k -k 1", "old.exr is a file, not a folder"),
+    ] {
+        let text = refusal(folder.path(), &format!("{line} -q"));
+        assert!(text.contains(said), "{line}: {text}");
+    }
     // No process writes to the pipe: reading it would block for ever.
     let made = Command::new("mkfifo").arg(folder.path().join("pipe.exr")).status().expect("mkfifo runs");
     assert!(made.success());
