@@ -3,6 +3,8 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | choice | lights are as frequent as their probability says (chi-square), and it is the same both ways | probabilities for another point |
+//! | microfacets | the same for rough lobes | probabilities for another viewer |
+//! | highlight | the one of many lamps that narrow microfacets mirror is chosen often | wide ones |
 //! | contribution | a light that can light a point has a probability above 0 there | probabilities for the opposite normal |
 
 use std::f64::consts::PI;
@@ -62,51 +64,86 @@ fn many_lights() -> Scene {
     scene
 }
 
-fn run(buffers: &SceneBuffers, rows: &[Row]) -> Vec<[f32; 4]> {
-    Probe::of_scene("probe_light_tree", buffers, &buffers.lights.photons).run(rows)
+/// A way to choose: by irradiance at a surface of a normal, or by what microfacets show.
+const BY_IRRADIANCE: &str = "probe_light_tree";
+const BY_LOBES: &str = "probe_shown_lights";
+
+fn run(probe: &str, buffers: &SceneBuffers, rows: &[Row]) -> Vec<[f32; 4]> {
+    Probe::of_scene(probe, buffers, &buffers.lights.photons).run(rows)
 }
 
-/// Probability of each light at a point of a surface.
-fn told(buffers: &SceneBuffers, point: Vec3, normal: Vec3) -> Vec<f64> {
+/// Probability of each light at a point.
+fn told(probe: &str, buffers: &SceneBuffers, point: Vec3, facing: Vec3) -> Vec<f64> {
     let count = buffers.lights.table.lights.len();
-    let row = |i: usize| [point.extend(0.5).to_array(), normal.extend(1.0 + i as f32).to_array()];
-    run(buffers, &(0..count).map(row).collect::<Vec<_>>()).iter().map(|[_, _, told, _]| f64::from(*told)).collect()
+    let row = |i: usize| [point.extend(0.5).to_array(), facing.extend(1.0 + i as f32).to_array()];
+    let rows = (0..count).map(row).collect::<Vec<_>>();
+    run(probe, buffers, &rows).iter().map(|[_, _, told, _]| f64::from(*told)).collect()
+}
+
+/// Choices at a point are as frequent as told, unlike what is told of another one.
+fn check_choice(probe: &str, buffers: &SceneBuffers, at: (Vec3, Vec3), other: (Vec3, Vec3)) {
+    let count = buffers.lights.table.lights.len();
+    let mut random = Random(11);
+    let row =
+        |random: &mut Random| [at.0.extend(random.unit()).to_array(), at.1.extend(random.unit() * 0.999).to_array()];
+    let drawn = run(probe, buffers, &(0..SAMPLES).map(|_| row(&mut random)).collect::<Vec<_>>());
+    // The last cell: a node that might have had light for the point has none below.
+    let mut counts = vec![0.0; count + 1];
+    for [light, probability, told, _] in &drawn {
+        if *probability == 0.0 {
+            counts[count] += 1.0;
+            continue;
+        }
+        assert!((probability / told - 1.0).abs() < 1e-4, "light {light}: {probability} and {told}");
+        counts[*light as usize] += 1.0;
+    }
+    let with_none = |(point, facing): (Vec3, Vec3)| {
+        let mut told = told(probe, buffers, point, facing);
+        let sum: f64 = told.iter().sum();
+        assert!(sum > 0.5 && sum < 1.0001, "the probabilities sum to {sum}");
+        told.push((1.0 - sum).max(0.0));
+        told
+    };
+    let found = deviate(&counts, &with_none(at));
+    assert!(found.fits(), "at {at:?}: {found:?}");
+    let other = deviate(&counts, &with_none(other));
+    assert!(!other.fits(), "control: probabilities of another: {other:?}");
 }
 
 #[test]
 fn lights_are_chosen_with_the_probability_that_is_told() {
     let buffers = upload(&many_lights(), LightSampling::Power);
-    let count = buffers.lights.table.lights.len();
     let away = vec3(0.4, 0.3, -0.2);
     for (point, normal) in [(Vec3::ZERO, Vec3::Y), (vec3(3.0, 0.2, -2.0), Vec3::ZERO), (vec3(-40.0, 9.0, 7.0), Vec3::X)]
     {
-        let mut random = Random(11);
-        let row = |random: &mut Random| {
-            [point.extend(random.unit()).to_array(), normal.extend(random.unit() * 0.999).to_array()]
-        };
-        let drawn = run(&buffers, &(0..SAMPLES).map(|_| row(&mut random)).collect::<Vec<_>>());
-        // The last cell: a node that might have had light for the point has none below.
-        let mut counts = vec![0.0; count + 1];
-        for [light, probability, told, _] in &drawn {
-            if *probability == 0.0 {
-                counts[count] += 1.0;
-                continue;
-            }
-            assert!((probability / told - 1.0).abs() < 1e-4, "light {light}: {probability} and {told}");
-            counts[*light as usize] += 1.0;
-        }
-        let with_none = |mut told: Vec<f64>| {
-            let sum: f64 = told.iter().sum();
-            assert!(sum > 0.5 && sum < 1.0001, "the probabilities sum to {sum}");
-            told.push((1.0 - sum).max(0.0));
-            told
-        };
-        let found = deviate(&counts, &with_none(told(&buffers, point, normal)));
-        assert!(found.fits(), "at {point}: {found:?}");
-        let other = with_none(told(&buffers, point + away * (1.0 + 0.1 * point.length()), normal));
-        let other = deviate(&counts, &other);
-        assert!(!other.fits(), "control: probabilities at another point: {other:?}");
+        let other = point + away * (1.0 + 0.1 * point.length());
+        check_choice(BY_IRRADIANCE, &buffers, (point, normal), (other, normal));
     }
+}
+
+#[test]
+fn lights_of_microfacets_are_chosen_with_the_probability_that_is_told() {
+    let buffers = upload(&many_lights(), LightSampling::Power);
+    let viewers = [(Vec3::ZERO, vec3(0.6, 0.7, 0.1)), (vec3(3.0, 0.2, -2.0), vec3(-0.9, 0.1, 0.3)), (Vec3::X, Vec3::Y)];
+    for ((point, wo), width) in viewers.into_iter().zip([0.3, 0.05, 0.8]) {
+        let wo = width * wo.normalize();
+        check_choice(BY_LOBES, &buffers, (point, wo), (point, width * vec3(-wo.x, wo.y, 0.5).normalize()));
+    }
+}
+
+#[test]
+fn the_lamp_that_microfacets_mirror_is_chosen_often() {
+    let mut scene = scene(&[diffuse(0.5)]);
+    scene.materials.push(emissive("lamp", 0.0, 4.0, false));
+    let at = |i: i32| vec3(0.5 * (i % 7 - 3) as f32, 2.0, 0.5 * (i / 7 - 3) as f32);
+    scene.spheres.extend((0..49).map(|i| sphere(at(i), 0.03, 1)));
+    let buffers = upload(&scene, LightSampling::Power);
+    let mirrored = buffers.lights.table.lights.iter().position(|light| Vec3::from_array(light.position) == at(12));
+    let mirrored = mirrored.expect("lamp");
+    let wo = (at(12) * vec3(-1.0, 1.0, -1.0)).normalize();
+    let chosen = |width: f32| told(BY_LOBES, &buffers, Vec3::ZERO, width * wo)[mirrored];
+    assert!(chosen(0.05) > 0.2, "{}", chosen(0.05));
+    assert!(chosen(1.0) < 0.05, "control: {}", chosen(1.0));
 }
 
 /// Points of a light from which it shines, each with the direction that it faces (0: all).
@@ -157,7 +194,8 @@ fn no_light_that_can_light_a_point_is_left_out() {
         let reach = if i % 3 == 0 { 30.0 } else { 5.0 };
         let point = reach * (2.0 * vec3(random.unit(), 0.4 * random.unit(), random.unit()) - vec3(1.0, 0.2, 1.0));
         let normal = if i % 4 == 0 { Vec3::ZERO } else { direction(&mut random) };
-        let (here, opposite) = (told(&buffers, point, normal), told(&buffers, point, -normal));
+        let (here, opposite) =
+            (told(BY_IRRADIANCE, &buffers, point, normal), told(BY_IRRADIANCE, &buffers, point, -normal));
         for (index, light) in lights.iter().enumerate() {
             if lights_up(light, point.as_dvec3(), normal.as_dvec3()) {
                 lit += 1;

@@ -6,6 +6,7 @@
 //! | suns | 40 of them give the sum of E cos θ | every third one left out |
 //! | few | 16 have no noise | 17 have |
 //! | metal | 16 light rough metal as their sum, without noise | 17 do with noise; one left out |
+//! | bulbs | rough metal shows 60 bulbs at few samples with little noise, and with the mean of many | a trace of sheen, with which bulbs are chosen by irradiance |
 //! | parts | a lamp in 800 pieces lights diffuse and rough surfaces like one | some pieces left out |
 //! | agreement | photons and rays have the same mean under many lights of all kinds | without the second bounce |
 //! | dark | a million lights of no power, and one of infinite or undefined position, change nothing | the position in order |
@@ -14,6 +15,7 @@ use std::time::Instant;
 
 use caustica::{
     bvh::Bvh,
+    renderer::Render,
     scene::{Environment, Light, LightKind, Material, Scene, Surface},
     settings::{LightSettings, Mode},
     upload::SceneBuffers,
@@ -122,6 +124,34 @@ fn sixteen_lights_on_rough_metal_have_no_noise() {
     assert!(furthest(&seen(&lights[..16]), 16) < 1e-3, "{}", furthest(&seen(&lights[..16]), 16));
     assert!(furthest(&seen(&lights), 17) > 0.1, "control: {}", furthest(&seen(&lights), 17));
     assert!(furthest(&seen(&lights[1..16]), 16) > 1e-3, "control: one left out");
+}
+
+#[test]
+fn rough_metal_shows_many_bulbs_with_little_noise() {
+    let metal = Surface::Layered { base: Vec3::splat(0.8), metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    let mut scene = floor(2.0);
+    scene.materials[0] = Material { surface: metal, roughness: 0.4, ..scene.materials[0].clone() };
+    scene.materials.push(emissive("bulb", 0.0, 400.0, false));
+    let at = |i: i32| vec3(0.4 * (i % 10 - 5) as f32 + 0.2, 0.7, 0.5 * (i / 10 - 3) as f32 + 0.1);
+    scene.spheres.extend((0..60).map(|i| sphere(at(i), 0.02, 1)));
+    scene.cameras = vec![camera(vec3(0.0, 0.5, 1.9), vec3(0.0, 0.0, 0.3), 30.0)];
+    let seen = |scene: &Scene, spp: u32| {
+        let few = settings(Mode::DirectRays, 1, 32).with(|s| (s.picture.spp, s.picture.max_spp) = (spp, None));
+        render_scene(scene, &few)
+    };
+    let right = seen(&scene, 256);
+    // The sum of squared differences over that of squares.
+    let noise = |found: &Render| {
+        let pairs = || found.frame.radiance().iter().zip(right.frame.radiance());
+        let sum = |of: &dyn Fn(f32, f32) -> f32| pairs().map(|(a, b)| f64::from(of(a[0], b[0]))).sum::<f64>();
+        sum(&|a, b| (a - b).powi(2)) / sum(&|_, b| b * b)
+    };
+    let found = seen(&scene, 4);
+    assert!(within(mean(&found), mean(&right), 0.02), "{} instead of {}", mean(&found), mean(&right));
+    scene.materials[0].sheen_color = Vec3::splat(1e-4);
+    scene.materials[0].sheen_roughness = 0.5;
+    let control = seen(&scene, 4);
+    assert!(noise(&found) < 0.5 * noise(&control), "{}, and {} by irradiance", noise(&found), noise(&control));
 }
 
 /// A surface under a lamp of `side` x `side` squares, all but each `gap`-th of them.
