@@ -37,13 +37,13 @@ impl Target {
 
 /// Geometry of one specular primitive, for its bounds.
 #[derive(Clone, Copy)]
-enum Item {
+pub(super) enum Item {
     Triangle([Vec3; 3]),
     Sphere(Vec3, f32),
 }
 
 impl Item {
-    fn bounds(&self) -> Bounds {
+    pub fn bounds(&self) -> Bounds {
         match *self {
             Item::Triangle([a, b, c]) => Bounds { min: a.min(b).min(c), max: a.max(b).max(c) },
             Item::Sphere(center, radius) => Bounds { min: center - radius, max: center + radius },
@@ -56,7 +56,7 @@ impl Item {
     }
 
     /// Distance from `from` to the farthest point of the primitive.
-    fn reach(&self, from: Vec3) -> f32 {
+    pub fn reach(&self, from: Vec3) -> f32 {
         match *self {
             Item::Triangle(corners) => corners.into_iter().map(|p| p.distance(from)).fold(0.0, f32::max),
             Item::Sphere(center, radius) => center.distance(from) + radius,
@@ -111,19 +111,24 @@ pub fn scene_target(scene: &Scene) -> Target {
 }
 
 /// Spheres that together contain all specular surfaces, at most [`MAX_TARGETS`]; none if there are
-/// no such surfaces. The largest cluster is split along its longest axis until there are
-/// [`MAX_TARGETS`] clusters, those of several connected parts first. Then halves are kept only
-/// where the sum of their cross-sections is smaller than that of the whole cluster, or hardly
-/// greater where no part is in both: so a glass beside a large window has a sphere of its own.
+/// no such surfaces.
 #[must_use]
 pub fn specular_targets(scene: &Scene) -> Vec<Target> {
     let casts = scene.caustic_materials();
-    let specular = parts(scene, |material| casts[material as usize]);
-    if specular.is_empty() {
+    spheres_around(parts(scene, |material| casts[material as usize]), MAX_TARGETS)
+}
+
+/// Spheres that together contain all parts, at most so many. The largest cluster is split along its
+/// longest axis until there are as many, those of several connected parts first. Then halves are
+/// kept only where the sum of their cross-sections is smaller than that of the whole cluster, or
+/// hardly greater where no part is in both: so a glass beside a large window has a sphere of its
+/// own.
+pub(super) fn spheres_around(parts: Vec<Vec<Item>>, most: u32) -> Vec<Target> {
+    if parts.is_empty() {
         return Vec::new();
     }
-    let mut tree = vec![Cluster::new(specular)];
-    for _ in 1..MAX_TARGETS {
+    let mut tree = vec![Cluster::new(parts)];
+    for _ in 1..most {
         let leaves = (0..tree.len()).filter(|&i| tree[i].halves.is_none() && tree[i].can_be_split());
         let several = |i: usize| tree[i].parts.len() > 1;
         let radius = |i: usize| tree[i].target.radius;
@@ -163,7 +168,7 @@ fn split<T>(all: Vec<T>, middle: impl Fn(&T) -> Vec3) -> std::result::Result<[Ve
     }
 }
 
-fn sphere_around<'a>(items: impl IntoIterator<Item = &'a Item> + Clone) -> Target {
+pub(super) fn sphere_around<'a>(items: impl IntoIterator<Item = &'a Item> + Clone) -> Target {
     let Bounds { min, max } = items.clone().into_iter().map(Item::bounds).fold(Bounds::EMPTY, Bounds::union);
     let center = 0.5 * (min + max);
     // Slightly enlarged, so that rounding leaves nothing outside.
@@ -172,7 +177,7 @@ fn sphere_around<'a>(items: impl IntoIterator<Item = &'a Item> + Clone) -> Targe
 }
 
 /// The wanted primitives, by connected parts.
-fn parts(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Vec<Item>> {
+pub(super) fn parts(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Vec<Item>> {
     let triangles = scene.triangles.iter().filter(|t| wanted(t.material));
     let spheres = scene.spheres.iter().filter(|s| wanted(s.material));
     let has = |mesh: &SharedMesh| mesh.triangles.iter().any(|t| wanted(t.material));
@@ -188,7 +193,7 @@ fn parts(scene: &Scene, wanted: impl Fn(u32) -> bool) -> Vec<Vec<Item>> {
 }
 
 /// Triangles that hang together by corners in one place.
-fn connected(triangles: &[[Vec3; 3]]) -> Vec<Vec<Item>> {
+pub(super) fn connected(triangles: &[[Vec3; 3]]) -> Vec<Vec<Item>> {
     let mut corners = HashMap::<[u32; 3], usize>::new();
     // Each leads to an earlier triangle of its part, or to itself.
     let mut leads: Vec<usize> = (0..triangles.len()).collect();

@@ -134,12 +134,17 @@ pub struct CameraTile {
     /// numbers, pixels in Morton order; 0: the samples of each pixel are a set. Those from
     /// [`Self::spp`] on always are.
     pub square_bits: u32,
-    /// Bright patches that rays are aimed at.
+    /// Bright patches that rays of final gathering are aimed at.
     pub patches: u32,
     /// Irradiance by all but these patches on average, in the units of [`BrightPatch::power`].
     pub other_light: f32,
     /// 1: paths that show them blurred see a base and what lies above it as one diffuse lobe.
     pub merges_layers: u32,
+    /// Bright patches that rays of rough lobes are aimed at: the same, and lamps in glass.
+    pub lobe_patches: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// Veils, surfaces of an opacity between 0 and 1, that a camera path passes at most before it draws
@@ -195,8 +200,8 @@ pub struct FinalStep {
     pub pad2: u32,
 }
 
-/// Bright patches of a picture at most.
-pub const MAX_PATCHES: usize = 64;
+/// Bright patches of a picture at most, lamps in glass among them.
+pub const MAX_PATCHES: usize = 128;
 
 /// A small part of a surface from which much light comes: a disc.
 #[repr(C)]

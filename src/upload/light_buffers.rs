@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::{
     bvh::{Bvh, MediaProbe},
     emitters::{
+        covered_lamps::CoveredLamps,
         environment_map::EnvironmentMap,
         importance::Importance,
         light_table::{Choices, LightTable},
@@ -62,6 +63,8 @@ pub struct LightBuffers {
     pub settings: LightSettings,
     importance_words: Table,
     pub has_environment: bool,
+    /// Lamps in glass.
+    pub lamps: CoveredLamps,
     pub warnings: Vec<String>,
     lights: Buffer,
     nodes: Table,
@@ -136,6 +139,7 @@ impl LightBuffers {
             importance,
             settings: settings.clone(),
             has_environment: map.is_some(),
+            lamps: CoveredLamps::new(scene, &table),
             warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
             nodes: Table::new(gpu, "light nodes", &table.trees.nodes)?,

@@ -1,9 +1,11 @@
-//! Rough lobes that see a small bright place: a part of their rays is aimed at it.
+//! Rough lobes that see a small bright place, or a lamp in glass: a part of their rays is aimed at
+//! it.
 //!
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | noise | a wall of rough metal shows a spot of light on the floor with little noise, and with the mean of many samples | without final gathering, nothing is aimed |
 //! | narrow | a narrow lobe finds the spot by itself, and loses few of its samples | the rough wall |
+//! | lamps | rough metal shows lamps in glass of the index of air with the light of bare ones and little noise, in mirrors as well | a plate of the same glass, which no lamp is in |
 
 use caustica::{
     renderer::Render,
@@ -70,4 +72,46 @@ fn narrow_lobes_keep_their_samples() {
     let (aimed, plain) = (render_scene(&scene, &sampled(16, 4)), render_scene(&scene, &sampled(0, 4)));
     let (found, control) = (error(&aimed, &right), error(&plain, &right));
     assert!(found < 1.2 * control && found > 0.5 * control, "{found}, and {control} where nothing is aimed");
+}
+
+/// A floor of rough metal under two small lamps, with glass of the index of air about each or
+/// between both and the floor, which is seen at once or by a mirror.
+fn under_lamps(cover: Option<(Vec3, Vec3)>, by_mirror: bool) -> Scene {
+    let surface = Surface::Layered { base: Vec3::splat(0.9), metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    let mut scene = scene(&[Surface::Glass { ior: 1.0001, tint: Vec3::ONE }, Surface::Mirror { tint: Vec3::ONE }]);
+    scene.materials.push(Material { roughness: 0.4, metallic: 1.0, ..Material::new("metal", surface) });
+    scene.materials.push(emissive("lamp", 0.0, 1000.0, false));
+    add_quad(&mut scene, vec3(-1.0, 0.0, 1.0), 2.0 * Vec3::X, -2.0 * Vec3::Z, 2);
+    for x in [-0.4, 0.3] {
+        let at = vec3(x, 0.6, -0.1);
+        scene.spheres.push(sphere(at, 0.01, 3));
+        if let Some((min, max)) = cover {
+            add_box(&mut scene, at + min, at + max, 0);
+        }
+    }
+    let mut eye = vec3(0.0, 0.5, 1.2);
+    if by_mirror {
+        add_quad(&mut scene, vec3(-2.0, -2.0, 1.3), 4.0 * Vec3::Y, 4.0 * Vec3::X, 1);
+        eye = vec3(0.0, 0.5, 1.25);
+    }
+    let ahead = if by_mirror { vec3(0.0, 0.0, 2.6) } else { Vec3::ZERO };
+    scene.cameras.push(camera(eye, ahead, 40.0));
+    scene
+}
+
+#[test]
+fn rough_metal_shows_lamps_in_glass_without_noise() {
+    let seen = |cover, by_mirror, spp| {
+        let settings = settings(Mode::DirectRays, 1000, 24).with(|s| (s.picture.spp, s.picture.max_spp) = (spp, None));
+        render_scene(&under_lamps(cover, by_mirror), &settings)
+    };
+    let about = Some((Vec3::splat(-0.05), Vec3::splat(0.05)));
+    let below = Some((vec3(-0.2, -0.5, -0.4), vec3(0.2, -0.1, 0.4)));
+    for by_mirror in [false, true] {
+        let right = seen(None, by_mirror, 256);
+        let many = seen(about, by_mirror, 256);
+        assert!(within(mean(&many), mean(&right), 0.02), "{} instead of {}", mean(&many), mean(&right));
+        let (found, control) = (error(&seen(about, by_mirror, 16), &right), error(&seen(below, by_mirror, 16), &right));
+        assert!(found < 0.05 * control, "{found}, and {control} where no lamp is in the glass");
+    }
 }

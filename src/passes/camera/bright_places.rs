@@ -6,11 +6,14 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3};
 
-use crate::layout::{BrightPatch, MAX_PATCHES};
+use crate::{
+    emitters::covered_lamps::MAX_LAMP_PATCHES,
+    layout::{BrightPatch, MAX_PATCHES},
+};
 
 /// Patches at most, and where light is uneven: every ray reads them all.
 const PATCHES: usize = 8;
-const PATCHES_OF_UNEVEN: usize = MAX_PATCHES;
+const PATCHES_OF_UNEVEN: usize = MAX_PATCHES - MAX_LAMP_PATCHES;
 /// Radiance of a bright end, in units of the mean over all rays.
 const BRIGHT: f64 = 8.0;
 /// Fraction of the rays' variance that bright ends must cause for any ray to be aimed.
@@ -88,12 +91,13 @@ impl BrightPlaces {
         let most = found.iter().map(|(part, _)| *part).fold(0.0, f64::max);
         let least = if is_uneven { LEAST_PART.max(NEAR_MOST * most) } else { LEAST_PART };
         let enough = found.into_iter().find(|(part, _)| *part > least).map(|(_, places)| places);
-        Self { is_uneven, ..enough.unwrap_or_default() }
+        let none = || Self { other_light: irradiance(mean_radiance(ends, rays)), ..Self::default() };
+        Self { is_uneven, ..enough.unwrap_or_else(none) }
     }
 
     /// The same by cells of one width, and the fraction of the variance that the places cause.
     fn in_cells((ends, is_uneven): (&[RayEnd], bool), rays: f64, width: f32) -> (f64, Self) {
-        let mean = ends.iter().map(|end| end.radiance).sum::<f64>() / rays.max(1.0);
+        let mean = mean_radiance(ends, rays);
         let mut cells: Vec<Cell> = Vec::new();
         let mut of_keys: BTreeMap<[i32; 5], usize> = BTreeMap::new();
         let mut of_ends: Vec<[Option<usize>; 2]> = vec![[None; 2]; ends.len()];
@@ -134,11 +138,20 @@ impl BrightPlaces {
             patches.extend(patch(&taken.iter().map(|(i, aim)| (*aim, ends[*i].radiance)).collect::<Vec<_>>()));
         }
         let all = ends.iter().map(|end| end.radiance.powi(2)).sum::<f64>();
-        let other = mean - light / rays;
-        let other_light = (std::f64::consts::PI * other.max(0.0)) as f32;
+        let other_light = irradiance(mean - light / rays);
         let places = Self { patches, other_light, is_uneven };
         (if all > 0.0 { squares / all } else { 0.0 }, places)
     }
+}
+
+/// Over all rays, of which those that met nothing are left out.
+fn mean_radiance(ends: &[RayEnd], rays: f64) -> f64 {
+    ends.iter().map(|end| end.radiance).sum::<f64>() / rays.max(1.0)
+}
+
+/// Of light of that radiance from all over the half sphere.
+fn irradiance(radiance: f64) -> f32 {
+    (std::f64::consts::PI * radiance.max(0.0)) as f32
 }
 
 /// Whether few of so many rays bring most of the light.
@@ -259,7 +272,8 @@ mod tests {
 
     #[test]
     fn even_light_has_none() {
-        assert_eq!(BrightPlaces::find(&ends(7.0), 10_000.0, 1.0), BrightPlaces::default());
+        let even = BrightPlaces::find(&ends(7.0), 10_000.0, 1.0);
+        assert!(even.patches.is_empty() && even.other_light > std::f32::consts::PI, "{even:?}");
         assert_eq!(BrightPlaces::find(&[], 0.0, 1.0), BrightPlaces::default());
     }
 }

@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     bvh::Media,
+    emitters::covered_lamps::CoveredLamps,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
     layout::{
@@ -60,6 +61,7 @@ pub struct CameraTracer {
     filter_table: Buffer,
     /// The bright patches that rays are aimed at.
     patches: Buffer,
+    lamps: CoveredLamps,
     pub(super) view: CameraTile,
     pub(super) window: Crop,
     /// Index of the first sample beyond those that every pixel has.
@@ -103,7 +105,7 @@ impl CameraTracer {
         let samples = room / u64::from(branches) + u64::from(margin);
         let slots = samples * u64::from(branches);
         let keys = if photons.final_gather > 0 { room } else { 0 };
-        Ok(Self {
+        let tracer = Self {
             kernels: CameraKernels::new(gpu, scene, photons, picture.light_samples),
             wavefront: Wavefront::new(gpu, scene, "camera", (slots, room / u64::from(branches)), keys)?,
             points: gpu.storage::<VisiblePoint>("visible points", slots)?,
@@ -114,12 +116,14 @@ impl CameraTracer {
             pixel_rows: gpu.storage::<PixelSums>("sums of pixels", room / u64::from(branches))?,
             filter_table: gpu.storage_with("pixel filter", &offsets)?,
             patches: gpu.uniform("bright patches", &[BrightPatch::default(); MAX_PATCHES]),
+            lamps: scene.lights.lamps.clone(),
             first_extra: first_extra_sample(photons, picture),
             extra: picture.extra_samples(),
             view: CameraTile { margin, square_bits: square_bits(photons, picture), ..view },
             window: picture.window(size),
             room,
-        })
+        };
+        Ok(tracer.aiming_at(gpu, &BrightPlaces::default()))
     }
 
     /// Has parallel rays start at a depth below 0, where `media` of [`Self::new`] are; the camera
@@ -131,13 +135,16 @@ impl CameraTracer {
     }
 
     /// Aims a part of the rays of final gathering, and of those that rough lobes send on, at bright
-    /// places.
+    /// places; the latter at lamps in glass as well.
     #[must_use]
     pub fn aiming_at(self, gpu: &Gpu, bright: &BrightPlaces) -> Self {
+        let all = [&bright.patches[..], &self.lamps.patches].concat();
         let mut patches = [BrightPatch::default(); MAX_PATCHES];
-        let count = bright.patches.len();
-        patches[..count].copy_from_slice(&bright.patches);
-        let view = CameraTile { patches: count as u32, other_light: bright.other_light, ..self.view };
+        patches[..all.len()].copy_from_slice(&all);
+        // Where no rays have looked, it is told by the lamps.
+        let other_light = if bright.other_light > 0.0 { bright.other_light } else { self.lamps.mean_light };
+        let [patches_of_rays, lobe_patches] = [bright.patches.len(), all.len()].map(|count| count as u32);
+        let view = CameraTile { patches: patches_of_rays, lobe_patches, other_light, ..self.view };
         Self { patches: gpu.uniform("bright patches", &patches), view, ..self }
     }
 
