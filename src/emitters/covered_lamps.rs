@@ -2,7 +2,7 @@
 //! glass, so that of the rays that rough lobes send on, few would show them, and brightly. These
 //! are aimed at such lamps instead, or at glass that is rough itself.
 
-use std::{collections::BTreeMap, f32::consts::TAU};
+use std::f32::consts::TAU;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     layout::{self, BrightPatch},
-    scene::{Bounds, Scene},
+    scene::{Bounds, Material, Scene, SharedMesh, instance_bounds},
 };
 
 /// Patches of lamps in glass at most.
@@ -41,32 +41,34 @@ impl CoveredLamps {
     /// that rays to lights pass.
     #[must_use]
     pub fn new(scene: &Scene, table: &LightTable) -> Self {
-        let covers: Vec<(Target, Bounds, bool)> =
-            [false, true].into_iter().flat_map(|rough| covers(scene, rough)).collect();
-        if covers.is_empty() || covers.len().saturating_mul(table.lights.len()) > MOST_COMPARED {
+        // Parts of large meshes take long to find, and most scenes have no lamp near glass.
+        let all = Cover::bounds_of_all(scene);
+        let may_be = |light: &layout::Light| shape(light).is_some_and(|item| holds(&all, item));
+        if !table.lights.par_iter().any(may_be) {
+            return Self::default();
+        }
+        let covers: Vec<Cover> = [false, true].into_iter().flat_map(|rough| Cover::of(scene, rough)).collect();
+        if covers.len().saturating_mul(table.lights.len()) > MOST_COMPARED {
             return Self::default();
         }
         // The widest, rough ones before others.
         let cover_of = |item: Item| {
-            let Bounds { min, max } = item.bounds();
-            let holds = |b: &Bounds| b.min.cmple(min).all() && b.max.cmpge(max).all();
-            let around = (0..covers.len()).filter(|i| holds(&covers[*i].1));
-            around.max_by(|a, b| {
-                let of = |i: &usize| (covers[*i].2, covers[*i].0.radius);
-                of(a).partial_cmp(&of(b)).expect("radii of finite bounds")
-            })
+            let around = covers.iter().filter(|cover| holds(&cover.bounds, item));
+            around.max_by(|a, b| a.is_rough.cmp(&b.is_rough).then(a.sphere.radius.total_cmp(&b.sphere.radius)))
         };
         let lamp = |i: usize| {
             let (item, power) = (shape(&table.lights[i])?, table.power_of(i as u32));
             (power > 0.0).then_some(())?;
             Some((item, power, cover_of(item)?))
         };
-        let lamps: Vec<(Item, f64, usize)> = (0..table.lights.len()).into_par_iter().filter_map(lamp).collect();
-        let mut of_rough = BTreeMap::<usize, f64>::new();
-        let (rough, clear): (Vec<_>, Vec<_>) = lamps.into_iter().partition(|(.., cover)| covers[*cover].2);
-        rough.iter().for_each(|(_, power, cover)| *of_rough.entry(*cover).or_default() += power);
+        let lamps: Vec<(Item, f64, &Cover)> = (0..table.lights.len()).into_par_iter().filter_map(lamp).collect();
+        let (rough, clear): (Vec<_>, Vec<_>) = lamps.into_iter().partition(|(.., cover)| cover.is_rough);
+        let within = |cover: &Cover| -> f64 {
+            rough.iter().filter(|(.., own)| std::ptr::eq(*own, cover)).map(|(_, power, _)| power).sum()
+        };
+        let rough_covers = covers.iter().filter(|cover| cover.is_rough);
         let mut patches: Vec<BrightPatch> =
-            of_rough.into_iter().map(|(cover, power)| patch(covers[cover].0, power)).collect();
+            rough_covers.filter_map(|cover| patch(cover.sphere, within(cover))).collect();
         patches.sort_by(|a, b| b.power.total_cmp(&a.power));
         patches.truncate(MAX_LAMP_PATCHES / 2);
         let lamps: Vec<(Item, f64)> = clear.into_iter().map(|(item, power, _)| (item, power)).collect();
@@ -77,16 +79,48 @@ impl CoveredLamps {
     }
 }
 
-/// Parts of glass, with their bounds, and whether they are rough.
-fn covers(scene: &Scene, rough: bool) -> impl Iterator<Item = (Target, Bounds, bool)> {
-    let is_one = |material: u32| {
-        let material = &scene.materials[material as usize];
-        material.surface.transmits() && !material.is_clear_pane() && (material.roughness > ROUGH) == rough
-    };
-    parts(scene, is_one).into_iter().map(move |part| {
-        let bounds = part.iter().map(Item::bounds).fold(Bounds::EMPTY, Bounds::union);
-        (sphere_around(&part), bounds, rough)
-    })
+/// A part of glass that rays to lights do not pass.
+struct Cover {
+    sphere: Target,
+    bounds: Bounds,
+    is_rough: bool,
+}
+
+impl Cover {
+    fn of(scene: &Scene, is_rough: bool) -> impl Iterator<Item = Self> {
+        let wanted = |material: u32| {
+            let material = &scene.materials[material as usize];
+            covers(material) && (material.roughness > ROUGH) == is_rough
+        };
+        parts(scene, wanted).into_iter().map(move |part| {
+            let bounds = part.iter().map(Item::bounds).fold(Bounds::EMPTY, Bounds::union);
+            Self { sphere: sphere_around(&part), bounds, is_rough }
+        })
+    }
+
+    fn bounds_of_all(scene: &Scene) -> Bounds {
+        let wanted: Vec<bool> = scene.materials.iter().map(covers).collect();
+        let triangles = scene.triangles.iter().filter(|t| wanted[t.material as usize]).map(Bounds::from);
+        let spheres = scene.spheres.iter().filter(|s| wanted[s.material as usize]).map(Bounds::from);
+        let has = |mesh: &SharedMesh| mesh.triangles.iter().any(|t| wanted[t.material as usize]);
+        let meshes: Vec<bool> = scene.meshes.iter().map(has).collect();
+        let boxes = scene.instances.iter().zip(instance_bounds(&scene.meshes, &scene.instances));
+        let instances = boxes.filter(|(instance, _)| meshes[instance.mesh as usize]).map(|(_, bounds)| {
+            // As wide as the sphere that stands for an instance among parts.
+            let (middle, half) = (0.5 * (bounds.min + bounds.max), 0.5 * bounds.diagonal());
+            Bounds { min: middle - half, max: middle + half }
+        });
+        triangles.chain(spheres).chain(instances).fold(Bounds::EMPTY, Bounds::union)
+    }
+}
+
+fn covers(material: &Material) -> bool {
+    material.surface.transmits() && !material.is_clear_pane()
+}
+
+fn holds(bounds: &Bounds, item: Item) -> bool {
+    let Bounds { min, max } = item.bounds();
+    bounds.min.cmple(min).all() && bounds.max.cmpge(max).all()
 }
 
 /// What emits, of a light that rays may meet.
@@ -117,7 +151,7 @@ fn patches_of(lamps: &[(Item, f64)], most: u32) -> Vec<BrightPatch> {
         let own = (0..spheres.len()).min_by(|a, b| out(&spheres[*a]).total_cmp(&out(&spheres[*b])));
         own.into_iter().for_each(|own| powers[own] += power);
     }
-    spheres.into_iter().zip(powers).map(|(sphere, power)| patch(sphere, power)).collect()
+    spheres.into_iter().zip(powers).filter_map(|(sphere, power)| patch(sphere, power)).collect()
 }
 
 /// Parts into which each edge of a triangle is cut, for none to be longer.
@@ -125,7 +159,7 @@ fn cuts(item: Item, length: f32) -> u32 {
     match item {
         Item::Triangle([a, b, c]) => {
             let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            (longest / length).ceil().clamp(1.0, MOST_PIECES as f32) as u32
+            ((longest / length).ceil().min(MOST_PIECES as f32) as u32).max(1)
         }
         Item::Sphere(..) => 1,
     }
@@ -146,10 +180,11 @@ fn pieces(item: Item, power: f64, length: f32) -> Vec<(Item, f64)> {
 }
 
 /// A lamp that sends its power, W, the mean of the channels, to all sides.
-fn patch(Target { center, radius }: Target, power: f64) -> BrightPatch {
+fn patch(Target { center, radius }: Target, power: f64) -> Option<BrightPatch> {
     // Intensity, the sum of the channels.
     let power = (3.0 * power / (2.0 * f64::from(TAU))) as f32;
-    BrightPatch { position: center.to_array(), radius, normal: [0.0; 3], power }
+    let is_one = (radius * radius).is_normal() && power.is_normal();
+    is_one.then(|| BrightPatch { position: center.to_array(), radius, normal: [0.0; 3], power })
 }
 
 #[cfg(test)]
@@ -158,7 +193,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        scene::{Material, Sphere, Surface, Triangle},
+        scene::{Sphere, Surface, Triangle},
         settings::LightSettings,
     };
 
