@@ -112,6 +112,6 @@ fn rough_metal_shows_lamps_in_glass_without_noise() {
         let many = seen(about, by_mirror, 256);
         assert!(within(mean(&many), mean(&right), 0.02), "{} instead of {}", mean(&many), mean(&right));
         let (found, control) = (error(&seen(about, by_mirror, 16), &right), error(&seen(below, by_mirror, 16), &right));
-        assert!(found < 0.05 * control, "{found}, and {control} where no lamp is in the glass");
+        assert!(found < 0.01 * control, "{found}, and {control} where no lamp is in the glass");
     }
 }
