@@ -1,10 +1,10 @@
 //! All that emits light, as one list and the tables and trees that choose from it: punctual lights,
 //! emissive triangles and spheres, the environment. Host only; `upload` puts it on the device.
 
-pub mod covered_lamps;
 mod cumulative;
 pub mod environment_map;
 pub mod importance;
+pub mod lamps_in_glass;
 mod light_bounds;
 pub mod light_clusters;
 mod light_media;

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use crate::{
     bvh::{Bvh, MediaProbe},
     emitters::{
-        covered_lamps::CoveredLamps,
         environment_map::EnvironmentMap,
         importance::Importance,
+        lamps_in_glass::LampsInGlass,
         light_table::{Choices, LightTable},
         set_media,
         sight::Sight,
@@ -64,7 +64,7 @@ pub struct LightBuffers {
     importance_words: Table,
     pub has_environment: bool,
     /// Lamps in glass.
-    pub lamps: CoveredLamps,
+    pub lamps: LampsInGlass,
     pub warnings: Vec<String>,
     lights: Buffer,
     nodes: Table,
@@ -139,7 +139,7 @@ impl LightBuffers {
             importance,
             settings: settings.clone(),
             has_environment: map.is_some(),
-            lamps: CoveredLamps::new(scene, &table),
+            lamps: LampsInGlass::new(scene, &table),
             warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
             nodes: Table::new(gpu, "light nodes", &table.trees.nodes)?,

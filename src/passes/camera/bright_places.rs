@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3};
 
 use crate::{
-    emitters::covered_lamps::MAX_LAMP_PATCHES,
+    emitters::lamps_in_glass::MAX_LAMP_PATCHES,
     layout::{BrightPatch, MAX_PATCHES},
 };
 

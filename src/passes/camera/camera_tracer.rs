@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     bvh::Media,
-    emitters::covered_lamps::CoveredLamps,
+    emitters::lamps_in_glass::LampsInGlass,
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
     layout::{
@@ -61,7 +61,7 @@ pub struct CameraTracer {
     filter_table: Buffer,
     /// The bright patches that rays are aimed at.
     patches: Buffer,
-    lamps: CoveredLamps,
+    lamps: LampsInGlass,
     pub(super) view: CameraTile,
     pub(super) window: Crop,
     /// Index of the first sample beyond those that every pixel has.

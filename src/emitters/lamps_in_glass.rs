@@ -1,4 +1,4 @@
-//! Lamps that glass covers: the filament of a bulb, a candle in a jar. No ray to a light passes the
+//! Lamps in glass: the filament of a bulb, a candle in a jar. No ray to a light passes the
 //! glass, so that of the rays that rough lobes send on, few would show them, and brightly. These
 //! are aimed at such lamps instead, or at glass that is rough itself.
 
@@ -20,7 +20,7 @@ use crate::{
 pub const MAX_LAMP_PATCHES: usize = 64;
 /// Roughness from which on glass is what is seen of a lamp in it.
 const ROUGH: f32 = 0.05;
-/// Lamps times covers that are compared at most.
+/// Lamps times parts of glass that are compared at most.
 const MOST_COMPARED: usize = 50_000_000;
 /// Pieces into which the triangles of lamps are cut at most, so that spheres can follow long ones,
 /// and lengths that are tried for their edges, as fractions of the extent of all.
@@ -29,46 +29,45 @@ const LENGTHS: [f32; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, f32::INFINITY];
 
 /// Lamps in glass, for rays to be aimed at.
 #[derive(Clone, Debug, Default)]
-pub struct CoveredLamps {
+pub struct LampsInGlass {
     pub patches: Vec<BrightPatch>,
     /// Irradiance by all lights if they were spread evenly over the sphere around the scene, in the
     /// units of [`BrightPatch::power`].
     pub mean_light: f32,
 }
 
-impl CoveredLamps {
+impl LampsInGlass {
     /// The emissive surfaces that lie within the bounds of one part of glass, other than of panes
     /// that rays to lights pass.
     #[must_use]
     pub fn new(scene: &Scene, table: &LightTable) -> Self {
         // Parts of large meshes take long to find, and most scenes have no lamp near glass.
-        let all = Cover::bounds_of_all(scene);
+        let all = GlassPart::bounds_of_all(scene);
         let may_be = |light: &layout::Light| shape(light).is_some_and(|item| holds(&all, item));
         if !table.lights.par_iter().any(may_be) {
             return Self::default();
         }
-        let covers: Vec<Cover> = [false, true].into_iter().flat_map(|rough| Cover::of(scene, rough)).collect();
-        if covers.len().saturating_mul(table.lights.len()) > MOST_COMPARED {
+        let glass: Vec<GlassPart> = [false, true].into_iter().flat_map(|rough| GlassPart::of(scene, rough)).collect();
+        if glass.len().saturating_mul(table.lights.len()) > MOST_COMPARED {
             return Self::default();
         }
         // The widest, rough ones before others.
-        let cover_of = |item: Item| {
-            let around = covers.iter().filter(|cover| holds(&cover.bounds, item));
+        let part_around = |item: Item| {
+            let around = glass.iter().filter(|part| holds(&part.bounds, item));
             around.max_by(|a, b| a.is_rough.cmp(&b.is_rough).then(a.sphere.radius.total_cmp(&b.sphere.radius)))
         };
         let lamp = |i: usize| {
             let (item, power) = (shape(&table.lights[i])?, table.power_of(i as u32));
             (power > 0.0).then_some(())?;
-            Some((item, power, cover_of(item)?))
+            Some((item, power, part_around(item)?))
         };
-        let lamps: Vec<(Item, f64, &Cover)> = (0..table.lights.len()).into_par_iter().filter_map(lamp).collect();
-        let (rough, clear): (Vec<_>, Vec<_>) = lamps.into_iter().partition(|(.., cover)| cover.is_rough);
-        let within = |cover: &Cover| -> f64 {
-            rough.iter().filter(|(.., own)| std::ptr::eq(*own, cover)).map(|(_, power, _)| power).sum()
+        let lamps: Vec<(Item, f64, &GlassPart)> = (0..table.lights.len()).into_par_iter().filter_map(lamp).collect();
+        let (rough, clear): (Vec<_>, Vec<_>) = lamps.into_iter().partition(|(.., part)| part.is_rough);
+        let within = |part: &GlassPart| -> f64 {
+            rough.iter().filter(|(.., own)| std::ptr::eq(*own, part)).map(|(_, power, _)| power).sum()
         };
-        let rough_covers = covers.iter().filter(|cover| cover.is_rough);
-        let mut patches: Vec<BrightPatch> =
-            rough_covers.filter_map(|cover| patch(cover.sphere, within(cover))).collect();
+        let rough_parts = glass.iter().filter(|part| part.is_rough);
+        let mut patches: Vec<BrightPatch> = rough_parts.filter_map(|part| patch(part.sphere, within(part))).collect();
         patches.sort_by(|a, b| b.power.total_cmp(&a.power));
         patches.truncate(MAX_LAMP_PATCHES / 2);
         let lamps: Vec<(Item, f64)> = clear.into_iter().map(|(item, power, _)| (item, power)).collect();
@@ -80,17 +79,17 @@ impl CoveredLamps {
 }
 
 /// A part of glass that rays to lights do not pass.
-struct Cover {
+struct GlassPart {
     sphere: Target,
     bounds: Bounds,
     is_rough: bool,
 }
 
-impl Cover {
+impl GlassPart {
     fn of(scene: &Scene, is_rough: bool) -> impl Iterator<Item = Self> {
         let wanted = |material: u32| {
             let material = &scene.materials[material as usize];
-            covers(material) && (material.roughness > ROUGH) == is_rough
+            stops_light(material) && (material.roughness > ROUGH) == is_rough
         };
         parts(scene, wanted).into_iter().map(move |part| {
             let bounds = part.iter().map(Item::bounds).fold(Bounds::EMPTY, Bounds::union);
@@ -99,7 +98,7 @@ impl Cover {
     }
 
     fn bounds_of_all(scene: &Scene) -> Bounds {
-        let wanted: Vec<bool> = scene.materials.iter().map(covers).collect();
+        let wanted: Vec<bool> = scene.materials.iter().map(stops_light).collect();
         let triangles = scene.triangles.iter().filter(|t| wanted[t.material as usize]).map(Bounds::from);
         let spheres = scene.spheres.iter().filter(|s| wanted[s.material as usize]).map(Bounds::from);
         let has = |mesh: &SharedMesh| mesh.triangles.iter().any(|t| wanted[t.material as usize]);
@@ -114,7 +113,7 @@ impl Cover {
     }
 }
 
-fn covers(material: &Material) -> bool {
+fn stops_light(material: &Material) -> bool {
     material.surface.transmits() && !material.is_clear_pane()
 }
 
@@ -198,20 +197,20 @@ mod tests {
     };
 
     /// Two lamps, and a ball about the first.
-    fn lamps(cover: Surface, roughness: f32) -> CoveredLamps {
+    fn lamps(globe: Surface, roughness: f32) -> LampsInGlass {
         let glowing =
             |name| Material { emission: Vec3::ONE, ..Material::new(name, Surface::Diffuse { albedo: Vec3::ZERO }) };
         let ball = |center: Vec3, radius: f32, material: u32| Sphere { center, radius, material, object: 0 };
         let scene = Scene {
             materials: vec![
-                Material { roughness, ..Material::new("cover", cover) },
+                Material { roughness, ..Material::new("globe", globe) },
                 glowing("first"),
                 glowing("second"),
             ],
             spheres: vec![ball(Vec3::X, 0.1, 0), ball(Vec3::X, 0.02, 1), ball(3.0 * Vec3::X, 0.02, 2)],
             ..Scene::default()
         };
-        CoveredLamps::new(&scene, &table(&scene))
+        LampsInGlass::new(&scene, &table(&scene))
     }
 
     fn table(scene: &Scene) -> LightTable {
@@ -219,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lamp_in_clear_glass_is_aimed_at_and_one_in_rough_glass_by_its_cover() {
+    fn a_lamp_in_clear_glass_is_aimed_at_and_one_in_rough_glass_by_that() {
         let glass = Surface::Glass { ior: 1.5, tint: Vec3::ONE };
         for (roughness, radius) in [(0.0, 0.02), (0.5, 0.1)] {
             let found = lamps(glass, roughness).patches;
@@ -246,7 +245,7 @@ mod tests {
             triangles: vec![Triangle::new(corners, [Vec3::Z; 3], 1)],
             ..Scene::default()
         };
-        let found = CoveredLamps::new(&scene, &table(&scene)).patches;
+        let found = LampsInGlass::new(&scene, &table(&scene)).patches;
         assert!(found.len() > 20 && found.len() <= MAX_LAMP_PATCHES, "{found:?}");
         assert!(found.iter().all(|patch| patch.radius < 0.1), "{found:?}");
         let sum: f32 = found.iter().map(|patch| patch.power).sum();
