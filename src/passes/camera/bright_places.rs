@@ -156,8 +156,8 @@ fn irradiance(radiance: f64) -> f32 {
 
 /// Whether few of so many rays bring most of the light.
 fn is_uneven(ends: &[RayEnd], rays: f64) -> bool {
-    let mean_of = |of: &dyn Fn(f64) -> f64| ends.iter().map(|end| of(end.radiance)).sum::<f64>() / rays.max(1.0);
-    mean_of(&|radiance| radiance * radiance) > UNEVEN * mean_of(&|radiance| radiance).powi(2)
+    let mean_square = ends.iter().map(|end| end.radiance * end.radiance).sum::<f64>() / rays.max(1.0);
+    mean_square > UNEVEN * mean_radiance(ends, rays).powi(2)
 }
 
 impl RayEnd {
