@@ -1,10 +1,10 @@
-//! Benchmark: error of a picture of many passes, estimated and true, against a reference at 128 x
-//! 128.
+//! Benchmark: error of a picture of many passes, estimated and true, against a reference.
 //!
-//! `cargo bench --bench convergence [-- PASSES [PLOT.svg [SCENE.glb]]]`. The reference of a scene,
-//! S1 unless one is given, is `SCENE_128.exr` beside it. Errors are relative, as
-//! [`ErrorEstimate`] has them. The noise of the reference is taken off. Fits are slopes over the
-//! logarithm of the number of passes.
+//! `cargo bench --bench convergence [-- PASSES [SIZE [PLOT.svg [SCENE.glb]]]]`. The reference of a
+//! scene, S1 unless one is given, is `SCENE_128.exr` beside it, averaged to SIZE x SIZE pixels: the
+//! fewer pixels, the less noise it has, and the more passes can be compared with it. Errors are
+//! relative, as [`ErrorEstimate`] has them. The noise of the reference is taken off. Fits are
+//! slopes over the logarithm of the number of passes.
 
 use std::{
     error::Error,
@@ -18,10 +18,11 @@ use caustica::{
 };
 use plotters::prelude::*;
 
-const SIZE: u32 = 128;
+/// Side of references, in pixels.
+const REFERENCE: u32 = 128;
 const PHOTONS: u32 = 50_000;
 const PASSES: u32 = 64;
-/// Mean square of the noise of the references S1 and S2 at this size, from that at 256 x 256.
+/// Mean square of the noise of the references S1 and S2, from that at 256 x 256.
 const REFERENCE_NOISE: f64 = 3e-4 / 4.0;
 /// Part of the mean radiance that is added to that of each pixel, as in [`ErrorEstimate`].
 const FLOOR: f64 = 0.1;
@@ -34,33 +35,38 @@ struct Row {
     blocks: f64,
     estimate: Option<ErrorEstimate>,
     noise: f64,
-    squared: f64,
+    truth: f64,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let passes = words.first().map_or(Ok(PASSES), |word| word.parse())?;
-    let scene = words.get(2).map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join(SCENE), PathBuf::from);
+    let size = words.get(1).map_or(Ok(REFERENCE), |word| word.parse())?;
+    if size == 0 || REFERENCE % size != 0 || size % 8 != 0 {
+        return Err(format!("SIZE divides {REFERENCE} and is a multiple of 8, not {size}").into());
+    }
+    let scene = words.get(3).map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join(SCENE), PathBuf::from);
     let scene = scene.as_path();
     let mut curves = Vec::new();
     for (name, settings) in [("final gathering", Quality::Normal.settings()), ("photons alone", Settings::default())] {
-        let rows = measure(scene, settings, passes)?;
-        print(&format!("{}, {name}", scene.display()), &rows);
+        let rows = measure(scene, settings, passes, size)?;
+        print(&format!("{}, {name}", scene.display()), size, &rows);
         curves.push((name, rows));
     }
-    words.get(1).filter(|path| path.as_str() != "-").map_or(Ok(()), |path| plot(Path::new(path), &curves))
+    words.get(2).filter(|path| path.as_str() != "-").map_or(Ok(()), |path| plot(Path::new(path), &curves))
 }
 
 /// Renders the passes.
-fn measure(path: &Path, settings: Settings, passes: u32) -> Result<Vec<Row>, Box<dyn Error>> {
+fn measure(path: &Path, settings: Settings, passes: u32, size: u32) -> Result<Vec<Row>, Box<dyn Error>> {
     let scene = Scene::load(path)?;
     let stem = path.file_stem().ok_or("no file")?.to_string_lossy();
-    let reference = read_exr(&path.with_file_name(format!("{stem}_{SIZE}.exr")))?;
+    let reference = read_exr(&path.with_file_name(format!("{stem}_{REFERENCE}.exr")))?;
+    let reference = averages(reference.radiance(), REFERENCE / size);
     let settings = settings.with(|s| {
         (s.photons.global, s.photons.caustic) = (PHOTONS, PHOTONS);
-        s.picture.size = Some((SIZE, SIZE));
+        s.picture.size = Some((size, size));
     });
-    let right: Vec<f64> = reference.layer("radiance").iter().map(|x| f64::from(*x)).collect();
+    let right: Vec<f64> = reference.as_flattened().iter().map(|x| f64::from(*x)).collect();
     let mean = right.iter().sum::<f64>() / right.len() as f64;
     // Mean over all numbers, each relative to the reference.
     let relative = |term: &dyn Fn(usize) -> f64| {
@@ -94,46 +100,51 @@ fn measure(path: &Path, settings: Settings, passes: u32) -> Result<Vec<Row>, Box
         rows.push(Row {
             passes: index + 1,
             mean: here.iter().map(|x| f64::from(*x)).sum::<f64>() / (mean * right.len() as f64),
-            blocks: rel_mse(&blocks(frame.radiance()), &blocks(reference.radiance()), None),
+            blocks: rel_mse(&averages(frame.radiance(), 8), &averages(&reference, 8), None),
             estimate: ErrorEstimate::of(total.film(), None),
             noise: noise.sqrt(),
-            squared: relative(&square),
+            truth: (relative(&square) - reference_noise(size)).max(0.0).sqrt(),
         });
     }
     Ok(rows)
 }
 
-/// Means of blocks of 8 x 8 pixels.
-fn blocks(radiance: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    let side = SIZE as usize / 8;
-    let mut means = vec![[0.0; 3]; side * side];
+/// Means of blocks of a square picture, which are `of` pixels wide.
+fn averages(radiance: &[[f32; 3]], of: u32) -> Vec<[f32; 3]> {
+    let (side, of) = (radiance.len().isqrt(), of as usize);
+    let (blocks, part) = (side / of, ((of * of) as f32).recip());
+    let mut means = vec![[0.0; 3]; blocks * blocks];
     for (i, pixel) in radiance.iter().enumerate() {
-        let mean = &mut means[i / SIZE as usize / 8 * side + i % SIZE as usize / 8];
-        (0..3).for_each(|c| mean[c] += pixel[c] / 64.0);
+        let mean = &mut means[i / side / of * blocks + i % side / of];
+        (0..3).for_each(|c| mean[c] += pixel[c] * part);
     }
     means
 }
 
-fn truth(row: &Row) -> f64 {
-    (row.squared - REFERENCE_NOISE).max(0.0).sqrt()
+/// Mean square of the noise of references averaged to this size.
+fn reference_noise(size: u32) -> f64 {
+    REFERENCE_NOISE * (f64::from(size) / f64::from(REFERENCE)).powi(2)
 }
 
-fn print(name: &str, rows: &[Row]) {
-    println!("{name}: {PHOTONS} photons a map; noise of the reference {:.2} %", 100.0 * REFERENCE_NOISE.sqrt());
+fn print(name: &str, size: u32, rows: &[Row]) {
+    println!(
+        "{name}, {size} x {size}: {PHOTONS} photons a map; noise of the reference {:.2} %",
+        100.0 * reference_noise(size).sqrt()
+    );
     println!(
         "{:>7} {:>8} {:>10} {:>9} {:>9} {:>9} {:>9} {:>11}",
         "passes", "mean", "8x8 relMSE", "noise %", "est. %", "bias e. %", "error %", "est. / true"
     );
     for row in rows {
         let estimate = row.estimate.unwrap_or(ErrorEstimate { noise: f64::NAN, bias: f64::NAN });
-        let (Row { passes, mean, blocks, .. }, error) = (row, truth(row));
+        let Row { passes, mean, blocks, truth, .. } = row;
         println!(
             "{passes:>7} {mean:>8.4} {blocks:>10.2e} {:>9.2} {:>9.2} {:>9.2} {:>9.2} {:>11.2}",
             100.0 * row.noise,
             100.0 * estimate.noise,
             100.0 * estimate.bias,
-            100.0 * error,
-            estimate.total() / error,
+            100.0 * truth,
+            estimate.total() / truth,
         );
     }
     let slope = |of: &dyn Fn(&Row) -> f64| {
@@ -145,7 +156,7 @@ fn print(name: &str, rows: &[Row]) {
             points.iter().fold((0.0, 0.0), |(a, b), (px, py)| (a + (px - x) * (py - y), b + (px - x).powi(2)));
         above / below
     };
-    println!("slopes: noise {:.2}, error {:.2}\n", slope(&|row| row.noise), slope(&|row| truth(row)));
+    println!("slopes: noise {:.2}, error {:.2}\n", slope(&|row| row.noise), slope(&|row| row.truth));
 }
 
 /// Draws estimated and true errors over the number of passes.
@@ -158,10 +169,10 @@ fn plot(path: &Path, curves: &[(&str, Vec<Row>)]) -> Result<(), Box<dyn Error>> 
         .caption("Error over passes: true (line) and estimated (dots)", ("sans-serif", 18))
         .x_label_area_size(44)
         .y_label_area_size(60)
-        .build_cartesian_2d((1.0..f64::from(most)).log_scale(), (0.5..20.0_f64).log_scale())?;
+        .build_cartesian_2d((1.0..f64::from(most)).log_scale(), (0.1..20.0_f64).log_scale())?;
     chart.configure_mesh().x_desc("passes").y_desc("relative error, %").draw()?;
     for ((name, rows), color) in curves.iter().zip(colors) {
-        let points = rows.iter().map(|row| (f64::from(row.passes), 100.0 * truth(row)));
+        let points = rows.iter().map(|row| (f64::from(row.passes), 100.0 * row.truth));
         chart
             .draw_series(LineSeries::new(points, color.stroke_width(2)))?
             .label(*name)

@@ -44,8 +44,10 @@ pub const SLOT_MASK: u32 = 127;
 pub const NO_SLOT: u32 = 127;
 /// Set there when parts of the surface are not there: rays ask for its opacity.
 pub const ALPHA_BIT: u32 = 1 << 21;
+/// Set there when rays to lights pass the surface.
+pub const CLEAR_BIT: u32 = 1 << 20;
 /// Mask there of the index into the materials.
-pub const MATERIAL_MASK: u32 = ALPHA_BIT - 1;
+pub const MATERIAL_MASK: u32 = CLEAR_BIT - 1;
 /// In place of the primitive that a path has left: none.
 pub const NOTHING_LEFT: u32 = (1 << BVH_INDEX_BITS) - 1;
 /// Surfaces that a path of light through mirrors and glass may meet beyond its diffuse bounces.
@@ -64,7 +66,8 @@ pub const LOST_SCALE: u32 = 4096;
 pub struct Primitive {
     pub v0: [f32; 3],
     /// Index into the materials, with [`SPHERE_BIT`] for a sphere; on the device also
-    /// [`TRANSMITS_BIT`], [`CONTACT_BIT`] and the slot at [`SLOT_SHIFT`].
+    /// [`TRANSMITS_BIT`], [`CONTACT_BIT`], [`ALPHA_BIT`], [`CLEAR_BIT`] and the slot at
+    /// [`SLOT_SHIFT`].
     pub material: u32,
     pub e1: [f32; 3],
     /// Index of the primitive in the scene before the BVH reordered it; on the device with its rank
@@ -143,8 +146,6 @@ pub const BLEND_BIT: u32 = 4;
 pub const UNLIT_BIT: u32 = 8;
 /// What of it is glass casts caustics however rough it is.
 pub const SMALL_GLASS_BIT: u32 = 16;
-/// Flag of a pane that rays to lights pass, [`crate::scene::Material::is_clear_pane`].
-pub const CLEAR_PANE_BIT: u32 = 32;
 
 /// Factors of a material, and where its textures are.
 #[repr(C)]
@@ -163,8 +164,7 @@ pub struct MaterialRecord {
     pub metallic: f32,
     /// Fraction of the light within glass that is transmitted.
     pub transmission: f32,
-    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`UNLIT_BIT`], [`SMALL_GLASS_BIT`],
-    /// [`CLEAR_PANE_BIT`].
+    /// [`DOUBLE_SIDED_BIT`], [`MASK_BIT`], [`BLEND_BIT`], [`UNLIT_BIT`], [`SMALL_GLASS_BIT`].
     pub flags: u32,
     /// Reflectance of the coat along the normal, without its strength.
     pub f0: [f32; 3],

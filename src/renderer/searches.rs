@@ -12,6 +12,10 @@ use crate::{
     upload::SceneBuffers,
 };
 
+/// Fraction of the light at a point below which what a map gives may be wrong there: neither its
+/// radius nor its shape says how far the light of the point is that of others.
+const NEGLIGIBLE: f32 = 0.01;
+
 /// The search of all maps.
 pub(super) enum Searches<'a> {
     Grid(Box<Gather<'a>>),
@@ -59,21 +63,17 @@ impl<'a> Searches<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<PointEstimate>> {
         let gpu = pass.gpu;
-        let mut found = vec![PointEstimate::default(); count as usize];
-        let radiance = gpu.storage_with("radiance of single points", &vec![[0.0_f32; 4]; found.len()])?;
+        let radiance = gpu.storage_with("radiance of single points", &vec![[0.0_f32; 4]; count as usize])?;
         let gathered = gpu.storage::<Gathered>("gathered at single points", count.into())?;
+        let mut of_maps = Vec::new();
         for index in 0..maps.maps().len() {
             let request = EstimateRequest { points, count, map_number: 1, radiance: &radiance, gathered: &gathered };
             self.answer(pass, maps, index, settings, &request, progress)?;
-            let all: Vec<Gathered> = gpu.read(&gathered, 0, count.into())?;
-            for (estimate, one) in found.iter_mut().zip(all) {
-                estimate.radius = estimate.radius.min(one.radius_squared.sqrt());
-                estimate.is_narrow |= one.narrow != 0;
-            }
+            let sums: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into())?;
+            let discs: Vec<Gathered> = gpu.read(&gathered, 0, count.into())?;
+            of_maps.push((sums, discs));
         }
-        let sums: Vec<[f32; 4]> = gpu.read(&radiance, 0, count.into())?;
-        found.iter_mut().zip(sums).for_each(|(estimate, [r, g, b, _])| estimate.light = [r, g, b]);
-        Ok(found)
+        Ok(together(&of_maps))
     }
 
     /// Adds the light at ends of rays to the visible points that the rays come from: the indices of
@@ -116,6 +116,26 @@ impl<'a> Searches<'a> {
     }
 }
 
+/// The light at each of several points, from the sums after each map and the discs of its
+/// estimates.
+fn together(of_maps: &[(Vec<[f32; 4]>, Vec<Gathered>)]) -> Vec<PointEstimate> {
+    let all = of_maps.last().map(|(sums, _)| sums.as_slice()).unwrap_or_default();
+    let estimate = |(i, [r, g, b, _]): (usize, &[f32; 4])| {
+        let mut found = PointEstimate { light: [*r, *g, *b], ..PointEstimate::default() };
+        let mut before = 0.0;
+        for (sums, discs) in of_maps {
+            let sum: f32 = sums[i][..3].iter().sum();
+            if sum - before >= NEGLIGIBLE * (r + g + b) {
+                found.radius = found.radius.min(discs[i].radius_squared.sqrt());
+                found.is_narrow |= discs[i].narrow != 0;
+            }
+            before = sum;
+        }
+        found
+    };
+    all.iter().enumerate().map(estimate).collect()
+}
+
 /// Counterpart of [`Gather::run_waiting`] for a kd-tree.
 fn kd_estimates(
     gpu: &Gpu,
@@ -144,4 +164,24 @@ fn kd_estimates(
 fn kd_map(gpu: &Gpu, map: &PhotonMap) -> Result<KdMap> {
     let (photons, fluxes) = map.read(gpu)?;
     Ok(KdMap::new(photons, fluxes, map.emitted()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_that_gives_next_to_nothing_says_nothing_of_the_light() {
+        let disc = |radius: f32, narrow| Gathered { radius_squared: radius * radius, narrow, ..Gathered::default() };
+        let found = |caustic: f32| {
+            let sums = |light: f32| vec![[light, light, light, 0.0]];
+            together(&[(sums(1.0), vec![disc(0.2, 0)]), (sums(1.0 + caustic), vec![disc(0.05, 1)])])[0]
+        };
+        let faint = found(0.005);
+        assert_eq!((faint.radius, faint.is_narrow, faint.light), (0.2, false, [1.005; 3]));
+        let bright = found(0.05);
+        assert_eq!((bright.radius, bright.is_narrow), (0.05, true), "control");
+        let none = together(&[(vec![[0.0; 4]], vec![disc(0.2, 0)])])[0];
+        assert_eq!(none.radius, 0.2, "without light");
+    }
 }

@@ -327,10 +327,16 @@ impl Material {
     /// not turn in it goes straight on.
     #[must_use]
     pub fn is_clear_pane(&self) -> bool {
+        matches!(self.surface, Surface::Pane { .. }) && self.is_clear()
+    }
+
+    /// Whether the surface is of glass or a pane, smooth, and all of it is there and transmits.
+    #[must_use]
+    pub fn is_clear(&self) -> bool {
         let Textures { transmission, normal, metallic_roughness, emission, .. } = &self.textures;
         let is_even = [transmission, normal, metallic_roughness, emission].iter().all(|texture| texture.is_none());
         let is_bare = self.transmission == 1.0 && self.metallic == 0.0 && !self.is_finished() && !self.unlit;
-        matches!(self.surface, Surface::Pane { .. })
+        self.surface.transmits()
             && (is_even && is_bare && self.roughness < SHARP_ROUGHNESS)
             && (self.alpha == Alpha::Opaque && self.emission == Vec3::ZERO)
     }

@@ -8,9 +8,9 @@ use crate::{
     error::{Error, Result},
     gpu::{Gpu, Table},
     layout::{
-        self, BLEND_BIT, CLEAR_PANE_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS,
-        MaterialRecord, SECOND_UV_BIT, SMALL_GLASS_BIT, SRGB_BIT, TEXTURE_ROLE_SHIFT, TEXTURE_TEXELS, TextureRecord,
-        UNLIT_BIT, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
+        self, BLEND_BIT, DOUBLE_SIDED_BIT, LINEAR_BIT, MASK_BIT, MATERIAL_MASK, MATERIAL_TEXELS, MaterialRecord,
+        SECOND_UV_BIT, SMALL_GLASS_BIT, SRGB_BIT, TEXTURE_ROLE_SHIFT, TEXTURE_TEXELS, TextureRecord, UNLIT_BIT,
+        WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT, octahedral,
     },
     scene::{Alpha, Attributes, ImageValues, Material, SHARP_ROUGHNESS, Scene, Surface, Texture, Wrap},
     settings::LightUnit,
@@ -93,8 +93,7 @@ fn rows(scene: &Scene, unit: LightUnit, texels: &mut Texels<'_>) -> Vec<[u32; 4]
     let record = |(material, small): (&Material, bool)| {
         let record = record(material, unit, first_row, &mut textures, texels);
         let small = if small { SMALL_GLASS_BIT } else { 0 };
-        let clear = if material.is_clear_pane() { CLEAR_PANE_BIT } else { 0 };
-        MaterialRecord { flags: record.flags | small | clear, ..record }
+        MaterialRecord { flags: record.flags | small, ..record }
     };
     let records: Vec<MaterialRecord> = scene.materials.iter().zip(scene.small_glass()).map(record).collect();
     [bytemuck::cast_slice(&records), bytemuck::cast_slice(&textures)].concat()

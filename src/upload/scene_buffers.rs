@@ -16,8 +16,8 @@ use crate::{
         shaders::{Shader, shader},
     },
     layout::{
-        self, ALPHA_BIT, CONTACT_BIT, INSTANCE, INSTANCED_STACK, Primitive, RANK_SHIFT, SLOT_SHIFT, SPHERE_BIT,
-        TRANSMITS_BIT,
+        self, ALPHA_BIT, CLEAR_BIT, CONTACT_BIT, INSTANCE, INSTANCED_STACK, Primitive, RANK_SHIFT, SLOT_SHIFT,
+        SPHERE_BIT, TRANSMITS_BIT,
     },
     scene::{Alpha, Material, Medium, Scene, Solids},
     settings::{LightSettings, Sampler},
@@ -62,7 +62,7 @@ pub struct SceneBuffers {
     /// Solids and the surfaces that bound them.
     pub solids: Solids,
     /// Nothing but panes that rays to lights pass casts caustics.
-    pub only_clear_panes_cast: bool,
+    pub only_clear_surfaces_cast: bool,
 }
 
 /// The `override` constant that selects a kernel's sampler: the source of its sample numbers.
@@ -134,7 +134,7 @@ impl SceneBuffers {
             is_listed_once: is_listed_once(scene, bvh),
             no_lists: Arc::new(gpu.storage::<u32>("no lists", 1)?),
             contacts,
-            only_clear_panes_cast: only_clear_panes_cast(scene),
+            only_clear_surfaces_cast: only_clear_surfaces_cast(scene, &solids),
             has_lobes: scene.has_lobes(),
             splits: scene
                 .materials
@@ -179,8 +179,8 @@ impl SceneBuffers {
 
     /// Whether rays to lights pass some panes: they would lose light at each listing of one.
     #[must_use]
-    pub fn has_clear_panes(&self) -> bool {
-        self.materials.has_clear_panes && self.is_listed_once
+    pub fn has_clear_surfaces(&self) -> bool {
+        (self.materials.has_clear_panes || self.solids.has_plates()) && self.is_listed_once
     }
 
     /// Whether a ray may visit more than an invocation can.
@@ -220,7 +220,7 @@ impl SceneBuffers {
             ("HAS_ALPHA", f64::from(u8::from(self.materials.has_alpha))),
             ("HAS_VEILS", f64::from(u8::from(self.has_veils()))),
             ("WEIGHS_VEILS", f64::from(u8::from(self.is_listed_once))),
-            ("HAS_CLEAR_PANES", f64::from(u8::from(self.has_clear_panes()))),
+            ("HAS_CLEAR_SURFACES", f64::from(u8::from(self.has_clear_surfaces()))),
             ("HAS_ABSORPTION", f64::from(u8::from(self.has_absorption))),
             ("HAS_VARIED_LIGHTS", f64::from(u8::from(self.lights.table.is_varied))),
             ("WEIGHED_LIGHTS", f64::from(self.lights.table.weighed())),
@@ -270,9 +270,10 @@ impl Split {
     }
 }
 
-fn only_clear_panes_cast(scene: &Scene) -> bool {
+fn only_clear_surfaces_cast(scene: &Scene, solids: &Solids) -> bool {
     let casting = scene.caustic_materials().into_iter().zip(&scene.materials).filter(|(casts, _)| *casts);
-    casting.map(|(_, material)| material).all(Material::is_clear_pane)
+    let are_plates = solids.are_plates() && scene.spheres.is_empty();
+    casting.map(|(_, material)| material).all(|m| m.is_clear_pane() || (are_plates && m.medium().is_some()))
 }
 
 /// Whether the hierarchy lists each of the scene's primitives once.
@@ -303,6 +304,7 @@ fn marked(
     lights: &LightTable,
 ) -> Vec<Primitive> {
     let transmits: Vec<bool> = scene.materials.iter().map(|m| m.surface.transmits()).collect();
+    let is_clear_pane: Vec<bool> = scene.materials.iter().map(Material::is_clear_pane).collect();
     let has_alpha: Vec<bool> = scene.materials.iter().map(|m| m.alpha != Alpha::Opaque).collect();
     let mark = |(p, rank): (&Primitive, &Option<u32>)| {
         if p.emitter == INSTANCE {
@@ -310,8 +312,11 @@ fn marked(
         }
         let of = |marks: &[bool]| marks.get((p.material & !SPHERE_BIT) as usize) == Some(&true);
         let alpha = if of(&has_alpha) { ALPHA_BIT } else { 0 };
+        // A pane in contact with other surfaces is a part of what it makes with them.
+        let is_clear = (of(&is_clear_pane) && rank.is_none()) || solids.is_face_of_plate(p.id);
+        let clear = if is_clear { CLEAR_BIT } else { 0 };
         let transmits = if of(&transmits) { TRANSMITS_BIT } else { 0 };
-        let bits = alpha | transmits | if rank.is_some() { CONTACT_BIT } else { 0 };
+        let bits = alpha | clear | transmits | if rank.is_some() { CONTACT_BIT } else { 0 };
         let material = p.material | bits | (solids.slot(p.id) << SLOT_SHIFT);
         let id = p.id | rank.unwrap_or(0) << RANK_SHIFT;
         Primitive { emitter: lights.emitter(p.id), material, id, ..*p }

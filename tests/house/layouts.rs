@@ -139,7 +139,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         BLEND_BIT,
         UNLIT_BIT,
         SMALL_GLASS_BIT,
-        CLEAR_PANE_BIT,
+        CLEAR_BIT,
         WRAP_REPEAT,
         WRAP_MIRROR,
         WRAP_CLAMP,

@@ -7,7 +7,8 @@
 //! | globes, instances | a globe about a bulb, and instances, keep the same of it | the bulb alone |
 //! | modes | all modes that show direct light show that through a pane | the mode that does not |
 //! | reflection | what a pane reflects is a caustic of the closed form | a pane of another index |
-//! | coats | rough metal and coats see a lamp behind a pane once | the lamp without a pane |
+//! | coats | rough metal and coats see a lamp behind a pane once, and a bulb and the sun behind panes and plates | the lamp without a pane; a pane of half the light |
+//! | plates | the same of solids between two planes, with their absorption; and of things that stand on one | a wedge; the light without absorption |
 
 use caustica::{
     renderer::Render,
@@ -217,4 +218,106 @@ fn rough_lobes_see_a_lamp_behind_a_pane_once() {
     let (through, open) = (seen(Some(pane(Vec3::ONE))), seen(None));
     // The pane takes 8 % along its normal and somewhat more elsewhere; what it reflects is dark.
     assert!((0.8..0.95).contains(&(through / open)), "{through} of {open}");
+}
+
+/// Glass as thin as a window's.
+fn window(ior: f32, tint: Vec3) -> Material {
+    Material::new("window", Surface::Glass { ior, tint })
+}
+
+#[test]
+fn rough_lobes_see_bulbs_and_the_sun_through_windows_once() {
+    let coated = Surface::Layered { base: Vec3::splat(0.5), metallic: 0.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    let metal = Surface::Layered { base: Vec3::ONE, metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
+    let seen = |surface: &Surface, light: &Light, window: Option<(Material, f32)>| {
+        let mut scene = scene(&[diffuse(0.0)]);
+        scene.materials.push(Material { roughness: 0.7, ..Material::new("floor", surface.clone()) });
+        add_quad(&mut scene, vec3(-2.0, 0.0, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z, 1);
+        if let Some((material, thickness)) = window {
+            scene.materials.push(material);
+            if thickness == 0.0 {
+                add_quad(&mut scene, vec3(-2.0, 0.5, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z, 2);
+            } else {
+                add_box(&mut scene, vec3(-2.0, 0.5, -2.0), vec3(2.0, 0.5 + thickness, 2.0), 2);
+            }
+        }
+        scene.lights.push(light.clone());
+        scene.cameras.push(camera(vec3(0.0, 0.4, 1.2), Vec3::ZERO, 30.0));
+        mean(&render_scene(&scene, &settings(Mode::Hybrid, 3000, 16).with(|s| s.picture.spp = 64)))
+    };
+    let clear = Vec3::ONE;
+    for light in [sun(vec3(0.2, -1.0, -0.3)), point_light(vec3(0.3, 1.0, -0.4), 2.0)] {
+        for surface in [&coated, &metal] {
+            let open = seen(surface, &light, None);
+            let thin =
+                seen(surface, &light, Some((Material::new("pane", Surface::Pane { ior: 1.0001, tint: clear }), 0.0)));
+            let thick = seen(surface, &light, Some((window(1.0001, clear), 0.02)));
+            assert!(within(thin, open, 0.005), "{thin} through a pane, {open} without");
+            assert!(within(thick, open, 0.005), "{thick} through a plate, {open} without");
+        }
+    }
+    let light = sun(vec3(0.2, -1.0, -0.3));
+    let half = seen(&metal, &light, Some((window(1.0001, Vec3::splat(0.5f32.sqrt())), 0.02)));
+    assert!(within(half, 0.5 * seen(&metal, &light, None), 0.02), "control: {half}");
+}
+
+#[test]
+fn the_sun_through_a_solid_window_has_the_closed_form_up_to_the_edge_of_a_shadow() {
+    let (thickness, absorption) = (0.02_f32, 20.0_f32);
+    let towards = vec3(0.4, -1.0, 0.0).normalize();
+    let edge = -(towards.x / -towards.y) * 0.6;
+    let lit = |absorption: f32, tilt: f32| {
+        let mut scene = floor_below(diffuse(0.0), 0.0);
+        scene.triangles.retain(|t| t.material == 0);
+        scene.materials[1] = Material { absorption: Vec3::splat(absorption), ..window(1.5, TINT) };
+        add_box(&mut scene, vec3(-2.0, 0.5, -2.0), vec3(2.0, 0.5 + thickness, 2.0), 1);
+        for corner in scene.triangles.iter_mut().flat_map(|t| &mut t.positions).filter(|p| p.y > 0.51) {
+            corner.y += tilt * corner.x;
+        }
+        for triangle in scene.triangles.iter_mut().filter(|t| t.material == 1) {
+            triangle.normals = [triangle.geometric_normal(); 3];
+        }
+        scene.lights.push(sun(towards));
+        add_quad(&mut scene, vec3(-1.9, 0.6, 1.9), (1.9 + edge) * Vec3::X, -3.8 * Vec3::Z, 0);
+        let render = render_scene(&scene, &direct(64));
+        [34, 29].map(|column| render.frame.radiance()[40 * 64 + column].map(f64::from))
+    };
+    let [found, shadow] = lit(absorption, 0.0);
+    let (cosine, ior) = (f64::from(-towards.y), 1.5_f64);
+    let inside = (1.0 - (1.0 - cosine * cosine) / (ior * ior)).sqrt();
+    let square = |a: f64, b: f64| ((a - b) / (a + b)).powi(2);
+    let face = 0.5 * (square(ior * cosine, inside) + square(cosine, ior * inside));
+    let kept = (1.0 - face).powi(2) * (-f64::from(absorption * thickness) / inside).exp();
+    let bare = 3.0 * cosine * 0.5 / std::f64::consts::PI * kept;
+    for (found, tint) in found.iter().zip(TINT.to_array()) {
+        let right = bare * f64::from(tint).powi(2);
+        assert!(within(*found, right, 1e-3), "{found} instead of {right}");
+    }
+    assert_eq!(shadow, [0.0; 3], "in the shadow of the board");
+    assert!(lit(0.0, 0.0)[0][1] > 1.3 * found[1], "control: without absorption");
+    assert_eq!(lit(absorption, 0.002)[0], [0.0; 3], "control: a wedge bends light");
+}
+
+#[test]
+fn lamps_light_through_plates_what_their_photons_do() {
+    // Coloured glass that absorbs; a ball of glass stands on it, and a bar divides it.
+    let plate = |scene: &mut Scene| {
+        scene.triangles.retain(|t| t.material == 0 || t.positions.iter().all(|p| p.z < 0.0));
+        let glass = scene.materials.len() as u32;
+        scene.materials.push(Material { absorption: vec3(3.0, 1.0, 5.0), ..window(1.5, vec3(0.95, 0.9, 0.8)) });
+        add_box(scene, vec3(-1.0, -0.25, -1.0), vec3(1.0, -0.2, 1.0), glass);
+        scene.spheres.push(sphere(vec3(0.5, 0.0, 0.3), 0.2, glass));
+        add_box(scene, vec3(-0.5, -0.25, -0.1), vec3(-0.4, -0.1, 0.1), 0);
+    };
+    let bulb = |s: &mut Scene| s.lights.push(point_light(vec3(0.2, 0.7, -0.4), 3.0));
+    let lights: [fn(&mut Scene); 2] = [bulb, lamp];
+    for (name, light) in ["a bulb", "a lamp"].into_iter().zip(lights) {
+        let mut scene = divided(None, light);
+        plate(&mut scene);
+        let rays = mean(&render_scene(&scene, &settings(Mode::Hybrid, 50_000, 24).with(|s| s.picture.spp = 4)));
+        let photons = mean(&render_scene(&scene, &settings(Mode::Photons, 200_000, 24)));
+        assert!(within(rays, photons, 0.01), "{name}: {rays} by rays, {photons} by photons");
+        let direct = mean(&render_scene(&scene, &direct(24)));
+        assert!(direct > 0.2 * rays, "control: {direct} of {rays} is direct light");
+    }
 }

@@ -126,7 +126,7 @@ impl PhotonTracer {
         for plan in plans(scene, settings, caustics, paths, steered.as_ref()) {
             let enough =
                 paths_that_matter(scene.lights.enclosure, largest).filter(|_| plan.is_for_little_light(settings));
-            let at_panes = (plan.is_for_caustics(settings) && scene.has_clear_panes())
+            let at_panes = (plan.is_for_caustics(settings) && scene.has_clear_surfaces())
                 .then(|| max_paths.min(PATHS_PER_PHOTON_AT_PANES * u64::from(settings.caustic)));
             let max_paths = plan.paths.count.or(enough).or(at_panes).unwrap_or(max_paths);
             self.run(gpu, scene, &plan, settings, (&buffers, batch_limit, max_paths), &mut traced, progress)?;
@@ -183,7 +183,7 @@ impl PhotonTracer {
                 for &kind in plan.fills {
                     let warning = traced.maps[kind].close_if_idle(kind.name(), growth_paths);
                     // What windows alone reflect is little, and mostly out of the house.
-                    let is_expected = kind == MapKind::Caustic && scene.only_clear_panes_cast;
+                    let is_expected = kind == MapKind::Caustic && scene.only_clear_surfaces_cast;
                     traced.warnings.extend(warning.filter(|_| !is_expected));
                 }
             }

@@ -9,6 +9,7 @@
 mod cavities;
 mod closed_lamps;
 mod covers;
+mod plates;
 mod rank;
 mod repair;
 mod shells;

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::{
+    plates::{Plates, plates},
     rank::{self, BoundingVolume},
     shells::Shells,
     solid::{COVER_BIT, NO_SLOT, NONE, SPHERE_BIT, Solid, glass},
@@ -18,6 +19,7 @@ pub struct Solids {
     pub media: Vec<Medium>,
     /// The slots of covers, see `covers.rs`: a bit for each.
     covers: u128,
+    plates: Plates,
     /// Solids that found no slot: there are more kinds that overlap than slots.
     pub without_slot: usize,
 }
@@ -33,6 +35,7 @@ impl Solids {
         };
         let mut found: Vec<Solid> = Vec::new();
         let mut volumes: Vec<BoundingVolume> = Vec::new();
+        let plates = plates(&scene.triangles, &of_surface, &scene.materials);
         let is_own = |solid: u32| solid != NONE && solid & SPHERE_BIT == 0;
         for (triangle, solid) in scene.triangles.iter().zip(&of_surface).filter(|(_, solid)| is_own(**solid)) {
             let index = (*solid & !COVER_BIT) as usize;
@@ -88,7 +91,7 @@ impl Solids {
         let of_covers = found.iter().zip(&slot_of).filter(|(solid, _)| solid.is_cover);
         let covers = of_covers.fold(0, |covers, (_, slot)| covers | 1 << slot);
         let media = materials.iter().filter_map(|material| scene.materials[*material as usize].medium());
-        Self { slots: of_surface.into_iter().map(slot).collect(), media: media.collect(), covers, without_slot }
+        Self { slots: of_surface.into_iter().map(slot).collect(), media: media.collect(), covers, plates, without_slot }
     }
 
     /// Slot of the triangle with that index in the scene, or of a sphere, which follow them.
@@ -101,6 +104,24 @@ impl Solids {
     #[must_use]
     pub fn is_cover(&self, slot: u32) -> bool {
         slot < NO_SLOT && self.covers >> slot & 1 == 1
+    }
+
+    /// Whether the triangle with that index in the scene is a face of a clear plate.
+    #[must_use]
+    pub fn is_face_of_plate(&self, primitive: u32) -> bool {
+        self.plates.is_face.get(primitive as usize) == Some(&true)
+    }
+
+    /// Whether there are plates.
+    #[must_use]
+    pub fn has_plates(&self) -> bool {
+        !self.plates.is_face.is_empty()
+    }
+
+    /// Whether all solids of triangles are plates.
+    #[must_use]
+    pub fn are_plates(&self) -> bool {
+        self.plates.are_all
     }
 
     /// Whether the scene has no solid.
