@@ -39,7 +39,7 @@ pub const LATE_HEADER: u32 = 4;
 /// Entries of a slice at most.
 pub const LATE_SLICE: u32 = 1024;
 /// Words that are kept of a late ray: where it stopped, and its stack.
-pub const LATE_RAY: u32 = 84;
-/// Words that are kept of an entry: whether it is done, and two rays.
-pub const LATE_WORDS: u32 = 1 + 2 * LATE_RAY;
-const _: () = assert!(INSTANCED_STACK + 20 <= LATE_RAY as usize);
+pub const LATE_RAY: u32 = 87;
+/// Words that are kept of an entry: whether it is done, and three rays.
+pub const LATE_WORDS: u32 = 1 + 3 * LATE_RAY;
+const _: () = assert!(INSTANCED_STACK + 23 <= LATE_RAY as usize);

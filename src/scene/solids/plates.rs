@@ -19,6 +19,8 @@ const PLANE: f64 = 1e-3;
 const FLAT: f64 = 1e-5;
 /// Difference of the areas of the faces, at most.
 const UNLIKE: f64 = 0.1;
+/// Fraction of a plate above which what stands on it covers it: hardly any light passes both faces.
+const COVERED: f64 = 0.5;
 
 /// Which triangles are faces of clear plates, and whether all solids of triangles are plates.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -122,15 +124,20 @@ fn candidate(solid: u32, part: &[u32], triangles: &[Triangle], is_clear: &[bool]
 
 /// Whether another solid, of which the normal is that of a plate if it has one, leaves the light
 /// that goes through a plate alone: it may stand on it, or end at it, but not reach into it, nor be
-/// a plate that lies on it.
+/// a plate that lies on it, nor cover most of it.
 fn is_clear_of(plate: &Candidate, other: &[u32], triangles: &[Triangle], normal: Option<&DVec3>) -> bool {
     let slack = 0.01 * (plate.ranges[0].1 - plate.ranges[0].0);
-    let lies_along = normal.is_some_and(|normal| normal.cross(plate.axes[0]).length() < 0.1);
-    (0..3).any(|i| {
+    let overlaps: [f64; 3] = std::array::from_fn(|i| {
         let ((low, high), own) = (range(other, triangles, plate.axes[i]), plate.ranges[i]);
-        let overlap = (high - own.0).min(own.1 - low);
-        overlap <= if i == 0 && lies_along { -slack } else { slack }
-    })
+        (high - own.0).min(own.1 - low)
+    });
+    if overlaps[1..].iter().any(|overlap| *overlap <= slack) {
+        return true;
+    }
+    let size = |i: usize| plate.ranges[i].1 - plate.ranges[i].0;
+    let covered: f64 = [1, 2].map(|i| (overlaps[i] / size(i)).min(1.0)).iter().product();
+    let lies_along = normal.is_some_and(|normal| normal.cross(plate.axes[0]).length() < 0.1);
+    overlaps[0] <= if lies_along || covered > COVERED { -slack } else { slack }
 }
 
 /// Where a solid begins and ends along a direction.
@@ -193,6 +200,8 @@ mod tests {
         let table = block(vec3(-1.0, 0.0, -1.0), vec3(1.0, 0.02, 1.0), as_is);
         let tumbler = block(vec3(-0.1, 0.02, -0.1), vec3(0.1, 0.2, 0.1), as_is);
         assert_eq!(faces(&[table.clone(), tumbler]), 4);
+        let water = block(vec3(-1.0, -0.5, -0.9), vec3(0.8, 0.0, 0.9), as_is);
+        assert_eq!(faces(&[table.clone(), water]), 0, "on water");
         let side = block(vec3(1.0, -0.5, -1.0), vec3(1.02, 0.5, 1.0), as_is);
         assert_eq!(faces(&[table.clone(), side]), 8, "a case of plates");
         let second = block(vec3(-1.0, 0.02, -1.0), vec3(1.0, 0.04, 1.0), as_is);
