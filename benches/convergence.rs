@@ -49,14 +49,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = scene.as_path();
     let mut curves = Vec::new();
     for (name, settings) in [("final gathering", Quality::Normal.settings()), ("photons alone", Settings::default())] {
+        print_head(&format!("{}, {name}", scene.display()), size);
         let rows = measure(scene, settings, passes, size)?;
-        print(&format!("{}, {name}", scene.display()), size, &rows);
+        print_slopes(&rows);
         curves.push((name, rows));
     }
     words.get(2).filter(|path| path.as_str() != "-").map_or(Ok(()), |path| plot(Path::new(path), &curves))
 }
 
-/// Renders the passes.
+/// Renders the passes, and prints a row at each power of two.
 fn measure(path: &Path, settings: Settings, passes: u32, size: u32) -> Result<Vec<Row>, Box<dyn Error>> {
     let scene = Scene::load(path)?;
     let stem = path.file_stem().ok_or("no file")?.to_string_lossy();
@@ -97,14 +98,16 @@ fn measure(path: &Path, settings: Settings, passes: u32, size: u32) -> Result<Ve
         let means = halves.each_ref().map(|half| half.as_ref().map(|film| film.finish().layer("radiance").to_vec()));
         let [Some(even), Some(odd)] = means else { continue };
         let noise = relative(&|i| (f64::from(even[i] - odd[i]) / 2.0).powi(2));
-        rows.push(Row {
+        let row = Row {
             passes: index + 1,
             mean: here.iter().map(|x| f64::from(*x)).sum::<f64>() / (mean * right.len() as f64),
             blocks: rel_mse(&averages(frame.radiance(), 8), &averages(&reference, 8), None),
             estimate: ErrorEstimate::of(total.film(), None),
             noise: noise.sqrt(),
             truth: (relative(&square) - reference_noise(size)).max(0.0).sqrt(),
-        });
+        };
+        print_row(&row);
+        rows.push(row);
     }
     Ok(rows)
 }
@@ -126,7 +129,7 @@ fn reference_noise(size: u32) -> f64 {
     REFERENCE_NOISE * (f64::from(size) / f64::from(REFERENCE)).powi(2)
 }
 
-fn print(name: &str, size: u32, rows: &[Row]) {
+fn print_head(name: &str, size: u32) {
     println!(
         "{name}, {size} x {size}: {PHOTONS} photons a map; noise of the reference {:.2} %",
         100.0 * reference_noise(size).sqrt()
@@ -135,18 +138,22 @@ fn print(name: &str, size: u32, rows: &[Row]) {
         "{:>7} {:>8} {:>10} {:>9} {:>9} {:>9} {:>9} {:>11}",
         "passes", "mean", "8x8 relMSE", "noise %", "est. %", "bias e. %", "error %", "est. / true"
     );
-    for row in rows {
-        let estimate = row.estimate.unwrap_or(ErrorEstimate { noise: f64::NAN, bias: f64::NAN });
-        let Row { passes, mean, blocks, truth, .. } = row;
-        println!(
-            "{passes:>7} {mean:>8.4} {blocks:>10.2e} {:>9.2} {:>9.2} {:>9.2} {:>9.2} {:>11.2}",
-            100.0 * row.noise,
-            100.0 * estimate.noise,
-            100.0 * estimate.bias,
-            100.0 * truth,
-            estimate.total() / truth,
-        );
-    }
+}
+
+fn print_row(row: &Row) {
+    let estimate = row.estimate.unwrap_or(ErrorEstimate { noise: f64::NAN, bias: f64::NAN });
+    let Row { passes, mean, blocks, truth, .. } = row;
+    println!(
+        "{passes:>7} {mean:>8.4} {blocks:>10.2e} {:>9.2} {:>9.2} {:>9.2} {:>9.2} {:>11.2}",
+        100.0 * row.noise,
+        100.0 * estimate.noise,
+        100.0 * estimate.bias,
+        100.0 * truth,
+        estimate.total() / truth,
+    );
+}
+
+fn print_slopes(rows: &[Row]) {
     let slope = |of: &dyn Fn(&Row) -> f64| {
         let points: Vec<(f64, f64)> =
             rows.iter().map(|row| (f64::from(row.passes).ln(), of(row).ln())).filter(|(_, y)| y.is_finite()).collect();

@@ -71,8 +71,8 @@ impl ErrorEstimate {
         };
         let checked = checked.and_then(|all| mean_and_error(all.into_iter().map(beyond)));
         let (more, error) = checked.unwrap_or_else(|| (biases.map_or(0.0, unexplained), 0.0));
-        // Less only where that is no chance.
-        let noise = (noise + (more + error).min(0.0)).max(LEAST_NOISE * noise);
+        // Less only where that is hardly chance.
+        let noise = (noise + (more + 2.0 * error).min(0.0)).max(LEAST_NOISE * noise);
         Some(Self { noise: noise.sqrt(), bias: more.max(0.0).sqrt() })
     }
 
