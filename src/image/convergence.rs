@@ -6,8 +6,6 @@ use crate::settings::Crop;
 /// Fraction of the mean radiance of all pixels that is added to each pixel's own, so that dark
 /// pixels do not decide. Where the mean is 1, the square of the error estimates relMSE.
 const FLOOR: f64 = 0.1;
-/// Fraction of the squared standard error that is noise at least, whatever closer estimates say.
-const LEAST_NOISE: f64 = 0.75;
 /// Fraction of a number of the picture that counts as right at least, whatever its noise and closer
 /// estimates say.
 const LEAST_RIGHT: f64 = 0.25;
@@ -15,8 +13,7 @@ const LEAST_RIGHT: f64 = 0.25;
 /// Relative errors of a picture, root mean squares over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorEstimate {
-    /// Standard error of the means; less where closer estimates say so, for points of one sequence
-    /// spread more from pass to pass than their mean is off.
+    /// Standard error of the means.
     pub noise: f64,
     /// What the error is more than that.
     pub bias: f64,
@@ -69,10 +66,8 @@ impl ErrorEstimate {
             };
             (0..3).map(of_channel).sum::<f64>() / 3.0
         };
-        let checked = checked.and_then(|all| mean_and_error(all.into_iter().map(beyond)));
-        let (more, error) = checked.unwrap_or_else(|| (biases.map_or(0.0, unexplained), 0.0));
-        // Less only where that is hardly chance.
-        let noise = (noise + (more + 2.0 * error).min(0.0)).max(LEAST_NOISE * noise);
+        let checked = checked.and_then(|all| mean(all.into_iter().map(beyond)));
+        let more = checked.unwrap_or_else(|| biases.map_or(0.0, unexplained));
         Some(Self { noise: noise.sqrt(), bias: more.max(0.0).sqrt() })
     }
 
@@ -89,12 +84,10 @@ fn floor_of(numbers: impl Iterator<Item = f64>) -> f64 {
     (FLOOR * sum / count.max(1) as f64).powi(2)
 }
 
-/// Mean of the terms and its standard error; `None` if there are none.
-fn mean_and_error(terms: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    let sums = |(n, sum, squares): (f64, f64, f64), term: f64| (n + 1.0, sum + term, squares + term * term);
-    let (n, sum, squares) = terms.fold((0.0, 0.0, 0.0), sums);
-    let mean = sum / n;
-    (n > 0.0).then(|| (mean, ((squares / n - mean * mean).max(0.0) / n).sqrt()))
+/// Mean of the terms; `None` if there are none.
+fn mean(terms: impl Iterator<Item = f64>) -> Option<f64> {
+    let (n, sum) = terms.fold((0_u64, 0.0), |(n, sum), term| (n + 1, sum + term));
+    (n > 0).then(|| sum / n as f64)
 }
 
 impl Film {
@@ -182,12 +175,9 @@ mod tests {
         let (noise, variance) = (merged(noisy, around), 0.08 / 12.0);
         assert!(is_near(noise.noise, relative(variance, 1.69 - variance)), "{noise:?}");
         assert!(is_near(noise.bias, relative(0.09 - 0.02 / 12.0 - variance, right)), "{noise:?}");
-        // Passes that err oppositely: closer estimates say that their mean is right.
+        // Passes that err oppositely: closer estimates say that their mean is right, by chance.
         let opposite = merged(noisy, [1.3; 4]);
-        assert!(
-            opposite.bias == 0.0 && is_near(opposite.noise, relative(LEAST_NOISE * variance, 1.69 - variance)),
-            "{opposite:?}"
-        );
+        assert!(opposite.bias == 0.0 && opposite.noise == noise.noise, "{opposite:?}");
         assert_eq!(merged(even, [1.3; 4]).total(), 0.0, "control: no difference");
         // A black picture errs by the light that is missing, relative to a tenth of that.
         let black = merged([0.0; 4], [1.0; 4]);

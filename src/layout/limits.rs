@@ -37,7 +37,7 @@ pub const MEDIA_WORDS: usize = 4;
 /// entry of the slice that goes on, and its number of entries.
 pub const LATE_HEADER: u32 = 4;
 /// Entries of a slice at most.
-pub const LATE_SLICE: u32 = 1024;
+pub const LATE_SLICE: u32 = 768;
 /// Words that are kept of a late ray: where it stopped, and its stack.
 pub const LATE_RAY: u32 = 87;
 /// Words that are kept of an entry: whether it is done, and three rays.
