@@ -123,21 +123,18 @@ fn candidate(solid: u32, part: &[u32], triangles: &[Triangle], is_clear: &[bool]
 }
 
 /// Whether another solid, of which the normal is that of a plate if it has one, leaves the light
-/// that goes through a plate alone: it may stand on it, or end at it, but not reach into it, nor be
-/// a plate that lies on it, nor cover most of it.
+/// that goes through a plate alone: it may end at it, stand on it or reach through it, for no
+/// ray to a light passes its own surface; but a plate must not lie on it, and nothing cover most of it.
 fn is_clear_of(plate: &Candidate, other: &[u32], triangles: &[Triangle], normal: Option<&DVec3>) -> bool {
-    let slack = 0.01 * (plate.ranges[0].1 - plate.ranges[0].0);
+    let size = |i: usize| plate.ranges[i].1 - plate.ranges[i].0;
     let overlaps: [f64; 3] = std::array::from_fn(|i| {
         let ((low, high), own) = (range(other, triangles, plate.axes[i]), plate.ranges[i]);
         (high - own.0).min(own.1 - low)
     });
-    if overlaps[1..].iter().any(|overlap| *overlap <= slack) {
-        return true;
-    }
-    let size = |i: usize| plate.ranges[i].1 - plate.ranges[i].0;
-    let covered: f64 = [1, 2].map(|i| (overlaps[i] / size(i)).min(1.0)).iter().product();
+    let is_apart = overlaps[0] < -0.01 * size(0) || overlaps[1..].iter().any(|overlap| *overlap <= 2.0 * size(0));
     let lies_along = normal.is_some_and(|normal| normal.cross(plate.axes[0]).length() < 0.1);
-    overlaps[0] <= if lies_along || covered > COVERED { -slack } else { slack }
+    let covered: f64 = [1, 2].map(|i| (overlaps[i] / size(i)).min(1.0)).iter().product();
+    is_apart || !lies_along && covered <= COVERED
 }
 
 /// Where a solid begins and ends along a direction.
@@ -195,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn others_may_stand_on_a_plate_but_not_lie_on_it_or_in_it() {
+    fn others_may_stand_on_a_plate_but_not_cover_it() {
         let as_is = |p: Vec3| p;
         let table = block(vec3(-1.0, 0.0, -1.0), vec3(1.0, 0.02, 1.0), as_is);
         let tumbler = block(vec3(-0.1, 0.02, -0.1), vec3(0.1, 0.2, 0.1), as_is);
@@ -207,7 +204,11 @@ mod tests {
         let second = block(vec3(-1.0, 0.02, -1.0), vec3(1.0, 0.04, 1.0), as_is);
         assert_eq!(faces(&[table.clone(), second]), 0, "on each other");
         let through = block(vec3(-0.1, -0.2, -0.1), vec3(0.1, 0.2, 0.1), as_is);
-        assert_eq!(faces(&[table.clone(), through]), 0, "in each other");
+        assert_eq!(faces(&[table.clone(), through]), 4, "through it");
+        let around = block(vec3(-2.0, -2.0, -2.0), vec3(2.0, 2.0, 2.0), as_is);
+        assert_eq!(faces(&[table.clone(), around]), 0, "in water");
+        let corner = block(vec3(-1.0, -0.5, -1.0), vec3(1.0, 0.5, -0.98), as_is);
+        assert_eq!(faces(&[table.clone(), corner]), 8, "overlapping at a corner");
         let next = block(vec3(1.0, 0.0, -1.0), vec3(3.0, 0.02, 1.0), as_is);
         assert_eq!(faces(&[table, next]), 8, "beside each other");
     }
