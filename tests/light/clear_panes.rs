@@ -3,7 +3,7 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | sun | a floor behind a tinted pane has the closed form of the pane's transmittance, up to the edge of a shadow | a rough pane, whose light comes by photons |
-//! | lamps and skies | lamps of all kinds and a sky light through a pane what they light by photons alone | no pane |
+//! | lamps and skies | lamps of all kinds and a sky light through a pane what they light by photons alone, a sky without more noise | no pane |
 //! | globes, instances | a globe about a bulb, and instances, keep the same of it | the bulb alone |
 //! | modes | all modes that show direct light show that through a pane | the mode that does not |
 //! | reflection | what a pane reflects is a caustic of the closed form | a pane of another index |
@@ -163,6 +163,16 @@ fn the_sky_lights_a_room_through_its_window() {
     let photons = kept(&settings(Mode::Photons, 200_000, 24));
     assert!(within(rays, photons, 0.01), "{rays} by rays, {photons} by photons");
     assert!(rays < 0.97, "control: {rays}");
+    // With as little noise as through the open window.
+    let pixels = |scene: &Scene, spp: u32| {
+        let settings = settings(Mode::DirectRays, 1000, 32).with(|s| s.picture.spp = spp);
+        render_scene(scene, &settings).frame.radiance().as_flattened().to_vec()
+    };
+    scene.materials[1].surface = Surface::Pane { ior: 1.0001, tint: Vec3::ONE };
+    let right = pixels(&open, 256);
+    let error = |found: Vec<f32>| found.iter().zip(&right).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+    let (found, without) = (error(pixels(&scene, 4)), error(pixels(&open, 4)));
+    assert!(found < 1.2 * without, "{found} with glass, {without} without");
 }
 
 #[test]

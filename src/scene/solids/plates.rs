@@ -123,8 +123,8 @@ fn candidate(solid: u32, part: &[u32], triangles: &[Triangle], is_clear: &[bool]
 }
 
 /// Whether another solid, of which the normal is that of a plate if it has one, leaves the light
-/// that goes through a plate alone: it may end at it, stand on it or reach through it, for no
-/// ray to a light passes its own surface; but a plate must not lie on it, and nothing cover most of it.
+/// that goes through a plate alone: it may end at it, stand on it or reach through it, for no ray
+/// to a light passes its own surface; but a plate must not lie on it, and nothing cover most of it.
 fn is_clear_of(plate: &Candidate, other: &[u32], triangles: &[Triangle], normal: Option<&DVec3>) -> bool {
     let size = |i: usize| plate.ranges[i].1 - plate.ranges[i].0;
     let overlaps: [f64; 3] = std::array::from_fn(|i| {
