@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let passes = words.first().map_or(Ok(PASSES), |word| word.parse())?;
     let size = words.get(1).map_or(Ok(REFERENCE), |word| word.parse())?;
-    if size == 0 || REFERENCE % size != 0 || size % 8 != 0 {
+    if size == 0 || !REFERENCE.is_multiple_of(size) || !size.is_multiple_of(8) {
         return Err(format!("SIZE divides {REFERENCE} and is a multiple of 8, not {size}").into());
     }
     let scene = words.get(3).map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join(SCENE), PathBuf::from);

@@ -241,7 +241,7 @@ fn rough_lobes_see_bulbs_and_the_sun_through_windows_once() {
     let metal = Surface::Layered { base: Vec3::ONE, metallic: 1.0, f0: Vec3::splat(0.04), specular: 1.0 };
     let seen = |surface: &Surface, light: &Light, window: Option<(Material, f32)>| {
         let mut scene = scene(&[diffuse(0.0)]);
-        scene.materials.push(Material { roughness: 0.7, ..Material::new("floor", surface.clone()) });
+        scene.materials.push(Material { roughness: 0.7, ..Material::new("floor", *surface) });
         add_quad(&mut scene, vec3(-2.0, 0.0, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z, 1);
         if let Some((material, thickness)) = window {
             scene.materials.push(material);

@@ -15,8 +15,10 @@ use crate::scene::{Bounds, CompleteTree, Material, Triangle, Visit};
 const RIM: f64 = 0.1;
 /// Sine of the largest angle between normals of one plane, and of the vertices on it.
 const PLANE: f64 = 1e-3;
-/// Distance from a plane over the size of the plate, up to which vertices lie on it.
+/// Distance from a plane up to which vertices lie on it: over the size of the plate, and the
+/// rounding of its largest coordinate.
 const FLAT: f64 = 1e-5;
+const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
 /// Difference of the areas of the faces, at most.
 const UNLIKE: f64 = 0.1;
 /// Fraction of a plate above which what stands on it covers it: hardly any light passes both faces.
@@ -104,7 +106,8 @@ fn candidate(solid: u32, part: &[u32], triangles: &[Triangle], is_clear: &[bool]
     let (low, high) = ranges[0];
     let along = |i: &u32| of(i).positions.map(|p| normal.dot(p.as_dvec3()));
     let size = bounds(part, triangles);
-    let slack = FLAT * f64::from((size.max - size.min).max_element());
+    let farthest = size.min.abs().max(size.max.abs()).max_element();
+    let slack = FLAT * f64::from((size.max - size.min).max_element()) + ROUNDING * f64::from(farthest);
     let is_face = |i: &u32, side: f64, plane: f64| {
         let flat = of(i).geometric_normal();
         let lean = flat.as_dvec3().cross(side * normal).length();
@@ -181,9 +184,11 @@ mod tests {
         assert_eq!(faces(&[window(0.0, &as_is)]), 4);
         let tilted = |p: Vec3| turn * p + vec3(30.0, 2.0, -5.0);
         assert_eq!(faces(&[window(0.0, &tilted)]), 4, "anywhere");
+        let away = |p: Vec3| tilted(p) + vec3(700.0, 0.0, 900.0);
+        assert_eq!(faces(&[window(0.0, &away)]), 4, "far away");
         assert_eq!(faces(&[window(0.0, &tilted), window(0.02, &tilted)]), 8, "double glazing");
         let cube = block(Vec3::ZERO, Vec3::ONE, as_is);
-        assert_eq!(faces(&[cube.clone()]), 0, "a cube");
+        assert_eq!(faces(&[cube]), 0, "a cube");
         let wedge = |p: Vec3| p + vec3(0.0, 0.0, if p.z > 0.003 { 0.003 * p.x } else { 0.0 });
         assert_eq!(faces(&[window(0.0, &wedge)]), 0, "a wedge");
         let mut rounded = window(0.0, &as_is);
