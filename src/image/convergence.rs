@@ -9,6 +9,9 @@ const FLOOR: f64 = 0.1;
 /// Fraction of a number of the picture that counts as right at least, whatever its noise and closer
 /// estimates say.
 const LEAST_RIGHT: f64 = 0.25;
+/// Standard errors that are taken off what closer estimates find: the mean of what exceeds nothing
+/// is else too large.
+const CHANCE: f64 = 0.5;
 
 /// Relative errors of a picture, root mean squares over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +69,8 @@ impl ErrorEstimate {
             };
             (0..3).map(of_channel).sum::<f64>() / 3.0
         };
-        let checked = checked.and_then(|all| mean(all.into_iter().map(beyond)));
+        let checked = checked.and_then(|all| mean_and_error(all.into_iter().map(beyond)));
+        let checked = checked.map(|(mean, error)| mean - CHANCE * error);
         let more = checked.unwrap_or_else(|| biases.map_or(0.0, unexplained));
         Some(Self { noise: noise.sqrt(), bias: more.max(0.0).sqrt() })
     }
@@ -84,10 +88,12 @@ fn floor_of(numbers: impl Iterator<Item = f64>) -> f64 {
     (FLOOR * sum / count.max(1) as f64).powi(2)
 }
 
-/// Mean of the terms; `None` if there are none.
-fn mean(terms: impl Iterator<Item = f64>) -> Option<f64> {
-    let (n, sum) = terms.fold((0_u64, 0.0), |(n, sum), term| (n + 1, sum + term));
-    (n > 0).then(|| sum / n as f64)
+/// Mean of the terms and its standard error; `None` if there are none.
+fn mean_and_error(terms: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let sums = |(n, sum, squares): (f64, f64, f64), term: f64| (n + 1.0, sum + term, squares + term * term);
+    let (n, sum, squares) = terms.fold((0.0, 0.0, 0.0), sums);
+    let mean = sum / n;
+    (n > 0.0).then(|| (mean, ((squares / n - mean * mean).max(0.0) / n).sqrt()))
 }
 
 impl Film {
