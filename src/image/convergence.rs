@@ -9,9 +9,6 @@ const FLOOR: f64 = 0.1;
 /// Fraction of a number of the picture that counts as right at least, whatever its noise and closer
 /// estimates say.
 const LEAST_RIGHT: f64 = 0.25;
-/// Standard errors that are taken off what closer estimates find: the mean of what exceeds nothing
-/// is else too large.
-const CHANCE: f64 = 0.5;
 
 /// Relative errors of a picture, root mean squares over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +67,8 @@ impl ErrorEstimate {
             (0..3).map(of_channel).sum::<f64>() / 3.0
         };
         let checked = checked.and_then(|all| mean_and_error(all.into_iter().map(beyond)));
-        let checked = checked.map(|(mean, error)| mean - CHANCE * error);
+        // Few passes find much by chance, of which only what exceeds nothing counts.
+        let checked = checked.map(|(mean, error)| mean - error / f64::from(film.passes()));
         let more = checked.unwrap_or_else(|| biases.map_or(0.0, unexplained));
         Some(Self { noise: noise.sqrt(), bias: more.max(0.0).sqrt() })
     }
