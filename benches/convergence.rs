@@ -17,6 +17,7 @@ use caustica::{
     settings::{PassSettings, Quality},
 };
 use plotters::prelude::*;
+use support::blocks;
 
 /// Side of references, in pixels.
 const REFERENCE: u32 = 128;
@@ -62,7 +63,7 @@ fn measure(path: &Path, settings: Settings, passes: u32, size: u32) -> Result<Ve
     let scene = Scene::load(path)?;
     let stem = path.file_stem().ok_or("no file")?.to_string_lossy();
     let reference = read_exr(&path.with_file_name(format!("{stem}_{REFERENCE}.exr")))?;
-    let reference = averages(reference.radiance(), REFERENCE / size);
+    let reference = blocks(reference.radiance(), (REFERENCE / size) as usize);
     let settings = settings.with(|s| {
         (s.photons.global, s.photons.caustic) = (PHOTONS, PHOTONS);
         s.picture.size = Some((size, size));
@@ -101,7 +102,7 @@ fn measure(path: &Path, settings: Settings, passes: u32, size: u32) -> Result<Ve
         let row = Row {
             passes: index + 1,
             mean: here.iter().map(|x| f64::from(*x)).sum::<f64>() / (mean * right.len() as f64),
-            blocks: rel_mse(&averages(frame.radiance(), 8), &averages(&reference, 8), None),
+            blocks: rel_mse(&blocks(frame.radiance(), 8), &blocks(&reference, 8), None),
             estimate: ErrorEstimate::of(total.film(), None),
             noise: noise.sqrt(),
             truth: (relative(&square) - reference_noise(size)).max(0.0).sqrt(),
@@ -110,18 +111,6 @@ fn measure(path: &Path, settings: Settings, passes: u32, size: u32) -> Result<Ve
         rows.push(row);
     }
     Ok(rows)
-}
-
-/// Means of blocks of a square picture, which are `of` pixels wide.
-fn averages(radiance: &[[f32; 3]], of: u32) -> Vec<[f32; 3]> {
-    let (side, of) = (radiance.len().isqrt(), of as usize);
-    let (blocks, part) = (side / of, ((of * of) as f32).recip());
-    let mut means = vec![[0.0; 3]; blocks * blocks];
-    for (i, pixel) in radiance.iter().enumerate() {
-        let mean = &mut means[i / side / of * blocks + i % side / of];
-        (0..3).for_each(|c| mean[c] += pixel[c] * part);
-    }
-    means
 }
 
 /// Mean square of the noise of references averaged to this size.

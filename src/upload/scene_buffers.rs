@@ -61,7 +61,7 @@ pub struct SceneBuffers {
     pub lights: LightBuffers,
     /// Solids and the surfaces that bound them.
     pub solids: Solids,
-    /// Nothing but panes that rays to lights pass casts caustics.
+    /// Nothing but panes and plates that rays to lights pass casts caustics.
     pub only_clear_surfaces_cast: bool,
 }
 
@@ -177,7 +177,8 @@ impl SceneBuffers {
         self.materials.has_veils
     }
 
-    /// Whether rays to lights pass some panes: they would lose light at each listing of one.
+    /// Whether rays to lights pass some panes or plates: they would lose light at each listing of
+    /// one.
     #[must_use]
     pub fn has_clear_surfaces(&self) -> bool {
         (self.materials.has_clear_panes || self.solids.has_plates()) && self.is_listed_once
