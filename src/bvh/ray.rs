@@ -43,6 +43,45 @@ impl Bvh {
         })
     }
 
+    /// Whether a ray meets a surface whose material does not let it pass; `direction` is a unit vector.
+    #[must_use]
+    pub fn is_blocked(&self, origin: Vec3, direction: Vec3, passes: &dyn Fn(u32) -> bool) -> bool {
+        self.blocks(0, (origin, direction, LEAST * origin.abs().max_element()), passes)
+    }
+
+    /// Whether something below a node stops the ray, whose coordinates are those of its tree.
+    fn blocks(&self, root: u32, (origin, direction, least): (Vec3, Vec3, f32), passes: &dyn Fn(u32) -> bool) -> bool {
+        let mut waiting = vec![root];
+        while let Some(node) = waiting.pop() {
+            for child in self.nodes[node as usize].children() {
+                if child.bounds.entry(origin, direction, f32::INFINITY).is_none() {
+                    continue;
+                }
+                if child.count == 0 {
+                    waiting.push(child.first);
+                }
+                let primitives = &self.primitives[child.first as usize..(child.first + child.count) as usize];
+                let stops = primitives.iter().any(|primitive| {
+                    if primitive.emitter == INSTANCE {
+                        let instance = &self.instances[primitive.material as usize];
+                        let moved = instance.vector_from_scene(origin - instance.offset());
+                        return self.blocks(
+                            instance.root,
+                            (moved, instance.vector_from_scene(direction), least),
+                            passes,
+                        );
+                    }
+                    distance_to(primitive, origin, direction, least).is_some()
+                        && !passes(primitive.material & MATERIAL_MASK)
+                });
+                if stops {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
     /// Looks for a nearer hit below a node, which belongs to the scene's tree or to that of an
     /// instance. The ray, with its least distance, is in the coordinates of that tree, distances
     /// are the same in all.

@@ -8,6 +8,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use glam::{DVec3, Vec3};
+
 use super::cumulative::cumulative;
 use crate::scene::Environment;
 
@@ -64,6 +66,21 @@ impl EnvironmentMap {
             rotation: environment.rotation,
             pixels: pixels.iter().map(|&p| [p[0], p[1], p[2], mean(p) as f32]).collect(),
         }
+    }
+
+    /// Direction by luminance, uniform within each cell: about as kernels sample them.
+    #[must_use]
+    pub fn direction(&self, u: [f32; 4]) -> Vec3 {
+        let (columns, rows) = (self.columns as usize, self.rows as usize);
+        let row = self.marginal.partition_point(|up_to| *up_to <= u[0]).min(rows);
+        let cells = &self.cells[row * columns..(row + 1) * columns];
+        let column = cells.partition_point(|up_to| *up_to <= u[1]).min(columns - 1);
+        let edge = |row: usize| (PI * (row as f64 - 0.5).clamp(0.0, rows as f64) / rows as f64).cos();
+        let y = edge(row) + f64::from(u[2]) * (edge(row + 1) - edge(row));
+        let (sine, cosine) =
+            (TAU * ((column as f64 + 0.5 + f64::from(u[3])) / columns as f64 - 0.5) - f64::from(self.rotation)).sin_cos();
+        let across = (1.0 - y * y).max(0.0).sqrt();
+        DVec3::new(across * cosine, y, across * sine).as_vec3().normalize()
     }
 }
 

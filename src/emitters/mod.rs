@@ -10,6 +10,7 @@ pub mod light_clusters;
 mod light_media;
 pub mod light_table;
 pub mod light_tree;
+pub mod openings;
 pub mod sight;
 mod surface_lights;
 mod target_shares;

@@ -64,13 +64,9 @@ pub struct Sight {
 impl Sight {
     /// `specular`: spheres around mirrors and glass.
     #[must_use]
-    pub fn new(scene: &Scene, bvh: &Bvh, specular: &[Target]) -> Self {
-        let step = scene.cameras.len().div_ceil(MAX_CAMERAS).max(1);
-        let cameras = scene.cameras.iter().step_by(step);
-        let seen: Vec<SeenPoint> = cameras.flat_map(|camera| points_seen(scene, bvh, camera)).collect();
-        let enclosure = enclosure(&seen);
-        let points: Vec<Vec3> =
-            seen.into_iter().flat_map(|seen| std::iter::once(seen.position).chain(seen.around)).collect();
+    pub fn new(scene: &Scene, seen: &[SeenPoint], specular: &[Target]) -> Self {
+        let enclosure = enclosure(seen);
+        let points: Vec<Vec3> = seen.iter().flat_map(SeenPoint::points).map(|(position, _)| position).collect();
         let targets = spheres_around(&points, &scene_target(scene));
         let fewer = || points.iter().step_by(points.len().div_ceil(MAX_POINTS)).copied().collect::<Vec<_>>();
         let importance = (!targets.is_empty()).then(|| Importance::new(&fewer(), scene.bounds()));
@@ -78,10 +74,27 @@ impl Sight {
     }
 }
 
-/// A point on a diffuse surface that a camera sees, and those that are seen from there.
-struct SeenPoint {
+/// A point on a diffuse surface that a camera sees, and those that are seen from there, each with the
+/// normal on that side.
+#[derive(Clone, Debug)]
+pub struct SeenPoint {
     position: Vec3,
-    around: Vec<Vec3>,
+    normal: Vec3,
+    around: Vec<(Vec3, Vec3)>,
+}
+
+impl SeenPoint {
+    /// The points that the scene's cameras see.
+    #[must_use]
+    pub fn all(scene: &Scene, bvh: &Bvh) -> Vec<Self> {
+        let step = scene.cameras.len().div_ceil(MAX_CAMERAS).max(1);
+        scene.cameras.iter().step_by(step).flat_map(|camera| points_seen(scene, bvh, camera)).collect()
+    }
+
+    /// Position and normal of all.
+    pub fn points(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        std::iter::once((self.position, self.normal)).chain(self.around.iter().copied())
+    }
 }
 
 /// Points that lie near each other follow each other in the list: their rays together give one
@@ -114,8 +127,8 @@ fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<SeenPoint> {
         let (position, normal) = diffuse_hit(scene, bvh, origin, direction)?;
         let directions =
             (0..BOUNCES).map(|bounce| cosine_direction(normal, BOUNCES * (row * size.0 + column) + bounce));
-        let around = directions.filter_map(|d| diffuse_hit(scene, bvh, position, d).map(|(seen, _)| seen)).collect();
-        Some(SeenPoint { position, around })
+        let around = directions.filter_map(|d| diffuse_hit(scene, bvh, position, d)).collect();
+        Some(SeenPoint { position, normal, around })
     };
     let blocks = (0..size.1).step_by(BLOCK).flat_map(|row| (0..size.0).step_by(BLOCK).map(move |column| (column, row)));
     let side = BLOCK as u32;
@@ -212,7 +225,7 @@ mod tests {
             projection: Projection::Perspective { yfov: 0.7 },
             ..Camera::framing(scene.bounds())
         }];
-        Sight::new(&scene, &Bvh::build(&scene), &[])
+        Sight::new(&scene, &SeenPoint::all(&scene, &Bvh::build(&scene)), &[])
     }
 
     #[test]
@@ -256,7 +269,7 @@ mod tests {
             ..Scene::default()
         };
         scene.cameras = vec![Camera { position: Vec3::splat(0.5), ..Camera::framing(scene.bounds()) }];
-        let closed = Sight::new(&scene, &Bvh::build(&scene), &[]).enclosure;
+        let closed = Sight::new(&scene, &SeenPoint::all(&scene, &Bvh::build(&scene)), &[]).enclosure;
         assert!(closed > 0.95, "{closed}");
         assert_eq!(enclosure(&[]), 1.0);
     }

@@ -168,6 +168,8 @@ pub const CAUSTICS_APART: u32 = 32;
 
 /// Bit of a node of the octree over what cameras see that has children.
 pub const IMPORTANCE_CHILDREN: u32 = 0x8000_0000;
+/// Bins along each side of the square of directions of an opening.
+pub const OPENINGS_SIDE: u32 = 64;
 
 /// Maximum number of targets that caustic paths are aimed at.
 pub const MAX_TARGETS: u32 = 32;

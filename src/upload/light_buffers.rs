@@ -11,7 +11,8 @@ use crate::{
         lamps_in_glass::LampsInGlass,
         light_table::{Choices, LightTable},
         set_media,
-        sight::Sight,
+        openings::Openings,
+        sight::{SeenPoint, Sight},
         targets::{Target, scene_target, specular_targets},
     },
     error::Result,
@@ -63,6 +64,8 @@ pub struct LightBuffers {
     pub settings: LightSettings,
     importance_words: Table,
     pub has_environment: bool,
+    /// Whether little of the environment lights a part of what is seen: see [`Openings`].
+    pub has_openings: bool,
     /// Lamps in glass.
     pub lamps: LampsInGlass,
     pub warnings: Vec<String>,
@@ -74,6 +77,7 @@ pub struct LightBuffers {
     environment: Table,
     environment_cells: Table,
     environment_rows: Table,
+    openings: Table,
 }
 
 impl LightBuffers {
@@ -84,9 +88,11 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, (scene, bvh): (&Scene, &Bvh), probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = specular_targets(scene);
-        let Sight { targets: seen, enclosure, importance, shares } = Sight::new(scene, bvh, &targets);
+        let seen_points = SeenPoint::all(scene, bvh);
+        let Sight { targets: seen, enclosure, importance, shares } = Sight::new(scene, &seen_points, &targets);
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
+        let openings = Openings::new(scene, bvh, &seen_points, map.as_ref());
         let mut table = LightTable::new(scene, map.as_ref(), &around, settings)?;
         table.lights.par_iter_mut().for_each(|light| set_media(light, probe));
         // Paths are aimed at what is seen, and at all, as often, whatever the size.
@@ -139,6 +145,8 @@ impl LightBuffers {
             importance,
             settings: settings.clone(),
             has_environment: map.is_some(),
+            has_openings: openings.is_some(),
+            openings: Table::new(gpu, "openings", &openings.as_ref().map_or(vec![0], Openings::words))?,
             lamps: LampsInGlass::new(scene, &table),
             warnings: reduced(scene, map.as_ref()).into_iter().chain(table.warnings.iter().cloned()).collect(),
             lights: gpu.storage_with("lights", &table.lights)?,
@@ -166,13 +174,14 @@ impl LightBuffers {
 
     /// The tables that all passes share.
     #[must_use]
-    pub fn tables(&self) -> [(&'static str, &Table); 5] {
+    pub fn tables(&self) -> [(&'static str, &Table); 6] {
         [
             ("light_nodes", &self.nodes),
             ("environment", &self.environment),
             ("environment_cells", &self.environment_cells),
             ("environment_rows", &self.environment_rows),
             ("importance_table", &self.importance_words),
+            ("openings", &self.openings),
         ]
     }
 }

@@ -226,6 +226,7 @@ impl SceneBuffers {
             ("HAS_VARIED_LIGHTS", f64::from(u8::from(self.lights.table.is_varied))),
             ("WEIGHED_LIGHTS", f64::from(self.lights.table.weighed())),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
+            ("HAS_OPENINGS", f64::from(u8::from(self.lights.has_openings))),
             ("SPLIT", f64::from(u8::from(self.primitives.at + self.nodes.at > 0))),
             ("NODE_SPLIT", self.nodes.constant()),
             ("PRIMITIVE_SPLIT", self.primitives.constant()),

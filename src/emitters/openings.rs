@@ -1,0 +1,371 @@
+//! Openings through which the sky lights what the cameras see: windows, doors, gaps between houses.
+//!
+//! What is seen is divided into regions by place and normal. Rays from points of a region tell from
+//! which directions light of the environment arrives there. Where surfaces keep most of it away,
+//! the region has a histogram of these directions, of which direct light takes a part of its samples
+//! (compare Müller, Gross and Novák 2017, "Practical Path Guiding for Efficient Light-Transport
+//! Simulation"). Wherever the sky is, the environment's own samples fall as well.
+
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+use glam::{Vec2, Vec3, vec2, vec3};
+use rayon::prelude::*;
+
+use super::{cumulative::cumulative, environment_map::EnvironmentMap, sight::SeenPoint};
+use crate::{
+    bvh::Bvh,
+    layout::OPENINGS_SIDE,
+    scene::{Alpha, Environment, Material, Scene, Surface},
+};
+
+/// Bins along each side of the square of directions, and all of them. They are of one size.
+const SIDE: usize = OPENINGS_SIDE as usize;
+const BINS: usize = SIDE * SIDE;
+const BIN_SOLID_ANGLE: f32 = 4.0 * PI / BINS as f32;
+/// Maximum number of points, and of those of a region; minimum number of these.
+const MAX_POINTS: usize = 1 << 13;
+const POINTS: usize = 32;
+const FEWEST: usize = 8;
+/// Rays of a region: towards the environment by its luminance, by the cosine, and into bins that
+/// light came from in one round.
+const TOWARDS_SKY: u32 = 256;
+const BY_COSINE: u32 = 512;
+const INTO_BINS: u32 = 384;
+/// Rounds of the latter, each into bins that light came from in the one before, and into those beside.
+const ROUNDS: u32 = 4;
+/// Fraction of the light that environment's own samples find, above which they are good enough;
+/// part of the samples by the histogram where they find nothing, and least part.
+const ENOUGH: f32 = 0.4;
+const MOST: f32 = 0.9;
+const LEAST: f32 = 0.1;
+/// How far the bounds of a region reach beyond its points, in its largest extent: points lie that
+/// far apart.
+const MARGIN: f32 = 0.25;
+/// Least light from a bin, in units of the mean of those that light may come from.
+const FLOOR: f64 = 0.3;
+/// Rays beside which edges of openings are looked for, at most; and how far beside, radians.
+const MAX_EDGES: usize = 32;
+const EDGE: f32 = 0.15;
+/// Minimum radius of a sphere that shows openings, in those of the region.
+const CLEARANCE: f32 = 1.3;
+/// Words before the nodes: the roots of the trees, one for each of the normals' six directions, and
+/// the number of the nodes' words.
+const HEAD: usize = 8;
+/// Words of a region before its distributions: bounds, the part of the samples, and the sphere.
+const REGION_HEAD: usize = 12;
+/// In place of an axis: a leaf.
+const LEAF: u32 = 3;
+/// Steps of low-discrepancy sequences in four dimensions (Roberts 2018, "The Unreasonable
+/// Effectiveness of Quasirandom Sequences").
+const STEPS: [f64; 4] = [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_039_774, 0.538_596_908_569_094];
+
+/// The regions, in a tree for each of the six directions that normals are closest to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Openings {
+    roots: [u32; 6],
+    nodes: Vec<Node>,
+    regions: Vec<Region>,
+}
+
+/// Half spaces at a plane perpendicular to an axis, or a region.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Node {
+    /// Two nodes follow each other, the one below `at` first.
+    Inner { axis: u32, at: f32, first: u32 },
+    /// Index of a region; none: the sky is sampled as if nothing hid it.
+    Leaf(Option<u32>),
+}
+
+/// Surfaces near each other that face about the same way.
+#[derive(Clone, Debug, PartialEq)]
+struct Region {
+    low: Vec3,
+    high: Vec3,
+    /// Part of the samples that the histogram draws, 0 to 1.
+    part: f32,
+    sphere: Sphere,
+    /// Light from each bin of directions from the middle of the sphere, in units of its own.
+    bins: Vec<f64>,
+}
+
+/// What rays from points need.
+struct Surroundings<'a> {
+    bvh: &'a Bvh,
+    environment: &'a Environment,
+    map: &'a EnvironmentMap,
+    /// Materials that light of the sky may pass straight.
+    passes: Vec<bool>,
+}
+
+impl Openings {
+    /// The openings before the points that cameras see; none if there is no region that needs them.
+    #[must_use]
+    pub fn new(scene: &Scene, bvh: &Bvh, seen: &[SeenPoint], map: Option<&EnvironmentMap>) -> Option<Self> {
+        let around = Surroundings {
+            bvh,
+            environment: scene.environment.as_ref().filter(|environment| !environment.is_dark())?,
+            map: map?,
+            passes: scene.materials.iter().map(may_pass).collect(),
+        };
+        let all = || seen.iter().flat_map(SeenPoint::points);
+        let step = all().count().div_ceil(MAX_POINTS).max(1);
+        let mut sides: [Vec<(Vec3, Vec3)>; 6] = Default::default();
+        all().step_by(step).for_each(|point| sides[side_of(point.1)].push(point));
+        let (mut nodes, mut groups, mut roots) = (Vec::new(), Vec::new(), [0; 6]);
+        for (root, points) in roots.iter_mut().zip(sides) {
+            *root = nodes.len() as u32;
+            nodes.push(Node::Leaf(None));
+            split(*root as usize, points, &mut nodes, &mut groups);
+        }
+        let found: Vec<Option<Region>> = groups.par_iter().map(|(_, points)| around.region(points)).collect();
+        let mut regions = Vec::new();
+        for ((leaf, _), region) in groups.into_iter().zip(found) {
+            nodes[leaf] = Node::Leaf(region.is_some().then_some(regions.len() as u32));
+            regions.extend(region);
+        }
+        (!regions.is_empty()).then_some(Self { roots, nodes, regions })
+    }
+
+    /// The regions as `shaders/lib/transport/openings.wesl` reads them.
+    #[must_use]
+    pub fn words(&self) -> Vec<u32> {
+        let first_region = (HEAD + 2 * self.nodes.len()) as u32;
+        let stride = (REGION_HEAD + SIDE + BINS) as u32;
+        let node = |node: &Node| match *node {
+            Node::Inner { axis, at, first } => [at.to_bits(), axis << 30 | first],
+            Node::Leaf(region) => [region.map_or(0, |region| first_region + stride * region), LEAF << 30],
+        };
+        let head = self.roots.into_iter().chain([0; HEAD - 6]);
+        let nodes = self.nodes.iter().flat_map(node);
+        head.chain(nodes).chain(self.regions.iter().flat_map(Region::words)).collect()
+    }
+}
+
+impl Region {
+    fn words(&self) -> Vec<u32> {
+        let rows: Vec<f64> = self.bins.chunks(SIDE).map(|row| row.iter().sum()).collect();
+        let Self { low, high, part, sphere: Sphere { center, radius }, .. } = *self;
+        let head = [low.x, low.y, low.z, part, high.x, high.y, high.z, 1.0 / radius, center.x, center.y, center.z, 0.0];
+        let columns = self.bins.chunks(SIDE).flat_map(cumulative);
+        head.into_iter().chain(cumulative(&rows)).chain(columns).map(f32::to_bits).collect()
+    }
+}
+
+impl Surroundings<'_> {
+    fn region(&self, points: &[(Vec3, Vec3)]) -> Option<Region> {
+        if points.len() < FEWEST {
+            return None;
+        }
+        let point = |ray: u32| points[ray as usize % points.len()];
+        let (mut found, mut all, mut arrived) = (0.0, 0.0, Vec::new());
+        for ray in 0..TOWARDS_SKY {
+            let ray = self.ray(point(ray), self.map.direction(numbers(ray)));
+            all += ray.cosine.max(0.0);
+            if ray.light > 0.0 {
+                found += ray.cosine;
+                arrived.push(ray);
+            }
+        }
+        let part = MOST * (1.0 - found / (ENOUGH * all));
+        // NaN: nothing of the sky lies above.
+        if part.is_nan() || part < LEAST {
+            return None;
+        }
+        let by_sky = arrived.len();
+        let by_cosine =
+            (0..BY_COSINE).map(|ray| self.ray(point(ray), cosine_direction(point(ray).1, numbers(ray))));
+        arrived.extend(by_cosine.filter(|ray| ray.light > 0.0));
+        let bounds = |of: fn(Vec3, Vec3) -> Vec3| points.iter().map(|(p, _)| *p).reduce(of).unwrap_or_default();
+        let (low, high) = (bounds(Vec3::min), bounds(Vec3::max));
+        let margin = Vec3::splat(MARGIN * (high - low).max_element());
+        let (low, high) = (low - margin, high + margin);
+        let sphere = self.sphere(0.5 * (low + high), 0.5 * (high - low).length(), &arrived);
+        let mut into = Vec::new();
+        let mut rays_into = vec![0_u32; BINS];
+        for round in 0..ROUNDS {
+            let lit = widened(&lit_bins(&arrived, &sphere));
+            into = (0..BINS).filter(|bin| lit[*bin]).collect();
+            let rays = if into.is_empty() { 0 } else { INTO_BINS };
+            for ray in round * INTO_BINS..round * INTO_BINS + rays {
+                let (from, [x, y, ..]) = (point(ray), numbers(ray));
+                // All points send rays into all bins: their numbers may have a common divisor.
+                let bin = into[(ray as usize + ray as usize / points.len()) % into.len()];
+                let place = vec2((bin % SIDE) as f32 + x, (bin / SIDE) as f32 + y) / SIDE as f32;
+                rays_into[bin] += 1;
+                let ray = self.ray(from, sphere.direction(from.0, direction_of(place)));
+                arrived.extend((ray.light > 0.0).then_some(ray));
+            }
+        }
+        // Balance heuristic: Veach 1997, section 9.2.
+        let mut bins = vec![0.0; BINS];
+        for ray in &arrived[by_sky..] {
+            let (on_sphere, stretch) = sphere.seen(ray.origin, ray.direction);
+            let bin = bin_of(on_sphere);
+            let density = BY_COSINE as f32 * ray.cosine / PI + rays_into[bin] as f32 / BIN_SOLID_ANGLE * stretch;
+            bins[bin] += f64::from(ray.light / density);
+        }
+        // What no ray found in a bin that light may come from after all would be a white dot.
+        let least = FLOOR * bins.iter().sum::<f64>() / into.len().max(1) as f64;
+        into.iter().for_each(|bin| bins[*bin] = bins[*bin].max(least));
+        bins.iter().any(|bin| *bin > 0.0).then_some(Region { low, high, part, sphere, bins })
+    }
+
+    fn ray(&self, (origin, normal): (Vec3, Vec3), direction: Vec3) -> Ray {
+        let cosine = normal.dot(direction);
+        let is_lit = cosine > 0.0 && !self.bvh.is_blocked(origin, direction, &|m| self.passes[m as usize]);
+        let light = if is_lit { cosine * self.environment.radiance(direction).element_sum() } else { 0.0 };
+        Ray { origin, direction, cosine, light }
+    }
+
+    /// The sphere through the edges of the openings that light arrives by: of those through what
+    /// is met beside such rays and the one without bounds, that on which light comes from the
+    /// fewest bins. `radius`: that of the region.
+    fn sphere(&self, center: Vec3, radius: f32, arrived: &[Ray]) -> Sphere {
+        let far = Sphere { center, radius: f32::INFINITY };
+        let mut distances = Vec::new();
+        for ray in arrived.iter().step_by(arrived.len().div_ceil(MAX_EDGES).max(1)) {
+            let (right, up) = ray.direction.any_orthonormal_pair();
+            for aside in [right, -right, up, -up] {
+                let direction = (ray.direction + EDGE * aside).normalize();
+                distances.extend(self.bvh.nearest_hit(ray.origin, direction).map(|hit| hit.position.distance(center)));
+            }
+        }
+        distances.retain(|distance| *distance > CLEARANCE * radius);
+        distances.sort_by(f32::total_cmp);
+        let quantile = |q: usize| distances.get(q * distances.len() / 4).copied();
+        let near = [1, 2, 3].into_iter().filter_map(quantile).map(|radius| Sphere { center, radius });
+        let bins = |sphere: &Sphere| lit_bins(arrived, sphere).into_iter().filter(|is_lit| *is_lit).count();
+        std::iter::once(far).chain(near).min_by_key(bins).unwrap_or(far)
+    }
+}
+
+/// A ray from a surface, and the light of the sky that arrives along it, times the cosine.
+struct Ray {
+    origin: Vec3,
+    direction: Vec3,
+    cosine: f32,
+    light: f32,
+}
+
+/// A sphere on which a region sees its openings. An infinite one shows all points the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sphere {
+    center: Vec3,
+    radius: f32,
+}
+
+impl Sphere {
+    /// Where a ray from within meets the sphere, as the direction from its centre; and the solid
+    /// angle there over that at the origin.
+    fn seen(&self, origin: Vec3, direction: Vec3) -> (Vec3, f32) {
+        if self.radius == f32::INFINITY {
+            return (direction, 1.0);
+        }
+        let from = (origin - self.center) / self.radius;
+        let along = from.dot(direction);
+        let distance = (along * along + 1.0 - from.length_squared()).max(0.0).sqrt() - along;
+        let met = (from + distance * direction).normalize();
+        (met, distance * distance / met.dot(direction))
+    }
+
+    /// Direction from a point within to that on the sphere.
+    fn direction(&self, origin: Vec3, on_sphere: Vec3) -> Vec3 {
+        if self.radius == f32::INFINITY {
+            return on_sphere;
+        }
+        (on_sphere - (origin - self.center) / self.radius).normalize()
+    }
+}
+
+fn lit_bins(arrived: &[Ray], sphere: &Sphere) -> Vec<bool> {
+    let mut lit = vec![false; BINS];
+    arrived.iter().for_each(|ray| lit[bin_of(sphere.seen(ray.origin, ray.direction).0)] = true);
+    lit
+}
+
+/// Whether light may go straight on through a surface of the material, as far as a guess goes.
+fn may_pass(material: &Material) -> bool {
+    matches!(material.surface, Surface::Glass { .. } | Surface::Pane { .. }) || material.alpha != Alpha::Opaque
+}
+
+/// Divides points at the middle of their longest extent until few are left.
+fn split(
+    node: usize,
+    mut points: Vec<(Vec3, Vec3)>,
+    nodes: &mut Vec<Node>,
+    groups: &mut Vec<(usize, Vec<(Vec3, Vec3)>)>,
+) {
+    if points.len() <= POINTS {
+        groups.push((node, points));
+        return;
+    }
+    let bounds = |of: fn(Vec3, Vec3) -> Vec3| points.iter().map(|(p, _)| *p).reduce(of).unwrap_or_default();
+    let axis = (bounds(Vec3::max) - bounds(Vec3::min)).max_position();
+    points.sort_by(|(a, _), (b, _)| a[axis].total_cmp(&b[axis]));
+    let upper = points.split_off(points.len() / 2);
+    let first = nodes.len() as u32;
+    nodes[node] = Node::Inner { axis: axis as u32, at: upper[0].0[axis], first };
+    nodes.extend([Node::Leaf(None); 2]);
+    split(first as usize, points, nodes, groups);
+    split(first as usize + 1, upper, nodes, groups);
+}
+
+/// Number of the direction of an axis that a normal is closest to.
+fn side_of(normal: Vec3) -> usize {
+    let axis = normal.abs().max_position();
+    2 * axis + usize::from(normal[axis] < 0.0)
+}
+
+fn numbers(i: u32) -> [f32; 4] {
+    STEPS.map(|step| (0.5 + step * f64::from(i)).fract() as f32)
+}
+
+fn cosine_direction(normal: Vec3, [u, v, ..]: [f32; 4]) -> Vec3 {
+    let (right, up) = normal.any_orthonormal_pair();
+    let (sine, cosine) = (2.0 * PI * v).sin_cos();
+    let local = vec3(u.sqrt() * cosine, u.sqrt() * sine, (1.0 - u).max(1e-6).sqrt());
+    (local.x * right + local.y * up + local.z * normal).normalize()
+}
+
+/// Bins that are lit, and those beside them.
+fn widened(lit: &[bool]) -> Vec<bool> {
+    let mut wide = lit.to_vec();
+    let side = BIN_SOLID_ANGLE.sqrt();
+    for bin in (0..BINS).filter(|bin| lit[*bin]) {
+        let middle = direction_of(vec2((bin % SIDE) as f32 + 0.5, (bin / SIDE) as f32 + 0.5) / SIDE as f32);
+        let (right, up) = middle.any_orthonormal_pair();
+        for turn in 0..8 {
+            let (sine, cosine) = (turn as f32 * FRAC_PI_4).sin_cos();
+            wide[bin_of((middle + side * (cosine * right + sine * up)).normalize())] = true;
+        }
+    }
+    wide
+}
+
+fn bin_of(direction: Vec3) -> usize {
+    let place = (SIDE as f32 * square_of(direction)).as_uvec2().min(glam::UVec2::splat(OPENINGS_SIDE - 1));
+    (place.x + OPENINGS_SIDE * place.y) as usize
+}
+
+/// Place of a direction in the unit square, by the octahedron, areas kept (Clarberg 2008, "Fast
+/// Equal-Area Mapping of the (Hemi)Sphere using SIMD").
+fn square_of(direction: Vec3) -> Vec2 {
+    let d = direction.abs();
+    let r = (1.0 - d.z).max(0.0).sqrt();
+    let phi = if d.x == 0.0 && d.y == 0.0 { 0.0 } else { d.y.atan2(d.x) / FRAC_PI_2 };
+    let upper = vec2(r - r * phi, r * phi);
+    let place = if direction.z < 0.0 { vec2(1.0 - upper.y, 1.0 - upper.x) } else { upper };
+    0.5 + 0.5 * vec2(place.x.copysign(direction.x), place.y.copysign(direction.y))
+}
+
+/// The direction at a place in the unit square: the inverse of [`square_of`].
+fn direction_of(place: Vec2) -> Vec3 {
+    let centered = 2.0 * place - 1.0;
+    let p = centered.abs();
+    let inside = 1.0 - (p.x + p.y);
+    let r = 1.0 - inside.abs();
+    let phi = if r == 0.0 { 1.0 } else { (p.y - p.x) / r + 1.0 } * FRAC_PI_4;
+    let z = (1.0 - r * r).copysign(inside);
+    let across = r * (2.0 - r * r).max(0.0).sqrt();
+    vec3((across * phi.cos()).copysign(centered.x), (across * phi.sin()).copysign(centered.y), z).normalize()
+}
