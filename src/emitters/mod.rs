@@ -2,6 +2,7 @@
 //! emissive triangles and spheres, the environment. Host only; `upload` puts it on the device.
 
 mod cumulative;
+pub mod entries;
 pub mod environment_map;
 pub mod importance;
 pub mod lamps_in_glass;

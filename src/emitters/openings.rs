@@ -41,6 +41,8 @@ const LEAST: f32 = 0.1;
 /// How far the bounds of a region reach beyond its points, in its largest extent: points lie that
 /// far apart.
 const MARGIN: f32 = 0.25;
+/// Maximum number of rays by the cosine that are kept of a region.
+const FEW_RAYS: usize = 32;
 /// Least light from a bin, in units of the mean of those that light may come from.
 const FLOOR: f64 = 0.3;
 /// Rays beside which edges of openings are looked for, at most; and how far beside, radians.
@@ -65,6 +67,8 @@ pub struct Openings {
     roots: [u32; 6],
     nodes: Vec<Node>,
     regions: Vec<Region>,
+    /// Number of regions that were looked at.
+    all: usize,
 }
 
 /// Half spaces at a plane perpendicular to an axis, or a region.
@@ -84,6 +88,8 @@ struct Region {
     /// Part of the samples that the histogram draws, 0 to 1.
     part: f32,
     sphere: Sphere,
+    /// A few of the rays that light arrived along.
+    rays: Vec<(Vec3, Vec3)>,
     /// Light from each bin of directions from the middle of the sphere, in units of its own.
     bins: Vec<f64>,
 }
@@ -118,12 +124,24 @@ impl Openings {
             split(*root as usize, points, &mut nodes, &mut groups);
         }
         let found: Vec<Option<Region>> = groups.par_iter().map(|(_, points)| around.region(points)).collect();
+        let all = groups.len();
         let mut regions = Vec::new();
         for ((leaf, _), region) in groups.into_iter().zip(found) {
             nodes[leaf] = Node::Leaf(region.is_some().then_some(regions.len() as u32));
             regions.extend(region);
         }
-        (!regions.is_empty()).then_some(Self { roots, nodes, regions })
+        (!regions.is_empty()).then_some(Self { roots, nodes, regions, all })
+    }
+
+    /// Fraction of what is seen that the sky lights through openings, 0 to 1.
+    #[must_use]
+    pub fn fraction(&self) -> f32 {
+        self.regions.len() as f32 / self.all as f32
+    }
+
+    /// Rays from surfaces through the openings: origins and directions.
+    pub fn rays(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        self.regions.iter().flat_map(|region| region.rays.iter().copied())
     }
 
     /// The regions as `shaders/lib/transport/openings.wesl` reads them.
@@ -179,14 +197,16 @@ impl Surroundings<'_> {
         let (low, high) = (bounds(Vec3::min), bounds(Vec3::max));
         let margin = Vec3::splat(MARGIN * (high - low).max_element());
         let (low, high) = (low - margin, high + margin);
+        let few = arrived.iter().skip(by_sky).step_by((arrived.len() - by_sky).div_ceil(FEW_RAYS).max(1));
+        let rays = few.map(|ray| (ray.origin, ray.direction)).collect();
         let sphere = self.sphere(0.5 * (low + high), 0.5 * (high - low).length(), &arrived);
         let mut into = Vec::new();
         let mut rays_into = vec![0_u32; BINS];
         for round in 0..ROUNDS {
             let lit = widened(&lit_bins(&arrived, &sphere));
             into = (0..BINS).filter(|bin| lit[*bin]).collect();
-            let rays = if into.is_empty() { 0 } else { INTO_BINS };
-            for ray in round * INTO_BINS..round * INTO_BINS + rays {
+            let number = if into.is_empty() { 0 } else { INTO_BINS };
+            for ray in round * INTO_BINS..round * INTO_BINS + number {
                 let (from, [x, y, ..]) = (point(ray), numbers(ray));
                 // All points send rays into all bins: their numbers may have a common divisor.
                 let bin = into[(ray as usize + ray as usize / points.len()) % into.len()];
@@ -207,7 +227,7 @@ impl Surroundings<'_> {
         // What no ray found in a bin that light may come from after all would be a white dot.
         let least = FLOOR * bins.iter().sum::<f64>() / into.len().max(1) as f64;
         into.iter().for_each(|bin| bins[*bin] = bins[*bin].max(least));
-        bins.iter().any(|bin| *bin > 0.0).then_some(Region { low, high, part, sphere, bins })
+        bins.iter().any(|bin| *bin > 0.0).then_some(Region { low, high, part, sphere, rays, bins })
     }
 
     fn ray(&self, (origin, normal): (Vec3, Vec3), direction: Vec3) -> Ray {
@@ -284,7 +304,7 @@ fn lit_bins(arrived: &[Ray], sphere: &Sphere) -> Vec<bool> {
 }
 
 /// Whether light may go straight on through a surface of the material, as far as a guess goes.
-fn may_pass(material: &Material) -> bool {
+pub(super) fn may_pass(material: &Material) -> bool {
     matches!(material.surface, Surface::Glass { .. } | Surface::Pane { .. }) || material.alpha != Alpha::Opaque
 }
 
@@ -332,7 +352,7 @@ fn widened(lit: &[bool]) -> Vec<bool> {
     let mut wide = lit.to_vec();
     let side = BIN_SOLID_ANGLE.sqrt();
     for bin in (0..BINS).filter(|bin| lit[*bin]) {
-        let middle = direction_of(vec2((bin % SIDE) as f32 + 0.5, (bin / SIDE) as f32 + 0.5) / SIDE as f32);
+        let middle = middle_of(bin);
         let (right, up) = middle.any_orthonormal_pair();
         for turn in 0..8 {
             let (sine, cosine) = (turn as f32 * FRAC_PI_4).sin_cos();
@@ -340,6 +360,10 @@ fn widened(lit: &[bool]) -> Vec<bool> {
         }
     }
     wide
+}
+
+fn middle_of(bin: usize) -> Vec3 {
+    direction_of(vec2((bin % SIDE) as f32 + 0.5, (bin / SIDE) as f32 + 0.5) / SIDE as f32)
 }
 
 fn bin_of(direction: Vec3) -> usize {

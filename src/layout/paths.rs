@@ -127,7 +127,8 @@ pub struct PhotonBatch {
     pub aim: [f32; 4],
     /// Photons are stored with the probability importance times this, at most 1; 0: all are stored.
     pub kept_scale: f32,
-    pub pad0: u32,
+    /// Targets after those that parallel light alone is aimed at.
+    pub entry_count: u32,
     pub pad1: u32,
     pub pad2: u32,
 }

@@ -298,7 +298,8 @@ pub struct Target {
     /// Fraction of the paths that are aimed at it whatever its size; 0 to 1 in all. The others are
     /// shared out by size.
     pub share: f32,
-    pub pad0: f32,
+    /// The same of paths of parallel light and of the environment.
+    pub parallel_share: f32,
     pub pad1: f32,
     pub pad2: f32,
 }

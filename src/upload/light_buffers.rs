@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::{
     bvh::{Bvh, MediaProbe},
     emitters::{
+        entries::entries,
         environment_map::EnvironmentMap,
         importance::Importance,
         lamps_in_glass::LampsInGlass,
@@ -21,6 +22,9 @@ use crate::{
     scene::Scene,
     settings::LightSettings,
 };
+
+/// Fraction of the paths of parallel light that are aimed at where it enters.
+const BY_ENTRIES: f32 = 0.7;
 
 /// A table of [`Choices`] on the device, `array<LightChoice>`.
 #[derive(Debug)]
@@ -49,10 +53,12 @@ pub struct LightBuffers {
     /// The table for paths aimed at what the cameras see, if spheres lie around that.
     pub towards_seen: Option<ChoiceBuffer>,
     /// Number of spheres around what the cameras see, and around mirrors and glass. In `targets`,
-    /// the sphere around the scene lies between them.
+    /// the sphere around the scene lies between them, followed by the entries.
     pub seen_targets: u32,
     /// The smallest sphere around what the cameras see, centre and radius, metres; radius 0: none.
     pub seen: [f32; 4],
+    /// Number of spheres that parallel light enters by, after that around the scene.
+    pub entries: u32,
     pub specular_targets: u32,
     /// Whether photons of mirrors and glass have quite different powers.
     pub mixes_powers: bool,
@@ -101,15 +107,22 @@ impl LightBuffers {
             let choices = table.for_seen_photons(seen, &around, settings);
             ChoiceBuffer::new(gpu, "light choices towards what is seen", &choices)
         });
-        let general = seen.iter().chain([&around]).map(|sphere| (sphere, even));
+        let entries = entries(scene, bvh, &seen_points, openings.as_ref(), &around);
+        let by_entries = if entries.is_empty() { 0.0 } else { BY_ENTRIES };
+        let sizes: f32 = entries.iter().map(|sphere| sphere.radius * sphere.radius).sum();
+        let general = seen.iter().chain([&around]).map(|sphere| (sphere, even, even * (1.0 - by_entries)));
+        let entering =
+            entries.iter().map(|sphere| (sphere, 0.0, by_entries * sphere.radius * sphere.radius / sizes));
         let mixes_powers = shares.iter().any(|share| *share > 0.0);
-        let specular = targets.iter().zip(shares);
+        let specular = targets.iter().zip(shares).map(|(sphere, share)| (sphere, share, share));
         let spheres: Vec<layout::Target> = general
+            .chain(entering)
             .chain(specular)
-            .map(|(Target { center, radius }, share)| layout::Target {
+            .map(|(Target { center, radius }, share, parallel_share)| layout::Target {
                 center: center.to_array(),
                 radius: *radius,
                 share,
+                parallel_share,
                 ..Default::default()
             })
             .collect();
@@ -134,6 +147,7 @@ impl LightBuffers {
             towards_seen: towards_seen.transpose()?,
             seen_targets: seen.len() as u32,
             seen: seen.first().map_or([0.0; 4], |target| target.center.extend(target.radius).to_array()),
+            entries: entries.len() as u32,
             specular_targets: targets.len() as u32,
             mixes_powers,
             enclosure,

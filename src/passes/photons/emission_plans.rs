@@ -35,6 +35,7 @@ pub(super) struct EmissionPlan<'a> {
     stream: u32,
     first_target: u32,
     target_count: u32,
+    entry_count: u32,
     /// Rules of all batches: [`layout::AIM`], [`layout::CAUSTICS_APART`], and the rules of the mode
     /// that apply to these paths.
     rules: u32,
@@ -120,8 +121,9 @@ pub(super) fn plans<'a>(
     let caustic = EmissionPlan {
         choices: &lights.aimed,
         stream: layout::STREAM_CAUSTIC,
-        first_target: lights.seen_targets + 1,
+        first_target: lights.seen_targets + 1 + lights.entries,
         target_count: lights.specular_targets,
+        entry_count: 0,
         rules: layout::AIM | layout::CAUSTICS_APART,
         fills: &[MapKind::Caustic],
         paths: paths.caustic,
@@ -141,6 +143,7 @@ fn unsteered<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings) -> Emission
         stream: layout::STREAM_PHOTON,
         first_target: lights.seen_targets,
         target_count: 1,
+        entry_count: if aimed { lights.entries } else { 0 },
         // Rays of final gathering see light that was scattered diffusely before it came through
         // glass.
         rules: rule(aimed, layout::AIM)
@@ -188,6 +191,7 @@ impl EmissionPlan<'_> {
             stream: self.stream,
             first_target: self.first_target,
             target_count: self.target_count,
+            entry_count: self.entry_count,
             aim: self.aim,
             kept_scale: self.kept_scale,
             least_kept: self.least_kept,

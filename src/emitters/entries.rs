@@ -1,0 +1,115 @@
+//! Spheres at the places where parallel light and that of the environment enter what the cameras
+//! see: windows that the sky shines in by, and patches of sun. Photon paths are aimed at them, as
+//! most of those that are spread over the scene would end on its roof.
+
+use glam::{UVec3, Vec3, uvec3};
+use rayon::prelude::*;
+
+use super::{
+    openings::{Openings, may_pass},
+    sight::SeenPoint,
+    targets::{Item, Target, spheres_around},
+};
+use crate::{
+    bvh::Bvh,
+    scene::{Bounds, LightKind, Scene},
+};
+
+/// Maximum number of spheres.
+const MAX_ENTRIES: u32 = 8;
+/// Minimum number of points that the sun reaches.
+const FEWEST: usize = 8;
+/// Fraction of what is seen that a parallel light reaches, up to which it has to be aimed.
+const MOST_LIT: f32 = 0.25;
+/// Fraction of the regions of what is seen that the sky lights through openings, from which on it
+/// has to be aimed.
+const MOST_ENCLOSED: f32 = 0.5;
+/// Radius around a point that the sun reaches, in the extent of all: what lies between them counts.
+const AROUND: f32 = 0.01;
+/// Cells along the longest side of the box around the origins of the rays.
+const CELLS: f32 = 32.0;
+/// Fraction of the rays that go through the cells of the entries, and maximum number of these.
+const COVERED: f32 = 0.98;
+const MAX_CELLS: usize = 512;
+/// Greatest sum of the cross-sections of the spheres, in that of the scene: larger ones gain
+/// nothing.
+const LARGEST: f32 = 0.3;
+
+/// The entries of all parallel light; none if one of the lights reaches much of what is seen, as
+/// paths that are spread over the scene then do.
+#[must_use]
+pub fn entries(
+    scene: &Scene,
+    bvh: &Bvh,
+    seen: &[SeenPoint],
+    openings: Option<&Openings>,
+    whole: &Target,
+) -> Vec<Target> {
+    let mut parts = Vec::new();
+    if scene.environment.as_ref().is_some_and(|environment| !environment.is_dark()) {
+        match openings.filter(|openings| openings.fraction() > MOST_ENCLOSED) {
+            Some(openings) => parts.extend(narrowest(&openings.rays().collect::<Vec<_>>())),
+            None => return Vec::new(),
+        }
+    }
+    let suns = scene.lights.iter().filter(|light| light.kind == LightKind::Directional);
+    let suns = suns.filter(|light| light.intensity.max_element() > 0.0).map(|light| -light.direction);
+    let passes: Vec<bool> = scene.materials.iter().map(may_pass).collect();
+    let surfaces: Vec<(Vec3, Vec3)> = seen.iter().flat_map(SeenPoint::points).collect();
+    for sun in suns {
+        let is_lit = |(position, normal): &(Vec3, Vec3)| {
+            normal.dot(sun) > 0.0 && !bvh.is_blocked(*position, sun, &|m| passes[m as usize])
+        };
+        let lit: Vec<Vec3> = surfaces.par_iter().filter(|point| is_lit(point)).map(|point| point.0).collect();
+        if lit.len() < FEWEST || lit.len() as f32 > MOST_LIT * surfaces.len() as f32 {
+            return Vec::new();
+        }
+        let extent = Bounds::around(lit.iter().copied());
+        let radius = AROUND * (extent.max - extent.min).max_element();
+        parts.extend(lit.into_iter().map(|place| Item::Sphere(place, radius)));
+    }
+    let spheres = spheres_around(parts.into_iter().map(|part| vec![part]).collect(), MAX_ENTRIES);
+    let sizes: f32 = spheres.iter().map(|sphere| sphere.radius * sphere.radius).sum();
+    if sizes < LARGEST * whole.radius * whole.radius { spheres } else { Vec::new() }
+}
+
+/// Spheres around few cells of a grid that nearly all rays go through, found greedily. Rays through
+/// an opening from all sides are closest together within it.
+fn narrowest(rays: &[(Vec3, Vec3)]) -> Vec<Item> {
+    let Bounds { min, max } = Bounds::around(rays.iter().map(|ray| ray.0));
+    let side = ((max - min).max_element() / CELLS).max(f32::MIN_POSITIVE);
+    let (low, high) = (min - side, max + side);
+    let size = ((high - low) / side).ceil().as_uvec3().max(UVec3::ONE);
+    let cell_at = |position: Vec3| {
+        let at = ((position - low) / side).as_uvec3().min(size - 1);
+        at.x + size.x * (at.y + size.y * at.z)
+    };
+    let way = |(origin, direction): &(Vec3, Vec3)| {
+        let inside = |position: &Vec3| position.cmpge(low).all() && position.cmple(high).all();
+        let places = (0..).map(|i| *origin + 0.5 * side * i as f32 * *direction).take_while(inside);
+        let mut cells: Vec<u32> = places.map(cell_at).collect();
+        cells.dedup();
+        cells
+    };
+    let ways: Vec<Vec<u32>> = rays.par_iter().map(way).collect();
+    let mut through = vec![Vec::new(); size.element_product() as usize];
+    for (ray, way) in ways.iter().enumerate() {
+        way.iter().for_each(|cell| through[*cell as usize].push(ray));
+    }
+    let mut counts: Vec<usize> = through.iter().map(Vec::len).collect();
+    let (mut is_covered, mut left) = (vec![false; rays.len()], rays.len());
+    let mut chosen = Vec::new();
+    while left as f32 > (1.0 - COVERED) * rays.len() as f32 && chosen.len() < MAX_CELLS {
+        // The first of those with the most rays, so that the choice is the same everywhere.
+        let Some(cell) = (0..counts.len()).max_by_key(|cell| (counts[*cell], usize::MAX - cell)) else { break };
+        for ray in std::mem::take(&mut through[cell]) {
+            if !std::mem::replace(&mut is_covered[ray], true) {
+                left -= 1;
+                ways[ray].iter().for_each(|other| counts[*other as usize] -= 1);
+            }
+        }
+        let at = uvec3(cell as u32 % size.x, cell as u32 / size.x % size.y, cell as u32 / (size.x * size.y));
+        chosen.push(Item::Sphere(low + side * (at.as_vec3() + 0.5), 0.5 * 3_f32.sqrt() * side));
+    }
+    chosen
+}
