@@ -77,8 +77,9 @@ impl EnvironmentMap {
         let column = cells.partition_point(|up_to| *up_to <= u[1]).min(columns - 1);
         let edge = |row: usize| (PI * (row as f64 - 0.5).clamp(0.0, rows as f64) / rows as f64).cos();
         let y = edge(row) + f64::from(u[2]) * (edge(row + 1) - edge(row));
-        let (sine, cosine) =
-            (TAU * ((column as f64 + 0.5 + f64::from(u[3])) / columns as f64 - 0.5) - f64::from(self.rotation)).sin_cos();
+        let (sine, cosine) = (TAU * ((column as f64 + 0.5 + f64::from(u[3])) / columns as f64 - 0.5)
+            - f64::from(self.rotation))
+        .sin_cos();
         let across = (1.0 - y * y).max(0.0).sqrt();
         DVec3::new(across * cosine, y, across * sine).as_vec3().normalize()
     }

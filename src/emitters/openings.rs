@@ -11,7 +11,7 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 use glam::{Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
 
-use super::{cumulative::cumulative, environment_map::EnvironmentMap, sight::SeenPoint};
+use super::{cumulative::cumulative, environment_map::EnvironmentMap, sight::{SeenPoint, thinned}};
 use crate::{
     bvh::Bvh,
     layout::OPENINGS_SIDE,
@@ -113,10 +113,9 @@ impl Openings {
             map: map?,
             passes: scene.materials.iter().map(may_pass).collect(),
         };
-        let all = || seen.iter().flat_map(SeenPoint::points);
-        let step = all().count().div_ceil(MAX_POINTS).max(1);
+        let points = thinned(seen.iter().flat_map(SeenPoint::points).collect(), MAX_POINTS);
         let mut sides: [Vec<(Vec3, Vec3)>; 6] = Default::default();
-        all().step_by(step).for_each(|point| sides[side_of(point.1)].push(point));
+        points.into_iter().for_each(|point| sides[side_of(point.1)].push(point));
         let (mut nodes, mut groups, mut roots) = (Vec::new(), Vec::new(), [0; 6]);
         for (root, points) in roots.iter_mut().zip(sides) {
             *root = nodes.len() as u32;
@@ -190,8 +189,7 @@ impl Surroundings<'_> {
             return None;
         }
         let by_sky = arrived.len();
-        let by_cosine =
-            (0..BY_COSINE).map(|ray| self.ray(point(ray), cosine_direction(point(ray).1, numbers(ray))));
+        let by_cosine = (0..BY_COSINE).map(|ray| self.ray(point(ray), cosine_direction(point(ray).1, numbers(ray))));
         arrived.extend(by_cosine.filter(|ray| ray.light > 0.0));
         let bounds = |of: fn(Vec3, Vec3) -> Vec3| points.iter().map(|(p, _)| *p).reduce(of).unwrap_or_default();
         let (low, high) = (bounds(Vec3::min), bounds(Vec3::max));

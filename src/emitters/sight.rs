@@ -41,6 +41,8 @@ const MARGIN: f32 = 1.2;
 const RATIO: f32 = 3.0;
 /// Maximum number of spheres: the last is then smaller than the scene by more than the ratio.
 const MAX_SPHERES: usize = 12;
+/// Part of the golden ratio behind the point.
+const GOLDEN_STEP: f64 = 0.618_033_988_749_894_9;
 /// Steps of a low-discrepancy sequence in two dimensions (Roberts 2018, "The Unreasonable
 /// Effectiveness of Quasirandom Sequences").
 const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
@@ -68,8 +70,7 @@ impl Sight {
         let enclosure = enclosure(seen);
         let points: Vec<Vec3> = seen.iter().flat_map(SeenPoint::points).map(|(position, _)| position).collect();
         let targets = spheres_around(&points, &scene_target(scene));
-        let fewer = || points.iter().step_by(points.len().div_ceil(MAX_POINTS)).copied().collect::<Vec<_>>();
-        let importance = (!targets.is_empty()).then(|| Importance::new(&fewer(), scene.bounds()));
+        let importance = (!targets.is_empty()).then(|| Importance::new(&thinned(points.clone(), MAX_POINTS), scene.bounds()));
         Self { targets, enclosure, importance, shares: shares_whatever_size(&points, specular) }
     }
 }
@@ -95,6 +96,14 @@ impl SeenPoint {
     pub fn points(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
         std::iter::once((self.position, self.normal)).chain(self.around.iter().copied())
     }
+}
+
+/// About so many of a list, spread over all of it: by a step of the golden ratio, as the list may
+/// have a rhythm of its own.
+pub(super) fn thinned<T>(list: Vec<T>, most: usize) -> Vec<T> {
+    let part = most as f64 / list.len() as f64;
+    let is_kept = |i: usize| (i as f64 * GOLDEN_STEP).fract() < part;
+    list.into_iter().enumerate().filter(|(i, _)| is_kept(*i)).map(|(_, one)| one).collect()
 }
 
 /// Points that lie near each other follow each other in the list: their rays together give one

@@ -11,8 +11,8 @@ use crate::{
         importance::Importance,
         lamps_in_glass::LampsInGlass,
         light_table::{Choices, LightTable},
-        set_media,
         openings::Openings,
+        set_media,
         sight::{SeenPoint, Sight},
         targets::{Target, scene_target, specular_targets},
     },
@@ -111,8 +111,7 @@ impl LightBuffers {
         let by_entries = if entries.is_empty() { 0.0 } else { BY_ENTRIES };
         let sizes: f32 = entries.iter().map(|sphere| sphere.radius * sphere.radius).sum();
         let general = seen.iter().chain([&around]).map(|sphere| (sphere, even, even * (1.0 - by_entries)));
-        let entering =
-            entries.iter().map(|sphere| (sphere, 0.0, by_entries * sphere.radius * sphere.radius / sizes));
+        let entering = entries.iter().map(|sphere| (sphere, 0.0, by_entries * sphere.radius * sphere.radius / sizes));
         let mixes_powers = shares.iter().any(|share| *share > 0.0);
         let specular = targets.iter().zip(shares).map(|(sphere, share)| (sphere, share, share));
         let spheres: Vec<layout::Target> = general

@@ -17,6 +17,7 @@ mod lobe_mixture;
 mod losses;
 mod microfacets;
 mod nearest;
+mod openings;
 mod probe;
 mod rough_dielectric;
 mod sampling;

@@ -14,6 +14,7 @@ mod lights;
 mod material_references;
 mod modes;
 mod narrow_things;
+mod openings;
 mod pixels;
 mod references;
 mod refraction;

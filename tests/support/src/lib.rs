@@ -140,6 +140,21 @@ pub fn add_box(scene: &mut Scene, min: Vec3, max: Vec3, material: u32) {
     add_quad(scene, max, -x, -y, material);
 }
 
+/// A room from −1 to 1 along each axis with a hole from 0.1 to 0.7 m along y and from −0.5 to 0.1 along
+/// z in the wall at x = 1, and a camera at its wall at x = −1 that sees all others.
+pub fn room_with_window(albedo: f32) -> Scene {
+    let mut room = scene(&[diffuse(albedo)]);
+    add_box(&mut room, Vec3::NEG_ONE, Vec3::ONE, 0);
+    room.triangles.retain(|triangle| triangle.positions.iter().any(|p| p.x < 1.0));
+    for (y, z) in
+        [([-1.0, 0.1], [-1.0, 1.0]), ([0.7, 1.0], [-1.0, 1.0]), ([0.1, 0.7], [-1.0, -0.5]), ([0.1, 0.7], [0.1, 1.0])]
+    {
+        add_quad(&mut room, Vec3::new(1.0, y[0], z[0]), (y[1] - y[0]) * Vec3::Y, (z[1] - z[0]) * Vec3::Z, 0);
+    }
+    room.cameras.push(camera(Vec3::new(-0.95, 0.2, 0.1), Vec3::new(0.0, 0.0, 0.0), 100.0));
+    room
+}
+
 /// Small, quick settings.
 pub fn settings(mode: Mode, photons: u32, size: u32) -> Settings {
     Settings::default().with(|s| {
