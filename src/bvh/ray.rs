@@ -43,7 +43,8 @@ impl Bvh {
         })
     }
 
-    /// Whether a ray meets a surface whose material does not let it pass; `direction` is a unit vector.
+    /// Whether a ray meets a surface whose material does not let it pass; `direction` is a unit
+    /// vector.
     #[must_use]
     pub fn is_blocked(&self, origin: Vec3, direction: Vec3, passes: &dyn Fn(u32) -> bool) -> bool {
         self.blocks(0, (origin, direction, LEAST * origin.abs().max_element()), passes)

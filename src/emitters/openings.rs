@@ -2,16 +2,20 @@
 //!
 //! What is seen is divided into regions by place and normal. Rays from points of a region tell from
 //! which directions light of the environment arrives there. Where surfaces keep most of it away,
-//! the region has a histogram of these directions, of which direct light takes a part of its samples
-//! (compare Müller, Gross and Novák 2017, "Practical Path Guiding for Efficient Light-Transport
-//! Simulation"). Wherever the sky is, the environment's own samples fall as well.
+//! the region has a histogram of these directions, of which direct light takes a part of its
+//! samples (compare Müller, Gross and Novák 2017, "Practical Path Guiding for Efficient
+//! Light-Transport Simulation"). Wherever the sky is, the environment's own samples fall as well.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use glam::{Vec2, Vec3, vec2, vec3};
 use rayon::prelude::*;
 
-use super::{cumulative::cumulative, environment_map::EnvironmentMap, sight::{SeenPoint, thinned}};
+use super::{
+    cumulative::cumulative,
+    environment_map::EnvironmentMap,
+    sight::{SeenPoint, thinned},
+};
 use crate::{
     bvh::Bvh,
     layout::OPENINGS_SIDE,
@@ -31,7 +35,8 @@ const FEWEST: usize = 8;
 const TOWARDS_SKY: u32 = 256;
 const BY_COSINE: u32 = 512;
 const INTO_BINS: u32 = 384;
-/// Rounds of the latter, each into bins that light came from in the one before, and into those beside.
+/// Rounds of the latter, each into bins that light came from in the one before, and into those
+/// beside.
 const ROUNDS: u32 = 4;
 /// Fraction of the light that environment's own samples find, above which they are good enough;
 /// part of the samples by the histogram where they find nothing, and least part.

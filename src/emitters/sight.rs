@@ -70,13 +70,14 @@ impl Sight {
         let enclosure = enclosure(seen);
         let points: Vec<Vec3> = seen.iter().flat_map(SeenPoint::points).map(|(position, _)| position).collect();
         let targets = spheres_around(&points, &scene_target(scene));
-        let importance = (!targets.is_empty()).then(|| Importance::new(&thinned(points.clone(), MAX_POINTS), scene.bounds()));
+        let importance =
+            (!targets.is_empty()).then(|| Importance::new(&thinned(points.clone(), MAX_POINTS), scene.bounds()));
         Self { targets, enclosure, importance, shares: shares_whatever_size(&points, specular) }
     }
 }
 
-/// A point on a diffuse surface that a camera sees, and those that are seen from there, each with the
-/// normal on that side.
+/// A point on a diffuse surface that a camera sees, and those that are seen from there, each with
+/// the normal on that side.
 #[derive(Clone, Debug)]
 pub struct SeenPoint {
     position: Vec3,

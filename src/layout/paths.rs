@@ -129,8 +129,8 @@ pub struct PhotonBatch {
     pub kept_scale: f32,
     /// Targets after those that parallel light alone is aimed at.
     pub entry_count: u32,
+    pub pad0: u32,
     pub pad1: u32,
-    pub pad2: u32,
 }
 
 impl PhotonBatch {
@@ -169,7 +169,8 @@ pub const CAUSTICS_APART: u32 = 32;
 
 /// Bit of a node of the octree over what cameras see that has children.
 pub const IMPORTANCE_CHILDREN: u32 = 0x8000_0000;
-/// Bins along each side of the square of directions of an opening.
+
+/// Bins along each side of the square of directions from which light comes through an opening.
 pub const OPENINGS_SIDE: u32 = 64;
 
 /// Maximum number of targets that caustic paths are aimed at.

@@ -300,8 +300,8 @@ pub struct Target {
     pub share: f32,
     /// The same of paths of parallel light and of the environment.
     pub parallel_share: f32,
+    pub pad0: f32,
     pub pad1: f32,
-    pub pad2: f32,
 }
 
 /// Size and rotation of the environment map.

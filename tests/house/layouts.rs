@@ -51,14 +51,14 @@ fn twins() -> Vec<Twin> {
         LightNode { center, half, shine }
         LightChoice { cdf, probability }
         SceneSphere { center, radius }
-        Target { center, radius, share, pad0, pad1, pad2 }
+        Target { center, radius, share, parallel_share, pad0, pad1 }
         EnvironmentInfo { columns, rows, rotation_cos, rotation_sin }
         Path { origin, history, direction, bounces, beta, left, media }
         Photon { position, wi, flux, normal }
         VisiblePoint { position, next_map, weight, offset, ng, media_low, ns, media_high, view, above }
         LobePoint { position, offset, beta, eta, ng, ns, view, tangent, f0, f90, compensation, sheen, alpha, clearcoat, clearcoat_normal, pad }
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays, reads, further_rays }
-        PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, least_kept, aim, kept_scale, pad0, pad1, pad2 }
+        PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, least_kept, aim, kept_scale, entry_count, pad0, pad1 }
         Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, gathers, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, cells_from, listed, listed_at, left_out, shift, square_bits, patches, other_light, merges_layers, lobe_patches, pad0, pad1, pad2 }
         FinalStep { first_ray, rays_now, rays, chosen, seed, pad0, pad1, pad2 }
@@ -179,6 +179,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         NO_LEAF,
         LEAF_BIT,
         IMPORTANCE_CHILDREN,
+        OPENINGS_SIDE,
         BOTH_WAYS_BIT,
         FAR_BIT,
         NEXT_MASK,

@@ -13,8 +13,9 @@ use caustica::{
 use glam::{DVec3, Vec3, dvec3, vec3};
 use support::*;
 
-/// Irradiance from a polygon of radiance 1 at a point, W/m² (Lambert 1760; Arvo 1994, "The Irradiance
-/// Jacobian for Partially Occluded Polyhedral Sources", equation 1). Corners clockwise as seen from the point.
+/// Irradiance from a polygon of radiance 1 at a point, W/m² (Lambert 1760; Arvo 1994, "The
+/// Irradiance Jacobian for Partially Occluded Polyhedral Sources", equation 1). Corners clockwise
+/// as seen from the point.
 fn irradiance(point: DVec3, normal: DVec3, corners: [DVec3; 4]) -> f64 {
     let to = corners.map(|corner| (corner - point).normalize());
     let edges = (0..4).map(|i| (to[i], to[(i + 1) % 4]));

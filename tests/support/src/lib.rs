@@ -140,8 +140,8 @@ pub fn add_box(scene: &mut Scene, min: Vec3, max: Vec3, material: u32) {
     add_quad(scene, max, -x, -y, material);
 }
 
-/// A room from −1 to 1 along each axis with a hole from 0.1 to 0.7 m along y and from −0.5 to 0.1 along
-/// z in the wall at x = 1, and a camera at its wall at x = −1 that sees all others.
+/// A room from −1 to 1 along each axis with a hole from 0.1 to 0.7 m along y and from −0.5 to 0.1
+/// along z in the wall at x = 1, and a camera at its wall at x = −1 that sees all others.
 pub fn room_with_window(albedo: f32) -> Scene {
     let mut room = scene(&[diffuse(albedo)]);
     add_box(&mut room, Vec3::NEG_ONE, Vec3::ONE, 0);
