@@ -2,7 +2,7 @@
 //! see: windows that the sky shines in by, and patches of sun. Photon paths are aimed at them, as
 //! most of those that are spread over the scene would end on its roof.
 
-use glam::{UVec3, Vec3, uvec3};
+use glam::{UVec3, Vec3, uvec3, vec3};
 use rayon::prelude::*;
 
 use super::{
@@ -21,13 +21,16 @@ const MAX_ENTRIES: u32 = 8;
 const FEWEST: usize = 8;
 /// Fraction of what is seen that a parallel light reaches, up to which it has to be aimed.
 const MOST_LIT: f32 = 0.25;
-/// Fraction of the regions of what is seen that the sky lights through openings, from which on it
-/// has to be aimed.
-const MOST_ENCLOSED: f32 = 0.5;
+/// Fraction of what is seen that much of the sky lights, up to which that has to be aimed.
+const MOST_OPEN: f32 = 0.25;
 /// Radius around a point that the sun reaches, in the extent of all: what lies between them counts.
 const AROUND: f32 = 0.01;
-/// Cells along the longest side of the box around the origins of the rays.
+/// Cells along the longest side of the box around most origins of rays.
 const CELLS: f32 = 32.0;
+/// Fraction of the origins of rays beyond either end of the box, along each axis; and how far it
+/// reaches beyond the others, in its largest extent.
+const TRIMMED: f32 = 0.1;
+const MARGIN: f32 = 0.2;
 /// Fraction of the rays that go through the cells of the entries, and maximum number of these.
 const COVERED: f32 = 0.98;
 const MAX_CELLS: usize = 512;
@@ -47,7 +50,7 @@ pub fn entries(
 ) -> Vec<Target> {
     let mut parts = Vec::new();
     if scene.environment.as_ref().is_some_and(|environment| !environment.is_dark()) {
-        match openings.filter(|openings| openings.fraction() > MOST_ENCLOSED) {
+        match openings.filter(|openings| openings.open() < MOST_OPEN) {
             Some(openings) => parts.extend(narrowest(&openings.rays().collect::<Vec<_>>())),
             None => return Vec::new(),
         }
@@ -73,18 +76,34 @@ pub fn entries(
     if sizes < LARGEST * whole.radius * whole.radius { spheres } else { Vec::new() }
 }
 
+/// A box around most origins, for all that some lie far away, as on the houses across the street.
+fn box_of_most(rays: &[(Vec3, Vec3)]) -> (Vec3, Vec3) {
+    let along = |axis: usize| {
+        let mut all: Vec<f32> = rays.iter().map(|(origin, _)| origin[axis]).collect();
+        all.sort_by(f32::total_cmp);
+        let at = |part: f32| all.get((part * all.len() as f32) as usize).copied().unwrap_or(0.0);
+        let (low, high) = (at(TRIMMED), at(1.0 - TRIMMED));
+        (low, high)
+    };
+    let [x, y, z] = [0, 1, 2].map(along);
+    let (low, high) = (vec3(x.0, y.0, z.0), vec3(x.1, y.1, z.1));
+    let margin = MARGIN * (high - low).max_element();
+    (low - margin, high + margin)
+}
+
 /// Spheres around few cells of a grid that nearly all rays go through, found greedily. Rays through
 /// an opening from all sides are closest together within it.
 fn narrowest(rays: &[(Vec3, Vec3)]) -> Vec<Item> {
-    let Bounds { min, max } = Bounds::around(rays.iter().map(|ray| ray.0));
-    let side = ((max - min).max_element() / CELLS).max(f32::MIN_POSITIVE);
-    let (low, high) = (min - side, max + side);
+    let (low, high) = box_of_most(rays);
+    let rays: Vec<&(Vec3, Vec3)> =
+        rays.iter().filter(|(origin, _)| origin.cmpge(low).all() && origin.cmple(high).all()).collect();
+    let side = ((high - low).max_element() / CELLS).max(f32::MIN_POSITIVE);
     let size = ((high - low) / side).ceil().as_uvec3().max(UVec3::ONE);
     let cell_at = |position: Vec3| {
         let at = ((position - low) / side).as_uvec3().min(size - 1);
         at.x + size.x * (at.y + size.y * at.z)
     };
-    let way = |(origin, direction): &(Vec3, Vec3)| {
+    let way = |(origin, direction): &&(Vec3, Vec3)| {
         let inside = |position: &Vec3| position.cmpge(low).all() && position.cmple(high).all();
         let places = (0..).map(|i| *origin + 0.5 * side * i as f32 * *direction).take_while(inside);
         let mut cells: Vec<u32> = places.map(cell_at).collect();

@@ -19,7 +19,7 @@ use super::{
 use crate::{
     bvh::Bvh,
     layout::OPENINGS_SIDE,
-    scene::{Alpha, Environment, Material, Scene, Surface},
+    scene::{Alpha, Bounds, Environment, Material, Scene, Surface},
 };
 
 /// Bins along each side of the square of directions, and all of them. They are of one size.
@@ -30,6 +30,9 @@ const BIN_SOLID_ANGLE: f32 = 4.0 * PI / BINS as f32;
 const MAX_POINTS: usize = 1 << 13;
 const POINTS: usize = 32;
 const FEWEST: usize = 8;
+/// Fraction of the extent of points from which on a gap divides them, in halvings up to this depth.
+const WIDE_GAP: f32 = 0.3;
+const MAX_GAPS: u32 = 10;
 /// Rays of a region: towards the environment by its luminance, by the cosine, and into bins that
 /// light came from in one round.
 const TOWARDS_SKY: u32 = 256;
@@ -43,6 +46,8 @@ const ROUNDS: u32 = 4;
 const ENOUGH: f32 = 0.4;
 const MOST: f32 = 0.9;
 const LEAST: f32 = 0.1;
+/// Part of the samples by the histogram from which on a region counts as enclosed.
+const ENCLOSED: f32 = 0.6;
 /// How far the bounds of a region reach beyond its points, in its largest extent: points lie that
 /// far apart.
 const MARGIN: f32 = 0.25;
@@ -72,8 +77,7 @@ pub struct Openings {
     roots: [u32; 6],
     nodes: Vec<Node>,
     regions: Vec<Region>,
-    /// Number of regions that were looked at.
-    all: usize,
+    open: f32,
 }
 
 /// Half spaces at a plane perpendicular to an axis, or a region.
@@ -97,6 +101,15 @@ struct Region {
     rays: Vec<(Vec3, Vec3)>,
     /// Light from each bin of directions from the middle of the sphere, in units of its own.
     bins: Vec<f64>,
+}
+
+/// What points near each other get of the sky.
+enum Sky {
+    /// Much: its own samples find it.
+    Open,
+    /// Nothing, as far as is known.
+    Dark,
+    Through(Region),
 }
 
 /// What rays from points need.
@@ -125,27 +138,34 @@ impl Openings {
         for (root, points) in roots.iter_mut().zip(sides) {
             *root = nodes.len() as u32;
             nodes.push(Node::Leaf(None));
-            split(*root as usize, points, &mut nodes, &mut groups);
+            split((*root as usize, 0), points, &mut nodes, &mut groups);
         }
-        let found: Vec<Option<Region>> = groups.par_iter().map(|(_, points)| around.region(points)).collect();
-        let all = groups.len();
+        let found: Vec<Sky> = groups.par_iter().map(|(_, points)| around.sky(points)).collect();
+        let is_open = |sky: &&Sky| match sky {
+            Sky::Open => true,
+            Sky::Dark => false,
+            Sky::Through(region) => !region.is_enclosed(),
+        };
+        let open = found.iter().filter(is_open).count() as f32 / groups.len() as f32;
         let mut regions = Vec::new();
-        for ((leaf, _), region) in groups.into_iter().zip(found) {
-            nodes[leaf] = Node::Leaf(region.is_some().then_some(regions.len() as u32));
-            regions.extend(region);
+        for ((leaf, _), sky) in groups.into_iter().zip(found) {
+            if let Sky::Through(region) = sky {
+                nodes[leaf] = Node::Leaf(Some(regions.len() as u32));
+                regions.push(region);
+            }
         }
-        (!regions.is_empty()).then_some(Self { roots, nodes, regions, all })
+        (!regions.is_empty()).then_some(Self { roots, nodes, regions, open })
     }
 
-    /// Fraction of what is seen that the sky lights through openings, 0 to 1.
+    /// Fraction of what is seen that much of the sky lights, 0 to 1.
     #[must_use]
-    pub fn fraction(&self) -> f32 {
-        self.regions.len() as f32 / self.all as f32
+    pub fn open(&self) -> f32 {
+        self.open
     }
 
-    /// Rays from surfaces through the openings: origins and directions.
+    /// Rays from surfaces that see little of the sky through the openings: origins and directions.
     pub fn rays(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
-        self.regions.iter().flat_map(|region| region.rays.iter().copied())
+        self.regions.iter().filter(|region| region.is_enclosed()).flat_map(|region| region.rays.iter().copied())
     }
 
     /// The regions as `shaders/lib/transport/openings.wesl` reads them.
@@ -164,6 +184,11 @@ impl Openings {
 }
 
 impl Region {
+    /// Whether little of the sky reaches it: not a house front, but what is behind a window.
+    fn is_enclosed(&self) -> bool {
+        self.part > ENCLOSED
+    }
+
     fn words(&self) -> Vec<u32> {
         let rows: Vec<f64> = self.bins.chunks(SIDE).map(|row| row.iter().sum()).collect();
         let Self { low, high, part, sphere: Sphere { center, radius }, .. } = *self;
@@ -174,9 +199,9 @@ impl Region {
 }
 
 impl Surroundings<'_> {
-    fn region(&self, points: &[(Vec3, Vec3)]) -> Option<Region> {
+    fn sky(&self, points: &[(Vec3, Vec3)]) -> Sky {
         if points.len() < FEWEST {
-            return None;
+            return Sky::Dark;
         }
         let point = |ray: u32| points[ray as usize % points.len()];
         let (mut found, mut all, mut arrived) = (0.0, 0.0, Vec::new());
@@ -191,13 +216,12 @@ impl Surroundings<'_> {
         let part = MOST * (1.0 - found / (ENOUGH * all));
         // NaN: nothing of the sky lies above.
         if part.is_nan() || part < LEAST {
-            return None;
+            return if part < LEAST { Sky::Open } else { Sky::Dark };
         }
         let by_sky = arrived.len();
         let by_cosine = (0..BY_COSINE).map(|ray| self.ray(point(ray), cosine_direction(point(ray).1, numbers(ray))));
         arrived.extend(by_cosine.filter(|ray| ray.light > 0.0));
-        let bounds = |of: fn(Vec3, Vec3) -> Vec3| points.iter().map(|(p, _)| *p).reduce(of).unwrap_or_default();
-        let (low, high) = (bounds(Vec3::min), bounds(Vec3::max));
+        let Bounds { min: low, max: high } = Bounds::around(points.iter().map(|point| point.0));
         let margin = Vec3::splat(MARGIN * (high - low).max_element());
         let (low, high) = (low - margin, high + margin);
         let few = arrived.iter().skip(by_sky).step_by((arrived.len() - by_sky).div_ceil(FEW_RAYS).max(1));
@@ -230,7 +254,10 @@ impl Surroundings<'_> {
         // What no ray found in a bin that light may come from after all would be a white dot.
         let least = FLOOR * bins.iter().sum::<f64>() / into.len().max(1) as f64;
         into.iter().for_each(|bin| bins[*bin] = bins[*bin].max(least));
-        bins.iter().any(|bin| *bin > 0.0).then_some(Region { low, high, part, sphere, rays, bins })
+        match bins.iter().any(|bin| *bin > 0.0) {
+            true => Sky::Through(Region { low, high, part, sphere, rays, bins }),
+            false => Sky::Dark,
+        }
     }
 
     fn ray(&self, (origin, normal): (Vec3, Vec3), direction: Vec3) -> Ray {
@@ -311,26 +338,30 @@ pub(super) fn may_pass(material: &Material) -> bool {
     matches!(material.surface, Surface::Glass { .. } | Surface::Pane { .. }) || material.alpha != Alpha::Opaque
 }
 
-/// Divides points at the middle of their longest extent until few are left.
+/// Divides points along their longest extent until few are left: where a wide gap is, else at their
+/// middle.
 fn split(
-    node: usize,
+    (node, depth): (usize, u32),
     mut points: Vec<(Vec3, Vec3)>,
     nodes: &mut Vec<Node>,
     groups: &mut Vec<(usize, Vec<(Vec3, Vec3)>)>,
 ) {
-    if points.len() <= POINTS {
+    let Bounds { min, max } = Bounds::around(points.iter().map(|point| point.0));
+    let axis = (max - min).max_position();
+    points.sort_by(|(a, _), (b, _)| a[axis].total_cmp(&b[axis]));
+    let gap = |i: usize| points[i].0[axis] - points[i - 1].0[axis];
+    let widest = (1..points.len()).max_by(|a, b| gap(*a).total_cmp(&gap(*b)));
+    let widest = widest.filter(|i| depth < MAX_GAPS && gap(*i) > WIDE_GAP * (max - min)[axis]);
+    if points.len() <= POINTS && widest.is_none() {
         groups.push((node, points));
         return;
     }
-    let bounds = |of: fn(Vec3, Vec3) -> Vec3| points.iter().map(|(p, _)| *p).reduce(of).unwrap_or_default();
-    let axis = (bounds(Vec3::max) - bounds(Vec3::min)).max_position();
-    points.sort_by(|(a, _), (b, _)| a[axis].total_cmp(&b[axis]));
-    let upper = points.split_off(points.len() / 2);
-    let first = nodes.len() as u32;
-    nodes[node] = Node::Inner { axis: axis as u32, at: upper[0].0[axis], first };
+    let upper = points.split_off(widest.unwrap_or(points.len() / 2));
+    let first = nodes.len();
+    nodes[node] = Node::Inner { axis: axis as u32, at: upper[0].0[axis], first: first as u32 };
     nodes.extend([Node::Leaf(None); 2]);
-    split(first as usize, points, nodes, groups);
-    split(first as usize + 1, upper, nodes, groups);
+    split((first, depth + 1), points, nodes, groups);
+    split((first + 1, depth + 1), upper, nodes, groups);
 }
 
 /// Number of the direction of an axis that a normal is closest to.

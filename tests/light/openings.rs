@@ -52,7 +52,6 @@ fn the_sky_through_a_window_has_the_closed_form_and_little_noise() {
         // in all directions have more, and both together not less than half of it.
         let fraction = irradiance(place.as_dvec3(), DVec3::Y, window(0.7)) / std::f64::consts::PI;
         let plain = (1.0 / fraction - 1.0) / 16.0;
-        eprintln!("found {found} {} variance {variance} plain {plain}", right(0.7));
         assert!(variance < 0.2 * 0.5 * plain, "{variance}, without knowledge of the window {plain}");
     }
 }
@@ -78,7 +77,6 @@ fn photons_that_are_aimed_at_a_window_bring_the_same_light_by_fewer_paths() {
         let [found, right] = [&aimed, &plain].map(|render| mean(render));
         assert!(within(found, right, 0.015), "{name}: {found} instead of {right}");
         let [few, many] = [&aimed, &plain].map(|render| render.stats.photons.global.emitted);
-        eprintln!("{name} {found} {right} {few} {many}");
         assert!(3 * few < many, "{name}: {few} paths instead of {many}");
         let mut smaller = scene.clone();
         add_quad(&mut smaller, vec3(1.0, 0.66, -0.5), 0.04 * Vec3::Y, 0.6 * Vec3::Z, 0);
