@@ -27,19 +27,33 @@ const MOST_OPEN: f32 = 0.25;
 const AROUND: f32 = 0.01;
 /// Cells along the longest side of the box around most origins of rays.
 const CELLS: f32 = 32.0;
-/// Fraction of the origins of rays beyond either end of the box, along each axis; and how far it
-/// reaches beyond the others, in its largest extent.
-const TRIMMED: f32 = 0.1;
-const MARGIN: f32 = 0.2;
+/// Fraction of the origins of rays, and of what is seen, beyond either end of a box around the
+/// others, along each axis; and its margin, in its largest extent.
+const TRIMMED: f32 = 0.02;
+const SEEN_TRIMMED: f32 = 0.05;
+const MARGIN: f32 = 0.1;
 /// Fraction of the rays that go through the cells of the entries, and maximum number of these.
 const COVERED: f32 = 0.98;
 const MAX_CELLS: usize = 512;
-/// Greatest sum of the cross-sections of the spheres, in that of the scene: larger ones gain
+/// Greatest sum of the cross-sections of the entries, in that of what is seen: larger ones gain
 /// nothing.
 const LARGEST: f32 = 0.3;
+/// Density of the paths to the entries over that beside them.
+const LEVEL: f32 = 8.0;
+/// Maximum number of the spheres around what is seen, and ratio of their radii.
+const MAX_NESTED: usize = 6;
+const RATIO: f32 = 3.0;
 
-/// The entries of all parallel light; none if one of the lights reaches much of what is seen, as
-/// paths that are spread over the scene then do.
+/// A sphere that parallel light is aimed at, and its share of the paths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    pub target: Target,
+    pub share: f32,
+}
+
+/// The entries of all parallel light, and spheres around what is seen, where there is much else.
+/// The rest of the paths is spread over the scene. None if one of the lights reaches much of what
+/// is seen, as paths that are spread over the scene then do.
 #[must_use]
 pub fn entries(
     scene: &Scene,
@@ -47,7 +61,7 @@ pub fn entries(
     seen: &[SeenPoint],
     openings: Option<&Openings>,
     whole: &Target,
-) -> Vec<Target> {
+) -> Vec<Entry> {
     let mut parts = Vec::new();
     if scene.environment.as_ref().is_some_and(|environment| !environment.is_dark()) {
         match openings.filter(|openings| openings.open() < MOST_OPEN) {
@@ -71,19 +85,44 @@ pub fn entries(
         let radius = AROUND * (extent.max - extent.min).max_element();
         parts.extend(lit.into_iter().map(|place| Item::Sphere(place, radius)));
     }
-    let spheres = spheres_around(parts.into_iter().map(|part| vec![part]).collect(), MAX_ENTRIES);
-    let sizes: f32 = spheres.iter().map(|sphere| sphere.radius * sphere.radius).sum();
-    if sizes < LARGEST * whole.radius * whole.radius { spheres } else { Vec::new() }
+    let narrow = spheres_around(parts.into_iter().map(|part| vec![part]).collect(), MAX_ENTRIES);
+    with_shares(narrow, &nested(&surfaces, whole), whole)
 }
 
-/// A box around most origins, for all that some lie far away, as on the houses across the street.
-fn box_of_most(rays: &[(Vec3, Vec3)]) -> (Vec3, Vec3) {
+/// Spheres around what is seen, each next one larger, up to one that is not much smaller than the
+/// scene: light from far away comes from there too.
+fn nested(surfaces: &[(Vec3, Vec3)], whole: &Target) -> Vec<Target> {
+    let (low, high) = box_of_most(surfaces, SEEN_TRIMMED);
+    let (center, smallest) = (0.5 * (low + high), 0.5 * (high - low).length());
+    let radii = std::iter::successors(Some(smallest), |radius| Some(RATIO * radius)).take(MAX_NESTED);
+    let radii = radii.take_while(|radius| *radius > 0.0 && RATIO * radius <= 2.0 * whole.radius);
+    radii.map(|radius| Target { center, radius }).collect()
+}
+
+/// Entries that are small enough to gain something, with shares by which paths to them are no more
+/// than some times as dense as beside them: light by an entry that was not found has stronger
+/// photons then, but not much stronger ones.
+fn with_shares(narrow: Vec<Target>, nested: &[Target], whole: &Target) -> Vec<Entry> {
+    let size = |sphere: &Target| sphere.radius * sphere.radius;
+    let sizes: f32 = narrow.iter().map(size).sum();
+    let inner = nested.first().unwrap_or(whole);
+    let (narrow, sizes) = if sizes < LARGEST * size(inner) { (narrow, sizes) } else { (Vec::new(), 0.0) };
+    let even = 1.0 / (nested.len() + 1) as f32;
+    let beside: f32 = nested.iter().chain([whole]).map(|sphere| even / size(sphere)).sum();
+    let odds = LEVEL * beside * sizes;
+    let part = odds / (1.0 + odds);
+    let narrow = narrow.iter().map(|target| Entry { target: *target, share: part * size(target) / sizes });
+    narrow.chain(nested.iter().map(|target| Entry { target: *target, share: even * (1.0 - part) })).collect()
+}
+
+/// A box around most points, for all that some lie far away, as on the houses across the street:
+/// without that fraction of them at either end along each axis, and with a margin.
+fn box_of_most(points: &[(Vec3, Vec3)], trimmed: f32) -> (Vec3, Vec3) {
     let along = |axis: usize| {
-        let mut all: Vec<f32> = rays.iter().map(|(origin, _)| origin[axis]).collect();
+        let mut all: Vec<f32> = points.iter().map(|(position, _)| position[axis]).collect();
         all.sort_by(f32::total_cmp);
         let at = |part: f32| all.get((part * all.len() as f32) as usize).copied().unwrap_or(0.0);
-        let (low, high) = (at(TRIMMED), at(1.0 - TRIMMED));
-        (low, high)
+        (at(trimmed), at(1.0 - trimmed))
     };
     let [x, y, z] = [0, 1, 2].map(along);
     let (low, high) = (vec3(x.0, y.0, z.0), vec3(x.1, y.1, z.1));
@@ -94,7 +133,7 @@ fn box_of_most(rays: &[(Vec3, Vec3)]) -> (Vec3, Vec3) {
 /// Spheres around few cells of a grid that nearly all rays go through, found greedily. Rays through
 /// an opening from all sides are closest together within it.
 fn narrowest(rays: &[(Vec3, Vec3)]) -> Vec<Item> {
-    let (low, high) = box_of_most(rays);
+    let (low, high) = box_of_most(rays, TRIMMED);
     let rays: Vec<&(Vec3, Vec3)> =
         rays.iter().filter(|(origin, _)| origin.cmpge(low).all() && origin.cmple(high).all()).collect();
     let side = ((high - low).max_element() / CELLS).max(f32::MIN_POSITIVE);

@@ -23,9 +23,6 @@ use crate::{
     settings::LightSettings,
 };
 
-/// Fraction of the paths of parallel light that are aimed at where it enters.
-const BY_ENTRIES: f32 = 0.7;
-
 /// A table of [`Choices`] on the device, `array<LightChoice>`.
 #[derive(Debug)]
 pub struct ChoiceBuffer {
@@ -108,10 +105,9 @@ impl LightBuffers {
             ChoiceBuffer::new(gpu, "light choices towards what is seen", &choices)
         });
         let entries = entries(scene, bvh, &seen_points, openings.as_ref(), &around);
-        let by_entries = if entries.is_empty() { 0.0 } else { BY_ENTRIES };
-        let sizes: f32 = entries.iter().map(|sphere| sphere.radius * sphere.radius).sum();
-        let general = seen.iter().chain([&around]).map(|sphere| (sphere, even, even * (1.0 - by_entries)));
-        let entering = entries.iter().map(|sphere| (sphere, 0.0, by_entries * sphere.radius * sphere.radius / sizes));
+        let elsewhere = 1.0 - entries.iter().map(|entry| entry.share).sum::<f32>();
+        let general = seen.iter().chain([&around]).map(|sphere| (sphere, even, even * elsewhere));
+        let entering = entries.iter().map(|entry| (&entry.target, 0.0, entry.share));
         let mixes_powers = shares.iter().any(|share| *share > 0.0);
         let specular = targets.iter().zip(shares).map(|(sphere, share)| (sphere, share, share));
         let spheres: Vec<layout::Target> = general
