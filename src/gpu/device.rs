@@ -42,8 +42,9 @@ pub struct Gpu {
     /// The kernels' overrides `LANES` and `HAS_SEVERAL_GROUPS`.
     pub(super) lanes: u32,
     pub(super) several_groups: bool,
-    /// Whether searches run some queries ahead of the others: the kernels' override `HAS_PILOTS`.
-    pub(crate) has_pilots: bool,
+    /// Whether the device is software: searches run some queries ahead of the others then, the
+    /// kernels' override `HAS_PILOTS`.
+    pub(crate) is_software: bool,
     /// Maximum number of nodes and primitives that a ray visits, at least [`SHORT_LOOPS`].
     pub(crate) trace_budget: u32,
     faults: Faults,
@@ -108,8 +109,8 @@ impl Gpu {
         let lanes = if most > MAX_LANES { MIN_LANES } else { least.min(MAX_LANES) };
         let several_groups = most > lanes;
         let batch = batch_of(chosen.kind);
-        let has_pilots = chosen.kind == "software";
-        let trace_budget = if chosen.kind == "software" { SHORT_LOOPS } else { LONG_LOOPS };
+        let is_software = chosen.kind == "software";
+        let trace_budget = if is_software { SHORT_LOOPS } else { LONG_LOOPS };
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);
         let memory = Arc::<MemoryCount>::default();
         // Memory of software is the host's, which gives more than it has and then ends the process.
@@ -129,7 +130,7 @@ impl Gpu {
             compiler,
             lanes,
             several_groups,
-            has_pilots,
+            is_software,
             trace_budget,
             faults,
         })

@@ -45,7 +45,7 @@ impl Kernel {
         let of_device = [
             ("LANES", f64::from(gpu.lanes)),
             ("HAS_SEVERAL_GROUPS", flag(gpu.several_groups)),
-            ("HAS_PILOTS", flag(gpu.has_pilots)),
+            ("HAS_PILOTS", flag(gpu.is_software)),
         ];
         let value = |name: &str| overrides.iter().chain(&of_device).find(|(n, _)| *n == name).map(|(_, value)| *value);
         let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();

@@ -142,8 +142,7 @@ impl SceneBuffers {
                 .any(|m| m.surface.ior().is_some() || m.surface.is_coated() || m.is_finished()),
             has_environment_map: scene.environment.as_ref().is_some_and(|sky| sky.pixels.len() > 1),
             has_spheres: !scene.spheres.is_empty(),
-            // Rounded up to multiples of 16, so that few variants of a kernel are compiled.
-            stack: bvh.max_stack_depth().max(1).next_multiple_of(16).min(INSTANCED_STACK),
+            stack: rounded_stack(gpu, bvh.max_stack_depth()),
             solids,
             lights,
         })
@@ -256,6 +255,13 @@ impl SceneBuffers {
         all.push(("lists", &self.no_lists));
         all
     }
+}
+
+/// Size of the stack of a traversal, rounded up, so that few variants of a kernel are compiled: more
+/// so where it takes no memory of workgroups that would let fewer of them run at once.
+fn rounded_stack(gpu: &Gpu, depth: usize) -> usize {
+    let step = if gpu.is_software { 32 } else { 16 };
+    depth.max(1).next_multiple_of(step).min(INSTANCED_STACK)
 }
 
 impl Split {

@@ -219,7 +219,7 @@ impl<'s> Gather<'s> {
             ("gathered", gathered),
         ]);
         let with_info = |info| [buffers.as_slice(), &[("gather_info", info)]].concat();
-        let strides = if gpu.has_pilots { &STRIDES[..] } else { &[1] };
+        let strides = if gpu.is_software { &STRIDES[..] } else { &[1] };
         let info = |stride| gpu.uniform("gather info", &GatherInfo { count: waiting, stride, ..*info });
         let infos: Vec<_> = strides.iter().map(|&stride| info(stride)).collect();
         let search_bindings: Vec<_> = infos.iter().map(|info| search.bind(gpu, &with_info(info))).collect();
