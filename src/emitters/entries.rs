@@ -26,12 +26,13 @@ const MOST_OPEN: f32 = 0.25;
 /// Radius around a point that the sun reaches, in the extent of all: what lies between them counts.
 const AROUND: f32 = 0.01;
 /// Cells along the longest side of the box around most origins of rays.
-const CELLS: f32 = 32.0;
+const CELLS: f32 = 48.0;
 /// Fraction of the origins of rays, and of what is seen, beyond either end of a box around the
-/// others, along each axis; and its margin, in its largest extent.
+/// others, along each axis; and the margins of both, in the largest extent: openings lie beyond.
 const TRIMMED: f32 = 0.02;
 const SEEN_TRIMMED: f32 = 0.05;
-const MARGIN: f32 = 0.1;
+const MARGIN: f32 = 0.5;
+const SEEN_MARGIN: f32 = 0.1;
 /// Fraction of the rays that go through the cells of the entries, and maximum number of these.
 const COVERED: f32 = 0.98;
 const MAX_CELLS: usize = 512;
@@ -92,7 +93,7 @@ pub fn entries(
 /// Spheres around what is seen, each next one larger, up to one that is not much smaller than the
 /// scene: light from far away comes from there too.
 fn nested(surfaces: &[(Vec3, Vec3)], whole: &Target) -> Vec<Target> {
-    let (low, high) = box_of_most(surfaces, SEEN_TRIMMED);
+    let (low, high) = box_of_most(surfaces, SEEN_TRIMMED, SEEN_MARGIN);
     let (center, smallest) = (0.5 * (low + high), 0.5 * (high - low).length());
     let radii = std::iter::successors(Some(smallest), |radius| Some(RATIO * radius)).take(MAX_NESTED);
     let radii = radii.take_while(|radius| *radius > 0.0 && RATIO * radius <= 2.0 * whole.radius);
@@ -117,7 +118,7 @@ fn with_shares(narrow: Vec<Target>, nested: &[Target], whole: &Target) -> Vec<En
 
 /// A box around most points, for all that some lie far away, as on the houses across the street:
 /// without that fraction of them at either end along each axis, and with a margin.
-fn box_of_most(points: &[(Vec3, Vec3)], trimmed: f32) -> (Vec3, Vec3) {
+fn box_of_most(points: &[(Vec3, Vec3)], trimmed: f32, margin: f32) -> (Vec3, Vec3) {
     let along = |axis: usize| {
         let mut all: Vec<f32> = points.iter().map(|(position, _)| position[axis]).collect();
         all.sort_by(f32::total_cmp);
@@ -126,14 +127,14 @@ fn box_of_most(points: &[(Vec3, Vec3)], trimmed: f32) -> (Vec3, Vec3) {
     };
     let [x, y, z] = [0, 1, 2].map(along);
     let (low, high) = (vec3(x.0, y.0, z.0), vec3(x.1, y.1, z.1));
-    let margin = MARGIN * (high - low).max_element();
+    let margin = margin * (high - low).max_element();
     (low - margin, high + margin)
 }
 
 /// Spheres around few cells of a grid that nearly all rays go through, found greedily. Rays through
 /// an opening from all sides are closest together within it.
 fn narrowest(rays: &[(Vec3, Vec3)]) -> Vec<Item> {
-    let (low, high) = box_of_most(rays, TRIMMED);
+    let (low, high) = box_of_most(rays, TRIMMED, MARGIN);
     let rays: Vec<&(Vec3, Vec3)> =
         rays.iter().filter(|(origin, _)| origin.cmpge(low).all() && origin.cmple(high).all()).collect();
     let side = ((high - low).max_element() / CELLS).max(f32::MIN_POSITIVE);
@@ -170,4 +171,50 @@ fn narrowest(rays: &[(Vec3, Vec3)]) -> Vec<Item> {
         chosen.push(Item::Sphere(low + side * (at.as_vec3() + 0.5), 0.5 * 3_f32.sqrt() * side));
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rays from a plane to points of a square of that half side, 1 m away.
+    fn rays(half: f32) -> Vec<(Vec3, Vec3)> {
+        let part = |i: u32, step: f32| (i as f32 * step).fract() - 0.5;
+        let ray = |i: u32| {
+            let origin = vec3(4.0 * part(i, 0.618), 4.0 * part(i, 0.755), 0.0);
+            let to = vec3(2.0 * half * part(i, 0.57), 2.0 * half * part(i, 0.414), 1.0);
+            (origin, (to - origin).normalize())
+        };
+        (0..2000).map(ray).collect()
+    }
+
+    #[test]
+    fn cells_that_all_rays_go_through_lie_in_the_opening() {
+        let spheres = |half: f32| narrowest(&rays(half)).iter().map(Item::bounds).collect::<Vec<_>>();
+        let found = spheres(0.2);
+        assert!(found.len() < 20, "{} cells", found.len());
+        for Bounds { min, max } in found {
+            let middle = 0.5 * (min + max);
+            let off = middle.truncate().abs().max_element();
+            assert!((middle.z - 1.0).abs() < 0.35 && off < 0.45, "{middle}");
+        }
+        assert!(spheres(2.0).len() > 100, "control: rays to everywhere");
+    }
+
+    #[test]
+    fn shares_leave_some_for_the_scene_and_are_not_too_uneven() {
+        let sphere = |radius: f32| Target { center: Vec3::ZERO, radius };
+        for nested in [vec![], vec![sphere(3.0), sphere(9.0)]] {
+            let entries = with_shares(vec![sphere(0.5), sphere(1.0)], &nested, &sphere(40.0));
+            let rest = 1.0 - entries.iter().map(|entry| entry.share).sum::<f32>();
+            assert!(rest > 0.1, "{rest}");
+            let density = |entry: &Entry| entry.share / entry.target.radius.powi(2);
+            let beside: f32 = entries[2..].iter().map(density).sum::<f32>() + rest / 1600.0;
+            let ratio = density(&entries[0]) / beside;
+            assert!((ratio / LEVEL - 1.0).abs() < 1e-3, "{ratio}");
+            assert_eq!(density(&entries[0]), density(&entries[1]));
+        }
+        let large = with_shares(vec![sphere(30.0)], &[], &sphere(40.0));
+        assert!(large.is_empty(), "control: {large:?}");
+    }
 }

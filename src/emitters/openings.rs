@@ -31,7 +31,7 @@ const MAX_POINTS: usize = 1 << 13;
 const POINTS: usize = 32;
 const FEWEST: usize = 8;
 /// Fraction of the extent of points from which on a gap divides them, in halvings up to this depth.
-const WIDE_GAP: f32 = 0.3;
+const WIDE_GAP: f32 = 0.5;
 const MAX_GAPS: u32 = 10;
 /// Rays of a region: towards the environment by its luminance, by the cosine, and into bins that
 /// light came from in one round.
@@ -426,4 +426,60 @@ fn direction_of(place: Vec2) -> Vec3 {
     let z = (1.0 - r * r).copysign(inside);
     let across = r * (2.0 - r * r).max(0.0).sqrt();
     vec3((across * phi.cos()).copysign(centered.x), (across * phi.sin()).copysign(centered.y), z).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_and_bins_belong_together_and_bins_are_of_one_size() {
+        let side = 512;
+        let mut counts = vec![0_u32; BINS];
+        for i in 0..side * side {
+            // Uniform over the sphere.
+            let z = 1.0 - 2.0 * ((i / side) as f32 + 0.5) / side as f32;
+            let (sine, cosine) = (2.0 * PI * ((i % side) as f32 + 0.5) / side as f32).sin_cos();
+            let across = (1.0 - z * z).sqrt();
+            let direction = vec3(across * cosine, across * sine, z);
+            let again = direction_of(square_of(direction));
+            assert!(direction.distance(again) < 1e-3, "{direction} comes back as {again}");
+            counts[bin_of(direction)] += 1;
+        }
+        let even = (side * side) as f32 / BINS as f32;
+        let off = counts.iter().map(|count| (*count as f32 / even - 1.0).abs()).fold(0.0, f32::max);
+        assert!(off < 0.25, "a bin has {off} more or less than its share");
+        assert!((0..BINS).all(|bin| bin_of(middle_of(bin)) == bin));
+    }
+
+    #[test]
+    fn a_sphere_shows_directions_with_their_solid_angles() {
+        let sphere = Sphere { center: vec3(0.2, -0.1, 0.4), radius: 3.0 };
+        let origin = vec3(1.0, 0.5, -0.3);
+        for i in 0..100 {
+            let [x, y, ..] = numbers(i);
+            let direction = direction_of(vec2(x, y));
+            let (seen, stretch) = sphere.seen(origin, direction);
+            assert!(sphere.direction(origin, seen).distance(direction) < 1e-4);
+            // The solid angle of a small triangle there, over that at the origin.
+            let (right, up) = direction.any_orthonormal_pair();
+            let beside = [right, up].map(|aside| (direction + 0.01 * aside).normalize());
+            let area = |d: Vec3, a: Vec3, b: Vec3| (a - d).cross(b - d).length();
+            let [a, b] = beside.map(|d| sphere.seen(origin, d).0);
+            let ratio = area(seen, a, b) / area(direction, beside[0], beside[1]);
+            assert!((ratio / stretch - 1.0).abs() < 0.05, "{ratio} instead of {stretch}");
+        }
+    }
+
+    #[test]
+    fn gaps_divide_points() {
+        let points = |offset: f32| (0..16).map(move |i| (vec3(0.1 * i as f32 + offset, 0.0, 0.0), Vec3::Y));
+        let groups = |points: Vec<(Vec3, Vec3)>| {
+            let (mut nodes, mut groups) = (vec![Node::Leaf(None)], Vec::new());
+            split((0, 0), points, &mut nodes, &mut groups);
+            groups.len()
+        };
+        assert_eq!(groups(points(0.0).collect()), 1);
+        assert_eq!(groups(points(0.0).chain(points(10.0)).collect()), 2);
+    }
 }

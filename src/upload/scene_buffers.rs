@@ -257,8 +257,8 @@ impl SceneBuffers {
     }
 }
 
-/// Size of the stack of a traversal, rounded up, so that few variants of a kernel are compiled: more
-/// so where it takes no memory of workgroups that would let fewer of them run at once.
+/// Size of the stack of a traversal, rounded up, so that few variants of a kernel are compiled:
+/// more so where it takes no memory of workgroups that would let fewer of them run at once.
 fn rounded_stack(gpu: &Gpu, depth: usize) -> usize {
     let step = if gpu.is_software { 32 } else { 16 };
     depth.max(1).next_multiple_of(step).min(INSTANCED_STACK)
