@@ -74,7 +74,7 @@ fn photons_that_are_aimed_at_a_window_bring_the_same_light_by_fewer_paths() {
     let sunny = Scene { lights: vec![sun(towards)], ..room_with_window(0.5) };
     for (name, scene) in [("sky", sky), ("sun", sunny)] {
         let [aimed, plain] = [Emission::Aimed, Emission::Unaimed].map(|emission| look(&scene, emission));
-        let [found, right] = [&aimed, &plain].map(|render| mean(render));
+        let [found, right] = [&aimed, &plain].map(mean);
         assert!(within(found, right, 0.015), "{name}: {found} instead of {right}");
         let [few, many] = [&aimed, &plain].map(|render| render.stats.photons.global.emitted);
         assert!(3 * few < many, "{name}: {few} paths instead of {many}");
