@@ -86,6 +86,9 @@ pub fn entries(
         let radius = AROUND * (extent.max - extent.min).max_element();
         parts.extend(lit.into_iter().map(|place| Item::Sphere(place, radius)));
     }
+    if parts.is_empty() {
+        return Vec::new();
+    }
     let narrow = spheres_around(parts.into_iter().map(|part| vec![part]).collect(), MAX_ENTRIES);
     with_shares(narrow, &nested(&surfaces, whole), whole)
 }
@@ -145,7 +148,9 @@ fn narrowest(rays: &[(Vec3, Vec3)]) -> Vec<Item> {
     };
     let way = |(origin, direction): &&(Vec3, Vec3)| {
         let inside = |position: &Vec3| position.cmpge(low).all() && position.cmple(high).all();
-        let places = (0..).map(|i| *origin + 0.5 * side * i as f32 * *direction).take_while(inside);
+        // No more steps than through the whole box: far from the origin they may be rounded away.
+        let steps = 4 * CELLS as u32;
+        let places = (0..steps).map(|i| *origin + 0.5 * side * i as f32 * *direction).take_while(inside);
         let mut cells: Vec<u32> = places.map(cell_at).collect();
         cells.dedup();
         cells

@@ -60,9 +60,8 @@ const MAX_EDGES: usize = 32;
 const EDGE: f32 = 0.15;
 /// Minimum radius of a sphere that shows openings, in those of the region.
 const CLEARANCE: f32 = 1.3;
-/// Words before the nodes: the roots of the trees, one for each of the normals' six directions, and
-/// the number of the nodes' words.
-const HEAD: usize = 8;
+/// Words before the nodes: the roots of the trees, one for each of the normals' six directions.
+const HEAD: usize = 6;
 /// Words of a region before its distributions: bounds, the part of the samples, and the sphere.
 const REGION_HEAD: usize = 12;
 /// In place of an axis: a leaf.
@@ -74,7 +73,7 @@ const STEPS: [f64; 4] = [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706
 /// The regions, in a tree for each of the six directions that normals are closest to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Openings {
-    roots: [u32; 6],
+    roots: [u32; HEAD],
     nodes: Vec<Node>,
     regions: Vec<Region>,
     open: f32,
@@ -132,9 +131,9 @@ impl Openings {
             passes: scene.materials.iter().map(may_pass).collect(),
         };
         let points = thinned(seen.iter().flat_map(SeenPoint::points).collect(), MAX_POINTS);
-        let mut sides: [Vec<(Vec3, Vec3)>; 6] = Default::default();
+        let mut sides: [Vec<(Vec3, Vec3)>; HEAD] = Default::default();
         points.into_iter().for_each(|point| sides[side_of(point.1)].push(point));
-        let (mut nodes, mut groups, mut roots) = (Vec::new(), Vec::new(), [0; 6]);
+        let (mut nodes, mut groups, mut roots) = (Vec::new(), Vec::new(), [0; HEAD]);
         for (root, points) in roots.iter_mut().zip(sides) {
             *root = nodes.len() as u32;
             nodes.push(Node::Leaf(None));
@@ -177,9 +176,8 @@ impl Openings {
             Node::Inner { axis, at, first } => [at.to_bits(), axis << 30 | first],
             Node::Leaf(region) => [region.map_or(0, |region| first_region + stride * region), LEAF << 30],
         };
-        let head = self.roots.into_iter().chain([0; HEAD - 6]);
         let nodes = self.nodes.iter().flat_map(node);
-        head.chain(nodes).chain(self.regions.iter().flat_map(Region::words)).collect()
+        self.roots.into_iter().chain(nodes).chain(self.regions.iter().flat_map(Region::words)).collect()
     }
 }
 
