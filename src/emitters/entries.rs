@@ -19,6 +19,9 @@ use crate::{
 const MAX_ENTRIES: u32 = 8;
 /// Minimum number of points that the sun reaches.
 const FEWEST: usize = 8;
+/// Minimum radius of what is seen, in that of the scene. Light that a garden or a street reflects
+/// into a room would have fewer and stronger photons, if more paths were aimed at its windows.
+const MOST_OF_SCENE: f32 = 0.6;
 /// Fraction of what is seen that a parallel light reaches, up to which it has to be aimed.
 const MOST_LIT: f32 = 0.25;
 /// Fraction of what is seen that much of the sky lights, up to which that has to be aimed.
@@ -36,14 +39,11 @@ const SEEN_MARGIN: f32 = 0.1;
 /// Fraction of the rays that go through the cells of the entries, and maximum number of these.
 const COVERED: f32 = 0.98;
 const MAX_CELLS: usize = 512;
-/// Greatest sum of the cross-sections of the entries, in that of what is seen: larger ones gain
+/// Greatest sum of the cross-sections of the entries, in that of the scene: larger ones gain
 /// nothing.
 const LARGEST: f32 = 0.3;
 /// Density of the paths to the entries over that beside them.
-const LEVEL: f32 = 8.0;
-/// Maximum number of the spheres around what is seen, and ratio of their radii.
-const MAX_NESTED: usize = 6;
-const RATIO: f32 = 3.0;
+const LEVEL: f32 = 4.0;
 
 /// A sphere that parallel light is aimed at, and its share of the paths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,9 +52,9 @@ pub struct Entry {
     pub share: f32,
 }
 
-/// The entries of all parallel light, and spheres around what is seen, where there is much else.
-/// The rest of the paths is spread over the scene. None if one of the lights reaches much of what
-/// is seen, as paths that are spread over the scene then do.
+/// The entries of all parallel light. The rest of the paths is spread over the scene. None if one
+/// of the lights reaches much of what is seen, as paths that are spread over the scene then do; nor
+/// if there is much beside what is seen.
 #[must_use]
 pub fn entries(
     scene: &Scene,
@@ -63,6 +63,11 @@ pub fn entries(
     openings: Option<&Openings>,
     whole: &Target,
 ) -> Vec<Entry> {
+    let surfaces: Vec<(Vec3, Vec3)> = seen.iter().flat_map(SeenPoint::points).collect();
+    let (low, high) = box_of_most(&surfaces, SEEN_TRIMMED, SEEN_MARGIN);
+    if 0.5 * (high - low).length() < MOST_OF_SCENE * whole.radius {
+        return Vec::new();
+    }
     let mut parts = Vec::new();
     if scene.environment.as_ref().is_some_and(|environment| !environment.is_dark()) {
         match openings.filter(|openings| openings.open() < MOST_OPEN) {
@@ -73,7 +78,6 @@ pub fn entries(
     let suns = scene.lights.iter().filter(|light| light.kind == LightKind::Directional);
     let suns = suns.filter(|light| light.intensity.max_element() > 0.0).map(|light| -light.direction);
     let passes: Vec<bool> = scene.materials.iter().map(may_pass).collect();
-    let surfaces: Vec<(Vec3, Vec3)> = seen.iter().flat_map(SeenPoint::points).collect();
     for sun in suns {
         let is_lit = |(position, normal): &(Vec3, Vec3)| {
             normal.dot(sun) > 0.0 && !bvh.is_blocked(*position, sun, &|m| passes[m as usize])
@@ -89,34 +93,22 @@ pub fn entries(
     if parts.is_empty() {
         return Vec::new();
     }
-    let narrow = spheres_around(parts.into_iter().map(|part| vec![part]).collect(), MAX_ENTRIES);
-    with_shares(narrow, &nested(&surfaces, whole), whole)
-}
-
-/// Spheres around what is seen, each next one larger, up to one that is not much smaller than the
-/// scene: light from far away comes from there too.
-fn nested(surfaces: &[(Vec3, Vec3)], whole: &Target) -> Vec<Target> {
-    let (low, high) = box_of_most(surfaces, SEEN_TRIMMED, SEEN_MARGIN);
-    let (center, smallest) = (0.5 * (low + high), 0.5 * (high - low).length());
-    let radii = std::iter::successors(Some(smallest), |radius| Some(RATIO * radius)).take(MAX_NESTED);
-    let radii = radii.take_while(|radius| *radius > 0.0 && RATIO * radius <= 2.0 * whole.radius);
-    radii.map(|radius| Target { center, radius }).collect()
+    let spheres = spheres_around(parts.into_iter().map(|part| vec![part]).collect(), MAX_ENTRIES);
+    with_shares(&spheres, whole)
 }
 
 /// Entries that are small enough to gain something, with shares by which paths to them are no more
 /// than some times as dense as beside them: light by an entry that was not found has stronger
 /// photons then, but not much stronger ones.
-fn with_shares(narrow: Vec<Target>, nested: &[Target], whole: &Target) -> Vec<Entry> {
+fn with_shares(spheres: &[Target], whole: &Target) -> Vec<Entry> {
     let size = |sphere: &Target| sphere.radius * sphere.radius;
-    let sizes: f32 = narrow.iter().map(size).sum();
-    let inner = nested.first().unwrap_or(whole);
-    let (narrow, sizes) = if sizes < LARGEST * size(inner) { (narrow, sizes) } else { (Vec::new(), 0.0) };
-    let even = 1.0 / (nested.len() + 1) as f32;
-    let beside: f32 = nested.iter().chain([whole]).map(|sphere| even / size(sphere)).sum();
-    let odds = LEVEL * beside * sizes;
+    let sizes: f32 = spheres.iter().map(size).sum();
+    if sizes >= LARGEST * size(whole) {
+        return Vec::new();
+    }
+    let odds = LEVEL * sizes / size(whole);
     let part = odds / (1.0 + odds);
-    let narrow = narrow.iter().map(|target| Entry { target: *target, share: part * size(target) / sizes });
-    narrow.chain(nested.iter().map(|target| Entry { target: *target, share: even * (1.0 - part) })).collect()
+    spheres.iter().map(|target| Entry { target: *target, share: part * size(target) / sizes }).collect()
 }
 
 /// A box around most points, for all that some lie far away, as on the houses across the street:
@@ -209,17 +201,13 @@ mod tests {
     #[test]
     fn shares_leave_some_for_the_scene_and_are_not_too_uneven() {
         let sphere = |radius: f32| Target { center: Vec3::ZERO, radius };
-        for nested in [vec![], vec![sphere(3.0), sphere(9.0)]] {
-            let entries = with_shares(vec![sphere(0.5), sphere(1.0)], &nested, &sphere(40.0));
-            let rest = 1.0 - entries.iter().map(|entry| entry.share).sum::<f32>();
-            assert!(rest > 0.1, "{rest}");
-            let density = |entry: &Entry| entry.share / entry.target.radius.powi(2);
-            let beside: f32 = entries[2..].iter().map(density).sum::<f32>() + rest / 1600.0;
-            let ratio = density(&entries[0]) / beside;
-            assert!((ratio / LEVEL - 1.0).abs() < 1e-3, "{ratio}");
-            assert_eq!(density(&entries[0]), density(&entries[1]));
-        }
-        let large = with_shares(vec![sphere(30.0)], &[], &sphere(40.0));
+        let entries = with_shares(&[sphere(0.5), sphere(1.0)], &sphere(4.0));
+        let rest = 1.0 - entries.iter().map(|entry| entry.share).sum::<f32>();
+        let density = |entry: &Entry| entry.share / entry.target.radius.powi(2);
+        let ratio = density(&entries[0]) / (rest / 16.0);
+        assert!((ratio / LEVEL - 1.0).abs() < 1e-3, "{ratio}");
+        assert_eq!(density(&entries[0]), density(&entries[1]));
+        let large = with_shares(&[sphere(3.0)], &sphere(4.0));
         assert!(large.is_empty(), "control: {large:?}");
     }
 }
