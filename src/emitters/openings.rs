@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::{
     cumulative::cumulative,
     environment_map::EnvironmentMap,
-    sight::{SeenPoint, thinned},
+    sight::{SeenPoint, cosine_direction, thinned},
 };
 use crate::{
     bvh::Bvh,
@@ -217,7 +217,10 @@ impl Surroundings<'_> {
             return if part < LEAST { Sky::Open } else { Sky::Dark };
         }
         let by_sky = arrived.len();
-        let by_cosine = (0..BY_COSINE).map(|ray| self.ray(point(ray), cosine_direction(point(ray).1, numbers(ray))));
+        let by_cosine = (0..BY_COSINE).map(|ray| {
+            let [u, v, ..] = numbers(ray);
+            self.ray(point(ray), cosine_direction(point(ray).1, [u, v]))
+        });
         arrived.extend(by_cosine.filter(|ray| ray.light > 0.0));
         let Bounds { min: low, max: high } = Bounds::around(points.iter().map(|point| point.0));
         let margin = Vec3::splat(MARGIN * (high - low).max_element());
@@ -370,13 +373,6 @@ fn side_of(normal: Vec3) -> usize {
 
 fn numbers(i: u32) -> [f32; 4] {
     STEPS.map(|step| (0.5 + step * f64::from(i)).fract() as f32)
-}
-
-fn cosine_direction(normal: Vec3, [u, v, ..]: [f32; 4]) -> Vec3 {
-    let (right, up) = normal.any_orthonormal_pair();
-    let (sine, cosine) = (2.0 * PI * v).sin_cos();
-    let local = vec3(u.sqrt() * cosine, u.sqrt() * sine, (1.0 - u).max(1e-6).sqrt());
-    (local.x * right + local.y * up + local.z * normal).normalize()
 }
 
 /// Bins that are lit, and those beside them.

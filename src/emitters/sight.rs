@@ -135,8 +135,8 @@ fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<SeenPoint> {
         };
         let origin = origin + camera.near.min(0.0) * camera.forward;
         let (position, normal) = diffuse_hit(scene, bvh, origin, direction)?;
-        let directions =
-            (0..BOUNCES).map(|bounce| cosine_direction(normal, BOUNCES * (row * size.0 + column) + bounce));
+        let directions = (0..BOUNCES)
+            .map(|bounce| cosine_direction(normal, even_numbers(BOUNCES * (row * size.0 + column) + bounce)));
         let around = directions.filter_map(|d| diffuse_hit(scene, bvh, position, d)).collect();
         Some(SeenPoint { position, normal, around })
     };
@@ -179,9 +179,13 @@ fn goes_on(material: &Material) -> Option<Way> {
     }
 }
 
-/// The `i`-th cosine-distributed direction about `normal`.
-fn cosine_direction(normal: Vec3, i: u32) -> Vec3 {
-    let [u, v] = STEPS.map(|step| (0.5 + step * f64::from(i)).fract() as f32);
+/// The `i`-th point of a low-discrepancy sequence in the unit square.
+fn even_numbers(i: u32) -> [f32; 2] {
+    STEPS.map(|step| (0.5 + step * f64::from(i)).fract() as f32)
+}
+
+/// Cosine-distributed direction about `normal`, by two numbers from 0 to 1.
+pub(super) fn cosine_direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     let (right, up) = normal.any_orthonormal_pair();
     let (sine, cosine) = (std::f32::consts::TAU * v).sin_cos();
     let local = vec3(u.sqrt() * cosine, u.sqrt() * sine, (1.0 - u).max(1e-6).sqrt());
