@@ -2,6 +2,7 @@
 //! emissive triangles and spheres, the environment. Host only; `upload` puts it on the device.
 
 mod cumulative;
+mod direction_bins;
 pub mod entries;
 pub mod environment_map;
 pub mod importance;
