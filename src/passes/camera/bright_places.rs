@@ -168,14 +168,17 @@ impl RayEnd {
         let corner = start + first * direction;
         let after = self.position - corner;
         let length = first + after.length();
-        let straight = Aim { position: self.position, normal: self.normal };
-        if length <= STRAIGHT * self.position.distance(start) {
-            return [Some(straight), None];
+        let is_straight = length <= STRAIGHT * self.position.distance(start);
+        // What shines through a surface has the normal of its other side, and is seen on this one.
+        let arrives = if is_straight { direction } else { after };
+        let normal = if self.normal.dot(arrives) > 0.0 { -self.normal } else { self.normal };
+        if is_straight {
+            return [Some(Aim { position: self.position, normal }), None];
         }
         // The reflection that turns the way back into one line turns the surface as well.
         let turned = match (direction - after.normalize_or_zero()).try_normalize() {
-            Some(mirror) => self.normal - 2.0 * self.normal.dot(mirror) * mirror,
-            None => self.normal,
+            Some(mirror) => normal - 2.0 * normal.dot(mirror) * mirror,
+            None => normal,
         };
         let image = Aim { position: start + length * direction, normal: turned };
         [Some(image), Some(Aim { position: corner, normal: Vec3::ZERO })]
