@@ -13,10 +13,13 @@ use crate::{
 
 /// Angle added to cones against the rounding of their unions, radians.
 const ANGLE_SLACK: f32 = 1e-5;
-/// Steps of a 16-bit snorm number from 0 to 1, and those by which the falloff's cosine is lowered
-/// for the rounding of axes.
-const COSINE_STEPS: i16 = i16::MAX;
-const FALLOFF_SLACK: i16 = 4;
+/// Steps from 0 to 1 of the cosines of spread and falloff, and those by which the falloff's is
+/// lowered for the rounding of axes.
+const SPREAD_STEPS: f32 = i16::MAX as f32;
+const FALLOFF_STEPS: f32 = i8::MAX as f32;
+const FALLOFF_SLACK: f32 = 1.0;
+/// Part of the light that must shine along its mean direction for that to be the axis of a cone.
+const LEAST_DIRECTED: f32 = 1e-3;
 
 /// Bounds of one light or several. Lights at infinity (`is_far`) have no
 /// position.
@@ -32,9 +35,11 @@ pub(super) struct LightBounds {
     /// Surfaces shine along the opposite cone as well.
     pub both_ways: bool,
     pub is_far: bool,
-    /// Sum of the greatest radiant intensities, W/sr; of lights at infinity, of the irradiance of
-    /// surfaces that face them, W/m².
+    /// Sum of the [`strength`] of all.
     pub intensity: f32,
+    /// Sum of intensities times normals of surfaces. Of those that shine both ways, the normal
+    /// that is nearer to the sum of the others; of points and spots 0.
+    pub directed: Vec3,
 }
 
 impl LightBounds {
@@ -62,20 +67,23 @@ impl LightBounds {
         let weak = intensity.max(f32::MIN_POSITIVE.into()) as f32;
         let is_finite =
             (bounds.max - bounds.min).length_squared().is_finite() && axis.is_finite() && axis != Vec3::ZERO;
+        let is_surface = light.kind == layout::TRIANGLE_LIGHT;
         (intensity > 0.0 && weak.is_finite() && is_finite).then_some(Self {
             bounds,
             axis,
             spread,
             falloff,
-            both_ways: light.kind == layout::TRIANGLE_LIGHT && light.solid_angle > 1.5 * PI,
+            both_ways: is_surface && light.solid_angle > 1.5 * PI,
             is_far: matches!(light.kind, layout::DIRECTIONAL_LIGHT | layout::ENVIRONMENT_LIGHT),
             intensity: weak,
+            directed: if is_surface { weak * axis } else { Vec3::ZERO },
         })
     }
 
     /// Bounds of both.
     pub fn union(self, other: Self) -> Self {
         let (axis, spread) = union_of_cones((self.axis, self.spread), (other.axis, other.spread));
+        let is_turned = self.both_ways && other.both_ways && self.directed.dot(other.directed) < 0.0;
         Self {
             bounds: self.bounds.union(other.bounds),
             axis,
@@ -84,7 +92,20 @@ impl LightBounds {
             both_ways: self.both_ways || other.both_ways,
             is_far: self.is_far,
             intensity: self.intensity + other.intensity,
+            directed: self.directed + if is_turned { -other.directed } else { other.directed },
         }
+    }
+
+    /// The same with the mean direction of surfaces as the axis of the cone. `all`: what is bounded.
+    pub fn about_mean<'a>(self, all: impl Iterator<Item = &'a Self>) -> Self {
+        let is_directed = self.directed.length() > LEAST_DIRECTED * self.intensity;
+        if !is_directed || self.both_ways || self.spread == 0.0 {
+            return self;
+        }
+        let axis = self.directed.normalize();
+        let reach = |light: &Self| angle_between(axis, light.axis) + light.spread;
+        let spread = all.map(reach).fold(0.0, f32::max) + ANGLE_SLACK;
+        Self { axis, spread: spread.min(PI), ..self }
     }
 
     /// Point by which lights are split: their positions, or their directions if they are at
@@ -103,9 +124,15 @@ impl LightBounds {
     /// The node of these bounds. `next` as in [`LightNode::next`], without its bits for bounds.
     pub fn node(&self, next: u32) -> LightNode {
         let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
+        let lowered = |cosine: f32, steps: f32, slack: f32| ((cosine * steps).floor() - slack).max(-steps);
         // A single direction is exact.
-        let spread = if self.spread > 0.0 { lowered(self.spread.cos(), 0) } else { COSINE_STEPS };
-        let cones = spread as u16 as u32 | ((lowered(self.falloff.cos(), FALLOFF_SLACK) as u16 as u32) << 16);
+        let spread = if self.spread > 0.0 { lowered(self.spread.cos(), SPREAD_STEPS, 0.0) } else { SPREAD_STEPS };
+        let falloff = lowered(self.falloff.cos(), FALLOFF_STEPS, FALLOFF_SLACK);
+        let along = (self.directed.dot(self.axis) / self.intensity).clamp(0.0, 1.0);
+        let scatter = ((1.0 - along * along).sqrt() * f32::from(u8::MAX)).round();
+        let cones = u32::from(spread as i16 as u16)
+            | (u32::from(scatter as u8) << 16)
+            | (u32::from(falloff as i8 as u8) << 24);
         let next = next | bit(self.both_ways, BOTH_WAYS_BIT) | bit(self.is_far, FAR_BIT);
         LightNode {
             center: (0.5 * (self.bounds.min + self.bounds.max)).to_array(),
@@ -115,16 +142,17 @@ impl LightBounds {
     }
 }
 
-/// Greatest radiant intensity of a light, W/sr; of a light at infinity the irradiance that it
-/// gives, W/m².
+/// Greatest radiant intensity of a surface, W/sr, and four times that of what shines to all sides
+/// alike, as a ball of such surfaces does; of a light at infinity the irradiance that it gives,
+/// W/m².
 pub(super) fn strength(light: &layout::Light, power: f64, sky: f64) -> f64 {
     let mean = light.emission.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
     match light.kind {
         layout::DIRECTIONAL_LIGHT => mean,
         layout::ENVIRONMENT_LIGHT => sky,
         // A sphere shows a quarter of its surface.
-        layout::SPHERE_LIGHT => power / (4.0 * f64::from(light.solid_angle)),
-        _ => power / f64::from(light.solid_angle),
+        layout::SPHERE_LIGHT | layout::TRIANGLE_LIGHT => power / f64::from(light.solid_angle),
+        _ => 4.0 * power / f64::from(light.solid_angle),
     }
 }
 
@@ -141,14 +169,14 @@ fn packed_half(half: Vec3) -> u32 {
     (exponent << 24) | (x << 16) | (y << 8) | z
 }
 
-/// The 16-bit snorm number below a cosine, and `slack` steps below that.
-fn lowered(cosine: f32, slack: i16) -> i16 {
-    ((cosine * f32::from(COSINE_STEPS)).floor() as i16).saturating_sub(slack).max(-COSINE_STEPS)
-}
-
 /// The angle of which 1 − cos is `height`.
 fn angle_of_height(height: f32) -> f32 {
     2.0 * (0.5 * height.clamp(0.0, 2.0)).sqrt().min(1.0).asin()
+}
+
+/// Of unit vectors, by half of their distance, which small angles do not round away.
+fn angle_between(a: Vec3, b: Vec3) -> f32 {
+    2.0 * (0.5 * a.distance(b)).min(1.0).asin()
 }
 
 /// The cone around two cones, each an axis and a half angle.
@@ -157,8 +185,7 @@ fn union_of_cones(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     if wide.1 >= PI {
         return wide;
     }
-    // By half of the distance of the axes, which small angles do not round away.
-    let between = 2.0 * (0.5 * wide.0.distance(narrow.0)).min(1.0).asin();
+    let between = angle_between(wide.0, narrow.0);
     if between + narrow.1 <= wide.1 {
         return wide;
     }

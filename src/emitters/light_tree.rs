@@ -90,15 +90,15 @@ fn subtree(items: &mut [Item], slots: &mut [LightNode], first: u32, depth: u32) 
     }
     let is_large = items.len() > PARALLEL;
     let count = divide(items, depth);
-    let (items, others) = items.split_at_mut(count);
+    let (nearer, others) = items.split_at_mut(count);
     let (pair, slots) = slots.split_at_mut(2);
     let (own, rest) = slots.split_at_mut(2 * (count - 1));
     let second = first + 2 + own.len() as u32;
-    let mut left = || subtree(items, own, first + 2, depth + 1);
+    let mut left = || subtree(nearer, own, first + 2, depth + 1);
     let mut right = || subtree(others, rest, second, depth + 1);
     let (left, right) = if is_large { rayon::join(left, right) } else { (left(), right()) };
     (pair[0], pair[1]) = (left.node, right.node);
-    let bounds = left.bounds.union(right.bounds);
+    let bounds = left.bounds.union(right.bounds).about_mean(items.iter().map(|item| &item.bounds));
     Subtree { node: bounds.node(first), bounds }
 }
 

@@ -116,11 +116,12 @@ pub struct LightNode {
     /// Half extents of the box: eight bits each, z lowest, in units of which the top eight bits are
     /// the exponent, biased as in a float.
     pub half: u32,
-    /// Word 0: axis of the cone along which they shine, octahedral. Word 1: cosines of its half
-    /// angle, and of the angle from there on beyond which nothing shines; each a 16-bit snorm
-    /// number, rounded down. Word 2: bits of the sum of their greatest radiant intensities, or of
-    /// the irradiance by lights at infinity, relative to that of all lights. Word 3,
-    /// [`Self::next`].
+    /// Word 0: axis of the cone along which they shine, octahedral. Word 1: cosine of its half
+    /// angle, a 16-bit snorm number; √(1 − d²), an 8-bit unorm number, where d is the part of the
+    /// light that shines along the axis; and the cosine of the angle from the cone on beyond which
+    /// nothing shines, an 8-bit snorm number. Cosines are rounded down. Word 2: bits of the sum of
+    /// their intensities, four times those of points, or of the irradiance by lights at infinity,
+    /// relative to that of all lights. Word 3, [`Self::next`].
     pub shine: [u32; 4],
 }
 
