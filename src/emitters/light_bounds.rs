@@ -96,7 +96,8 @@ impl LightBounds {
         }
     }
 
-    /// The same with the mean direction of surfaces as the axis of the cone. `all`: what is bounded.
+    /// The same with the mean direction of surfaces as the axis of the cone. `all`: what is
+    /// bounded.
     pub fn about_mean<'a>(self, all: impl Iterator<Item = &'a Self>) -> Self {
         let is_directed = self.directed.length() > LEAST_DIRECTED * self.intensity;
         if !is_directed || self.both_ways || self.spread == 0.0 {

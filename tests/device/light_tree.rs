@@ -5,6 +5,7 @@
 //! | choice | lights are as frequent as their probability says (chi-square), and it is the same both ways | probabilities for another point |
 //! | microfacets | the same for rough lobes | probabilities for another viewer |
 //! | highlight | the one of many lamps that narrow microfacets mirror is chosen often | wide ones |
+//! | curved lamps | triangles of balls and tubes are chosen about in proportion to what they give | all alike |
 //! | contribution | a light that can light a point has a probability above 0 there | probabilities for the opposite normal |
 
 use std::f64::consts::PI;
@@ -16,7 +17,7 @@ use caustica::{
     upload::SceneBuffers,
 };
 use glam::{DVec3, Vec3, vec3};
-use support::{photons::Random, *};
+use support::{meshes::Mesh, photons::Random, *};
 
 use super::{
     chi_square::{SAMPLES, deviate},
@@ -144,6 +145,45 @@ fn the_lamp_that_microfacets_mirror_is_chosen_often() {
     let chosen = |width: f32| told(BY_LOBES, &buffers, Vec3::ZERO, width * wo)[mirrored];
     assert!(chosen(0.05) > 0.2, "{}", chosen(0.05));
     assert!(chosen(1.0) < 0.05, "control: {}", chosen(1.0));
+}
+
+/// Variance of what a triangle gives by its middle over its probability, in units of the squared
+/// mean; and the same if all are chosen alike.
+fn variances(lamp: &Mesh, point: Vec3, normal: Vec3) -> [f64; 2] {
+    let mut scene = scene(&[diffuse(0.5)]);
+    scene.materials.push(emissive("lamp", 0.0, 1.0, false));
+    for corners in &lamp.triangles {
+        let [a, b, c] = corners.map(|i| lamp.positions[i as usize]);
+        scene.triangles.push(Triangle::new([a, b, c], [(b - a).cross(c - a).normalize(); 3], 1));
+    }
+    let buffers = upload(&scene, LightSampling::Power);
+    let gives = |light: &layout::Light| {
+        let [p, e1, e2] = [light.position, light.e1, light.e2].map(|v| Vec3::from_array(v).as_dvec3());
+        let to = p + (e1 + e2) / 3.0 - point.as_dvec3();
+        let cosines = (-to.dot(e1.cross(e2))).max(0.0) * to.dot(normal.as_dvec3()).max(0.0);
+        cosines / to.length_squared().powi(2)
+    };
+    let given: Vec<f64> = buffers.lights.table.lights.iter().map(gives).collect();
+    let told = told(BY_IRRADIANCE, &buffers, point, normal);
+    let sum: f64 = given.iter().sum();
+    let of = |probability: &dyn Fn(usize) -> f64| {
+        let square = |(i, x): (usize, &f64)| if *x > 0.0 { x * x / probability(i) } else { 0.0 };
+        given.iter().enumerate().map(square).sum::<f64>() / (sum * sum) - 1.0
+    };
+    [of(&|i| told[i]), of(&|_| 1.0 / given.len() as f64)]
+}
+
+#[test]
+fn parts_of_curved_lamps_are_chosen_by_what_they_give() {
+    let ball = Mesh::ball(Vec3::ZERO, 0.08, 32);
+    let tube = Mesh::lathe(Vec3::ZERO, &[(0.02, -0.6), (0.02, -0.2), (0.02, 0.2), (0.02, 0.6)], 16);
+    for (lamp, most) in [(ball, 0.08), (tube, 0.12)] {
+        for (point, normal) in [(vec3(2.0, -1.0, 0.5), Vec3::Y), (vec3(-0.9, 0.4, 1.0), vec3(0.8, 0.0, -0.6))] {
+            let [by_tree, alike] = variances(&lamp, point, normal);
+            assert!(by_tree < most, "from {point}: {by_tree}");
+            assert!(alike > 5.0 * most, "control, from {point}: {alike}");
+        }
+    }
 }
 
 /// Points of a light from which it shines, each with the direction that it faces (0: all).
