@@ -176,6 +176,19 @@ impl Gatherer for MapGatherer<'_> {
         self.bright.clone()
     }
 
+    /// Keeps irradiance about the ends of rays that are aimed at bright places: of the others, few
+    /// end there.
+    fn prepare_aimed(&mut self, aimed: &CameraPass, stats: &mut Stats, progress: &dyn Progress) -> Result<()> {
+        let ends = ends_of_rays(aimed, stats, progress)?;
+        let Self { maps, search, estimate, cache, .. } = self;
+        let Some(cache) = cache else { return Ok(()) };
+        let mut irradiances = |points: &[VisiblePoint]| {
+            let points: Vec<_> = points.iter().map(bare).collect();
+            search.estimates(aimed, maps, estimate, &points, progress)
+        };
+        timed(&mut stats.seconds.gather, || cache.add(aimed.gpu, &ends.marks, &mut irradiances))
+    }
+
     fn blur(&self) -> f32 {
         self.cache.as_ref().map_or(0.0, IrradianceCache::width)
     }

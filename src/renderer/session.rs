@@ -307,13 +307,19 @@ impl<'a> Session<'a> {
             // The preview of each pass looks at points of its own; that of the first is a single
             // picture's.
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
-            for most in PREVIEW_RAYS {
+            let preview = |most| {
                 let small = preview_of(picture, pass.size, maps.settings().final_gather, most);
                 let preview = CameraPass::new(self.gpu, scene, camera, maps.settings(), estimate, &small)?;
-                let preview = preview.of_pass(&small, index)?;
-                if !gatherer.prepare(&preview, &mut stats, progress)? {
+                preview.of_pass(&small, index)
+            };
+            for most in PREVIEW_RAYS {
+                if !gatherer.prepare(&preview(most)?, &mut stats, progress)? {
                     break;
                 }
+            }
+            let bright = gatherer.bright_places();
+            if !bright.patches.is_empty() {
+                gatherer.prepare_aimed(&preview(PREVIEW_RAYS[0])?.aiming_at(&bright), &mut stats, progress)?;
             }
         }
         if estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty() {

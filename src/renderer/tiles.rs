@@ -52,6 +52,12 @@ pub(crate) trait Gatherer {
         BrightPlaces::default()
     }
 
+    /// Receives the same with rays that are aimed at bright places. The default does nothing with
+    /// it.
+    fn prepare_aimed(&mut self, _aimed: &CameraPass, _stats: &mut Stats, _progress: &dyn Progress) -> Result<()> {
+        Ok(())
+    }
+
     /// Receives a pass over a picture that is coarser by `spacing`, before the picture, to keep
     /// records of irradiance at its visible points. The default does nothing with it.
     fn keep_records(

@@ -51,10 +51,11 @@ impl Default for PointEstimate {
 pub(super) type Irradiances<'a> = dyn FnMut(&[VisiblePoint]) -> Result<Vec<PointEstimate>> + 'a;
 
 /// Entries by cell.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct CellTable {
-    /// A power of 2; at least half of them are no entries.
-    pub slots: Vec<IrradianceCell>,
+    entries: Vec<IrradianceCell>,
+    /// Width of a cell at most, in radii of its estimate.
+    spacing: f32,
     /// Cells of level 0 per metre.
     pub per_metre: f32,
     pub levels: u32,
@@ -72,21 +73,42 @@ impl CellTable {
         let Some(radius) = radii.get((radii.len() as f64 * PILOT_QUANTILE) as usize).filter(|r| **r > 0.0) else {
             return Ok(None);
         };
-        let per_metre = 1.0 / (spacing * radius);
-        let mut entries = Vec::new();
+        let mut table = Self { entries: Vec::new(), spacing, per_metre: 1.0 / (spacing * radius), levels: LEVELS };
+        table.add(marks, irradiances)?;
+        Ok(Some(table))
+    }
+
+    /// Has entries for those surfaces of further marks that have none.
+    pub fn add(&mut self, marks: &[VisiblePoint], irradiances: &mut Irradiances) -> Result<()> {
+        let mut known: BTreeMap<(u32, [i32; 3]), Vec<IrradianceCell>> = BTreeMap::new();
+        for entry in &self.entries {
+            known.entry((entry.level - 1, entry.coordinates)).or_default().push(*entry);
+        }
         let mut open: Vec<&VisiblePoint> = marks.iter().collect();
         for level in 0..LEVELS {
-            let per_metre = at_level(per_metre, level);
-            let surfaces = surfaces(&open, per_metre);
-            if entries.len() + surfaces.len() > MAX_ENTRIES {
+            let per_metre = at_level(self.per_metre, level);
+            let entry_at = |mark: &VisiblePoint| {
+                let cell = known.get(&(level, cell_at(mark, per_metre)))?;
+                cell.iter().find(|entry| is_flat((entry.position, entry.normal), mark, per_metre))
+            };
+            let (mut new, mut split) = (Vec::new(), Vec::new());
+            for mark in open {
+                match entry_at(mark) {
+                    None => new.push(mark),
+                    Some(entry) if entry.split != WHOLE_CELL => split.push(mark),
+                    Some(_) => {}
+                }
+            }
+            open = split;
+            let surfaces = surfaces(&new, per_metre);
+            if self.entries.len() + surfaces.len() > MAX_ENTRIES {
                 break;
             }
             let points: Vec<_> = surfaces.iter().map(|surface| *surface.marks[0]).collect();
-            open.clear();
             let found = irradiances(&points)?;
             let contrasts = contrasts(&surfaces, &found, per_metre);
             for ((surface, estimate), contrasts) in surfaces.into_iter().zip(found).zip(contrasts) {
-                let cells = estimate.radius * spacing * per_metre;
+                let cells = estimate.radius * self.spacing * per_metre;
                 let split = match cells {
                     _ if contrasts => WIDE_CELL,
                     1.0.. => WHOLE_CELL,
@@ -96,7 +118,7 @@ impl CellTable {
                 let Surface { coordinates, marks } = surface;
                 let VisiblePoint { position, ng: normal, .. } = *marks[0];
                 let level = level + 1;
-                entries.push(IrradianceCell {
+                self.entries.push(IrradianceCell {
                     coordinates,
                     level,
                     position,
@@ -111,8 +133,28 @@ impl CellTable {
                 }
             }
         }
-        Ok(Some(Self { slots: placed(&entries), per_metre, levels: LEVELS }))
+        Ok(())
     }
+
+    /// The entries, each at its hash or in the first free slot from there on. Their number is a
+    /// power of 2, and at least half of them are no entries.
+    pub fn slots(&self) -> Vec<IrradianceCell> {
+        let mut slots = vec![IrradianceCell::default(); (2 * self.entries.len()).next_power_of_two().max(2)];
+        let mask = slots.len() - 1;
+        for entry in &self.entries {
+            let mut slot = cell_hash(entry.coordinates, entry.level - 1) as usize & mask;
+            while slots[slot].level != 0 {
+                slot = (slot + 1) & mask;
+            }
+            slots[slot] = *entry;
+        }
+        slots
+    }
+}
+
+/// Coordinates of the cell of a point.
+fn cell_at(point: &VisiblePoint, per_metre: f32) -> [i32; 3] {
+    (Vec3::from(point.position) * per_metre).floor().as_ivec3().to_array()
 }
 
 /// Cells of that level per metre.
@@ -131,9 +173,8 @@ fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> Vec<Surface<'a>> 
     let mut cells: BTreeMap<[i32; 3], Vec<(f32, &VisiblePoint)>> = BTreeMap::new();
     for mark in marks {
         let at = Vec3::from(mark.position) * per_metre;
-        let coordinates = at.floor().as_ivec3();
         let from_centre = at.distance_squared(at.floor() + 0.5);
-        cells.entry(coordinates.to_array()).or_default().push((from_centre, mark));
+        cells.entry(cell_at(mark, per_metre)).or_default().push((from_centre, mark));
     }
     let mut surfaces = Vec::new();
     for (coordinates, mut marks) in cells {
@@ -141,7 +182,7 @@ fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> Vec<Surface<'a>> 
         let first = surfaces.len();
         for (_, mark) in marks {
             let found: &mut [Surface] = &mut surfaces[first..];
-            if let Some(surface) = found.iter_mut().find(|s| is_flat(s.marks[0], mark, per_metre)) {
+            if let Some(surface) = found.iter_mut().find(|s| is_flat(plane_of(s.marks[0]), mark, per_metre)) {
                 surface.marks.push(mark);
             } else if found.len() < MAX_SURFACES {
                 surfaces.push(Surface { coordinates, marks: vec![mark] });
@@ -164,7 +205,7 @@ fn contrasts(surfaces: &[Surface], found: &[PointEstimate], per_metre: f32) -> V
         for axis in 0..3 {
             let mut beside = surface.coordinates;
             beside[axis] += 1;
-            for j in in_cell(beside).filter(|j| is_flat(surface.marks[0], surfaces[*j].marks[0], per_metre)) {
+            for j in in_cell(beside).filter(|j| is_flat(plane_of(surface.marks[0]), surfaces[*j].marks[0], per_metre)) {
                 let differ = light[i].max(light[j]) > CONTRAST * light[i].min(light[j]);
                 contrasts[i] |= differ;
                 contrasts[j] |= differ;
@@ -174,25 +215,16 @@ fn contrasts(surfaces: &[Surface], found: &[PointEstimate], per_metre: f32) -> V
     contrasts
 }
 
-/// Whether `point` takes the irradiance at `mark`.
-fn is_flat(mark: &VisiblePoint, point: &VisiblePoint, per_metre: f32) -> bool {
-    let normal = Vec3::from(mark.ng);
-    let height = normal.dot(Vec3::from(point.position) - Vec3::from(mark.position));
-    height.abs() * per_metre <= CELL_FLATNESS && normal.dot(Vec3::from(point.ng)) >= CELL_COSINE
+/// Position and normal.
+fn plane_of(mark: &VisiblePoint) -> ([f32; 3], [f32; 3]) {
+    (mark.position, mark.ng)
 }
 
-/// Places entries by their hash, each in the first free slot from there on.
-fn placed(entries: &[IrradianceCell]) -> Vec<IrradianceCell> {
-    let mut slots = vec![IrradianceCell::default(); (2 * entries.len()).next_power_of_two().max(2)];
-    let mask = slots.len() - 1;
-    for entry in entries {
-        let mut slot = cell_hash(entry.coordinates, entry.level - 1) as usize & mask;
-        while slots[slot].level != 0 {
-            slot = (slot + 1) & mask;
-        }
-        slots[slot] = *entry;
-    }
-    slots
+/// Whether `point` takes the irradiance at a place of that position and normal.
+fn is_flat((position, normal): ([f32; 3], [f32; 3]), point: &VisiblePoint, per_metre: f32) -> bool {
+    let normal = Vec3::from(normal);
+    let height = normal.dot(Vec3::from(point.position) - Vec3::from(position));
+    height.abs() * per_metre <= CELL_FLATNESS && normal.dot(Vec3::from(point.ng)) >= CELL_COSINE
 }
 
 /// Hash of a cell. Twin of the function in `shaders/lib/core/cell_hash.wesl`.
@@ -233,7 +265,7 @@ mod tests {
     #[test]
     fn cells_are_as_wide_as_their_estimates_allow() {
         let table = CellTable::build(&marks(), 0.5, &mut found).unwrap().unwrap();
-        let kept: Vec<_> = table.slots.iter().filter(|e| e.level > 0 && e.split == WHOLE_CELL).collect();
+        let kept: Vec<_> = table.slots().iter().filter(|e| e.level > 0 && e.split == WHOLE_CELL).collect();
         let width = |e: &IrradianceCell| 1.0 / at_level(table.per_metre, e.level - 1);
         for entry in &kept {
             let most = if entry.position[0] < 50.0 { 0.05 } else { 0.4 };
@@ -241,7 +273,7 @@ mod tests {
         }
         let narrow = kept.iter().filter(|e| e.position[0] < 50.0).count();
         assert!(narrow > 300 && kept.len() - narrow < 40, "{narrow} of {}", kept.len());
-        assert!(table.slots.len() >= 2 * kept.len());
+        assert!(table.slots().len() >= 2 * kept.len());
     }
 
     #[test]
@@ -252,7 +284,7 @@ mod tests {
                 Ok(points.iter().map(|p| even(light(p), 0.4)).collect())
             };
             let table = CellTable::build(&marks(), 0.5, &mut found).unwrap().unwrap();
-            table.slots.iter().filter(|entry| entry.level > 1).map(|entry| entry.position[0]).collect::<Vec<_>>()
+            table.slots().iter().filter(|entry| entry.level > 1).map(|entry| entry.position[0]).collect::<Vec<_>>()
         };
         let narrow = split_between(0.02);
         assert!(narrow.iter().any(|x| (x - 0.55).abs() < 0.03), "{narrow:?}");
@@ -266,7 +298,26 @@ mod tests {
         let marks = [at(0.1, [0.0, 1.0, 0.0]), at(0.1, [0.0, -1.0, 0.0]), at(0.6, [0.0, 1.0, 0.0])];
         let mut found = |points: &[VisiblePoint]| Ok(points.iter().map(|_| even(1.0, 2.0)).collect());
         let table = CellTable::build(&marks, 0.5, &mut found).unwrap().unwrap();
-        assert_eq!(table.slots.iter().filter(|e| e.level == 1).count(), 3);
+        assert_eq!(table.slots().iter().filter(|e| e.level == 1).count(), 3);
+    }
+
+    #[test]
+    fn further_marks_have_entries_where_there_are_none() {
+        let [near, far]: [Vec<VisiblePoint>; 2] =
+            [false, true].map(|is_far| marks().into_iter().filter(|p| (p.position[0] > 50.0) == is_far).collect());
+        let mut table = CellTable::build(&far, 0.5, &mut found).unwrap().unwrap();
+        let before = table.clone();
+        let mut none = |points: &[VisiblePoint]| {
+            assert!(points.is_empty(), "an estimate where there is an entry");
+            Ok(Vec::new())
+        };
+        table.add(&far, &mut none).unwrap();
+        assert_eq!(table, before);
+        table.add(&near, &mut found).unwrap();
+        let added = &table.entries[before.entries.len()..];
+        assert!(added.len() > 300 && added.iter().all(|entry| entry.position[0] < 50.0), "{} entries", added.len());
+        let narrowest = added.iter().map(|entry| entry.level).max();
+        assert!(narrowest > before.entries.iter().map(|entry| entry.level).max(), "as wide as their estimates");
     }
 
     #[test]

@@ -12,6 +12,7 @@ use crate::{
 #[derive(Debug)]
 pub struct IrradianceCache {
     kernel: Kernel,
+    table: CellTable,
     cells: Buffer,
     grid: CellGrid,
 }
@@ -29,10 +30,18 @@ impl IrradianceCache {
         irradiances: &mut Irradiances,
     ) -> Result<Option<Self>> {
         let Some(table) = CellTable::build(marks, spacing, irradiances)? else { return Ok(None) };
-        let CellTable { slots, per_metre, levels } = table;
-        let grid = CellGrid { per_metre, levels, mask: slots.len() as u32 - 1, ..CellGrid::default() };
-        let cells = gpu.storage_with("irradiance cells", &slots)?;
-        Ok(Some(Self { kernel: Kernel::new(gpu, "reuse_irradiance", &[]), cells, grid }))
+        let (cells, grid) = on_device(gpu, &table)?;
+        Ok(Some(Self { kernel: Kernel::new(gpu, "reuse_irradiance", &[]), table, cells, grid }))
+    }
+
+    /// Keeps irradiance about those of further marks that have none.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    pub fn add(&mut self, gpu: &Gpu, marks: &[VisiblePoint], irradiances: &mut Irradiances) -> Result<()> {
+        self.table.add(marks, irradiances)?;
+        (self.cells, self.grid) = on_device(gpu, &self.table)?;
+        Ok(())
     }
 
     /// Has the kernel compiled ahead of its use.
@@ -65,6 +74,13 @@ impl IrradianceCache {
         self.kernel.dispatch(&mut encoder, &self.kernel.bind(gpu, &buffers), count.into());
         gpu.submit(encoder);
     }
+}
+
+fn on_device(gpu: &Gpu, table: &CellTable) -> Result<(Buffer, CellGrid)> {
+    let slots = table.slots();
+    let mask = slots.len() as u32 - 1;
+    let grid = CellGrid { per_metre: table.per_metre, levels: table.levels, mask, ..CellGrid::default() };
+    Ok((gpu.storage_with("irradiance cells", &slots)?, grid))
 }
 
 #[cfg(test)]
