@@ -131,9 +131,8 @@ impl LightBounds {
         let falloff = lowered(self.falloff.cos(), FALLOFF_STEPS, FALLOFF_SLACK);
         let along = (self.directed.dot(self.axis) / self.intensity).clamp(0.0, 1.0);
         let scatter = ((1.0 - along * along).sqrt() * f32::from(u8::MAX)).round();
-        let cones = u32::from(spread as i16 as u16)
-            | (u32::from(scatter as u8) << 16)
-            | (u32::from(falloff as i8 as u8) << 24);
+        let cones =
+            u32::from(spread as i16 as u16) | (u32::from(scatter as u8) << 16) | (u32::from(falloff as i8 as u8) << 24);
         let next = next | bit(self.both_ways, BOTH_WAYS_BIT) | bit(self.is_far, FAR_BIT);
         LightNode {
             center: (0.5 * (self.bounds.min + self.bounds.max)).to_array(),

@@ -100,3 +100,6 @@ pub const CELL_COSINE: f32 = 0.9;
 /// The same cosine, where the disc of the entry's estimate is narrow, and no entry is on the
 /// point's surface.
 pub const NARROW_COSINE: f32 = 0.25;
+/// Number of entries of a cell, one for each surface, from which on further surfaces have entries
+/// in narrower cells alone.
+pub const CELL_SURFACES: u32 = 8;

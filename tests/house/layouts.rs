@@ -200,6 +200,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         WIDE_CELL,
         CELL_FLATNESS,
         CELL_COSINE,
+        CELL_SURFACES,
         NARROW_COSINE,
         GLOBAL_MAP,
         CAUSTIC_MAP,

@@ -1,19 +1,19 @@
 //! Cells of space with one irradiance for each surface in them, chosen and kept in a hash table on
 //! the CPU; `reuse_irradiance` reads it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::Vec3;
 
 use crate::{
     error::Result,
-    layout::{CELL_COSINE, CELL_FLATNESS, IrradianceCell, SPLIT_CELL, VisiblePoint, WHOLE_CELL, WIDE_CELL},
+    layout::{
+        CELL_COSINE, CELL_FLATNESS, CELL_SURFACES, IrradianceCell, SPLIT_CELL, VisiblePoint, WHOLE_CELL, WIDE_CELL,
+    },
 };
 
 /// Levels of cells. Each is half as wide as the one before.
 const LEVELS: u32 = 8;
-/// Maximum number of surfaces in one cell with entries of their own.
-const MAX_SURFACES: usize = 8;
 /// Maximum number of entries, so that the table has at most 2^18 slots of 64 bytes.
 const MAX_ENTRIES: usize = 1 << 17;
 /// Marks from whose radii the width of the first level is taken, and the fraction of them whose
@@ -87,26 +87,30 @@ impl CellTable {
         let mut open: Vec<&VisiblePoint> = marks.iter().collect();
         for level in 0..LEVELS {
             let per_metre = at_level(self.per_metre, level);
-            let entry_at = |mark: &VisiblePoint| {
-                let cell = known.get(&(level, cell_at(mark, per_metre)))?;
-                cell.iter().find(|entry| is_flat((entry.position, entry.normal), mark, per_metre))
-            };
             let (mut new, mut split) = (Vec::new(), Vec::new());
             for mark in open {
-                match entry_at(mark) {
-                    None => new.push(mark),
-                    Some(entry) if entry.split != WHOLE_CELL => split.push(mark),
-                    Some(_) => {}
+                let cell = known.get(&(level, cell_at(mark, per_metre))).map_or(&[][..], Vec::as_slice);
+                let is_own = |entry: &&IrradianceCell| is_flat((entry.position, entry.normal), mark, per_metre);
+                match cell.iter().find(is_own) {
+                    Some(entry) if entry.split == WHOLE_CELL => {}
+                    None if cell.len() < CELL_SURFACES as usize => new.push(mark),
+                    _ => split.push(mark),
                 }
             }
             open = split;
-            let surfaces = surfaces(&new, per_metre);
+            let (surfaces, crowd) = surfaces(&new, per_metre);
             if self.entries.len() + surfaces.len() > MAX_ENTRIES {
                 break;
             }
             let points: Vec<_> = surfaces.iter().map(|surface| *surface.marks[0]).collect();
             let found = irradiances(&points)?;
             let contrasts = contrasts(&surfaces, &found, per_metre);
+            // Clutter takes the light of similar normals. Elsewhere, further surfaces have narrower
+            // cells.
+            let own = surfaces.iter().zip(&found);
+            let cluttered: BTreeSet<[i32; 3]> =
+                own.filter(|(_, estimate)| estimate.is_narrow).map(|(surface, _)| surface.coordinates).collect();
+            open.extend(crowd.into_iter().filter(|mark| !cluttered.contains(&cell_at(mark, per_metre))));
             for ((surface, estimate), contrasts) in surfaces.into_iter().zip(found).zip(contrasts) {
                 let cells = estimate.radius * self.spacing * per_metre;
                 let split = match cells {
@@ -168,15 +172,15 @@ struct Surface<'a> {
     marks: Vec<&'a VisiblePoint>,
 }
 
-/// Groups marks by cell and surface.
-fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> Vec<Surface<'a>> {
+/// Groups marks by cell and surface, and returns those for whose surfaces a cell has no room.
+fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> (Vec<Surface<'a>>, Vec<&'a VisiblePoint>) {
     let mut cells: BTreeMap<[i32; 3], Vec<(f32, &VisiblePoint)>> = BTreeMap::new();
     for mark in marks {
         let at = Vec3::from(mark.position) * per_metre;
         let from_centre = at.distance_squared(at.floor() + 0.5);
         cells.entry(cell_at(mark, per_metre)).or_default().push((from_centre, mark));
     }
-    let mut surfaces = Vec::new();
+    let (mut surfaces, mut crowd) = (Vec::new(), Vec::new());
     for (coordinates, mut marks) in cells {
         marks.sort_by(|a, b| a.0.total_cmp(&b.0));
         let first = surfaces.len();
@@ -184,12 +188,14 @@ fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> Vec<Surface<'a>> 
             let found: &mut [Surface] = &mut surfaces[first..];
             if let Some(surface) = found.iter_mut().find(|s| is_flat(plane_of(s.marks[0]), mark, per_metre)) {
                 surface.marks.push(mark);
-            } else if found.len() < MAX_SURFACES {
+            } else if found.len() < CELL_SURFACES as usize {
                 surfaces.push(Surface { coordinates, marks: vec![mark] });
+            } else {
+                crowd.push(mark);
             }
         }
     }
-    surfaces
+    (surfaces, crowd)
 }
 
 /// Whether each surface is much brighter or darker than the same one in a cell beside its own.

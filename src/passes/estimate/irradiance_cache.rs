@@ -88,31 +88,49 @@ mod tests {
     use super::*;
     use crate::passes::PointEstimate;
 
+    fn at(position: [f32; 3], ng: [f32; 3]) -> VisiblePoint {
+        VisiblePoint { position, ng, ns: ng, weight: [1.0; 3], next_map: 1, ..VisiblePoint::default() }
+    }
+
     /// Lights points of those normals by marks of others in the same cell, each as bright as its
     /// normal points up. `None` for a point that still waits.
     fn lit(is_narrow: bool, marks: &[[f32; 3]], normals: &[[f32; 3]]) -> Vec<Option<f32>> {
+        let marks: Vec<_> = marks.iter().zip(1..).map(|(ng, i)| at([0.1 * i as f32, 0.5, 0.5], *ng)).collect();
+        let points: Vec<_> = normals.iter().map(|ng| at([0.9, 0.9, 0.9], *ng)).collect();
+        lit_points(is_narrow, &marks, &points)
+    }
+
+    fn lit_points(is_narrow: bool, marks: &[VisiblePoint], points: &[VisiblePoint]) -> Vec<Option<f32>> {
         let gpu = &Gpu::open(None).expect("a device");
-        let at = |position: [f32; 3], ng: &[f32; 3]| VisiblePoint {
-            position,
-            ng: *ng,
-            ns: *ng,
-            weight: [1.0; 3],
-            next_map: 1,
-            ..VisiblePoint::default()
-        };
-        let marks: Vec<_> = marks.iter().zip(1..).map(|(ng, i)| at([0.1 * i as f32, 0.5, 0.5], ng)).collect();
         let mut found = |points: &[VisiblePoint]| {
             let of = |p: &VisiblePoint| PointEstimate { light: [2.0 + p.ng[1]; 3], radius: 2.0, is_narrow };
             Ok(points.iter().map(of).collect())
         };
-        let cache = IrradianceCache::build(gpu, &marks, 0.5, &mut found).expect("a table").expect("marks");
-        let points: Vec<_> = normals.iter().map(|ng| at([0.9, 0.9, 0.9], ng)).collect();
-        let buffer = gpu.storage_with("points", &points).expect("points");
+        let cache = IrradianceCache::build(gpu, marks, 0.5, &mut found).expect("a table").expect("marks");
+        let buffer = gpu.storage_with("points", points).expect("points");
         let radiance = gpu.storage_with("radiance", &vec![[0.0_f32; 4]; points.len()]).expect("radiance");
         cache.light(gpu, &buffer, points.len() as u32, &radiance);
         let after: Vec<VisiblePoint> = gpu.read(&buffer, 0, points.len() as u64).expect("points");
         let light: Vec<[f32; 4]> = gpu.read(&radiance, 0, points.len() as u64).expect("radiance");
         after.iter().zip(light).map(|(point, light)| (point.next_map == 0).then_some(light[0])).collect()
+    }
+
+    #[test]
+    fn more_surfaces_than_a_cell_holds_have_light_of_their_own() {
+        // The sides of a lampshade, which lie in one cell.
+        let side = |i: u32| {
+            let (sin, cos) = (0.5 * i as f32).sin_cos();
+            at([0.5 + 0.4 * cos, 0.5 + 0.4 * sin, 0.5], [cos, sin, 0.0])
+        };
+        let sides: Vec<_> = (0..12).map(side).collect();
+        let found = lit_points(false, &sides, &sides);
+        for (side, light) in sides.iter().zip(&found) {
+            let right = 2.0 + side.ng[1];
+            assert!(light.is_some_and(|light| (light - right).abs() < 0.6), "{light:?} for {right}");
+        }
+        let elsewhere: Vec<_> = sides.iter().map(|side| at([0.5, 0.5, 0.95], side.ng)).collect();
+        let none = lit_points(false, &sides, &elsewhere).iter().filter(|light| light.is_none()).count();
+        assert!((1..=4).contains(&none), "control: {none} of those that are not in the cell itself");
     }
 
     #[test]
