@@ -271,7 +271,7 @@ mod tests {
     #[test]
     fn cells_are_as_wide_as_their_estimates_allow() {
         let table = CellTable::build(&marks(), 0.5, &mut found).unwrap().unwrap();
-        let kept: Vec<_> = table.slots().iter().filter(|e| e.level > 0 && e.split == WHOLE_CELL).collect();
+        let kept: Vec<_> = table.entries.iter().filter(|e| e.split == WHOLE_CELL).collect();
         let width = |e: &IrradianceCell| 1.0 / at_level(table.per_metre, e.level - 1);
         for entry in &kept {
             let most = if entry.position[0] < 50.0 { 0.05 } else { 0.4 };
@@ -290,7 +290,7 @@ mod tests {
                 Ok(points.iter().map(|p| even(light(p), 0.4)).collect())
             };
             let table = CellTable::build(&marks(), 0.5, &mut found).unwrap().unwrap();
-            table.slots().iter().filter(|entry| entry.level > 1).map(|entry| entry.position[0]).collect::<Vec<_>>()
+            table.entries.iter().filter(|entry| entry.level > 1).map(|entry| entry.position[0]).collect::<Vec<_>>()
         };
         let narrow = split_between(0.02);
         assert!(narrow.iter().any(|x| (x - 0.55).abs() < 0.03), "{narrow:?}");
@@ -304,7 +304,7 @@ mod tests {
         let marks = [at(0.1, [0.0, 1.0, 0.0]), at(0.1, [0.0, -1.0, 0.0]), at(0.6, [0.0, 1.0, 0.0])];
         let mut found = |points: &[VisiblePoint]| Ok(points.iter().map(|_| even(1.0, 2.0)).collect());
         let table = CellTable::build(&marks, 0.5, &mut found).unwrap().unwrap();
-        assert_eq!(table.slots().iter().filter(|e| e.level == 1).count(), 3);
+        assert_eq!(table.entries.iter().filter(|e| e.level == 1).count(), 3);
     }
 
     #[test]
