@@ -206,6 +206,8 @@ fn patch(ends: &[(Aim, f64)]) -> Option<BrightPatch> {
 
 #[cfg(test)]
 mod tests {
+    use glam::vec3;
+
     use super::*;
 
     /// Ends all over a floor, of which those within a tenth of a metre are brighter.
@@ -232,6 +234,22 @@ mod tests {
         assert!((bright.other_light / std::f32::consts::PI - 1.0).abs() < 0.02, "{bright:?}");
         let narrow = BrightPlaces::find(&ends(500.0), 10_000.0, 0.1).patches;
         assert!(narrow.len() > 3 && narrow.len() <= PATCHES_OF_UNEVEN, "{narrow:?}");
+    }
+
+    #[test]
+    fn what_shines_through_faces_those_who_see_it() {
+        let lit_from_below = |end: RayEnd| RayEnd { normal: Vec3::NEG_Y, ..end };
+        let seen_from_below = |end: RayEnd| {
+            let turned = |v: Vec3| v * vec3(1.0, -1.0, 1.0);
+            RayEnd { leg: Leg { start: turned(end.leg.start), direction: turned(end.leg.direction), ..end.leg }, ..end }
+        };
+        let normal = |change: &dyn Fn(RayEnd) -> RayEnd| {
+            let ends: Vec<RayEnd> = ends(500.0).into_iter().map(change).collect();
+            BrightPlaces::find(&ends, 10_000.0, 1.0).patches[0].normal
+        };
+        assert_eq!(normal(&lit_from_below), [0.0, 1.0, 0.0]);
+        assert_eq!(normal(&seen_from_below), [0.0, -1.0, 0.0]);
+        assert_eq!(normal(&|end| end), [0.0, 1.0, 0.0], "control: lit where it is seen");
     }
 
     #[test]
