@@ -161,10 +161,7 @@ impl Gatherer for MapGatherer<'_> {
         let pixels = f64::from(preview.size.0) * f64::from(preview.size.1);
         self.rays_per_pixel = Some(ends.rays as f64 / pixels);
         let Self { maps, search, estimate, .. } = self;
-        let mut irradiances = |points: &[VisiblePoint]| {
-            let points: Vec<_> = points.iter().map(bare).collect();
-            search.estimates(preview, maps, estimate, &points, progress)
-        };
+        let mut irradiances = |points: &[VisiblePoint]| search.irradiances(preview, maps, estimate, points, progress);
         let fill = || IrradianceCache::build(preview.gpu, &ends.marks, estimate.irradiance_cells, &mut irradiances);
         self.cache = timed(&mut stats.seconds.gather, fill)?;
         let Some(cache) = &self.cache else { return Ok(false) };
@@ -182,10 +179,7 @@ impl Gatherer for MapGatherer<'_> {
         let ends = ends_of_rays(aimed, stats, progress)?;
         let Self { maps, search, estimate, cache, .. } = self;
         let Some(cache) = cache else { return Ok(()) };
-        let mut irradiances = |points: &[VisiblePoint]| {
-            let points: Vec<_> = points.iter().map(bare).collect();
-            search.estimates(aimed, maps, estimate, &points, progress)
-        };
+        let mut irradiances = |points: &[VisiblePoint]| search.irradiances(aimed, maps, estimate, points, progress);
         timed(&mut stats.seconds.gather, || cache.add(aimed.gpu, &ends.marks, &mut irradiances))
     }
 

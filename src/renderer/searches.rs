@@ -1,6 +1,6 @@
 //! Search of the photon maps: by the grid on the device, or by a kd-tree on the CPU.
 
-use super::{maps::PhotonMaps, tiles::CameraPass};
+use super::{maps::PhotonMaps, preview::bare, tiles::CameraPass};
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu},
@@ -39,8 +39,8 @@ impl<'a> Searches<'a> {
         })
     }
 
-    /// Same as [`Self::estimates_at`].
-    pub fn estimates(
+    /// Irradiance by all maps at points, as [`Self::estimates_at`].
+    pub fn irradiances(
         &mut self,
         pass: &CameraPass,
         maps: &PhotonMaps,
@@ -49,7 +49,8 @@ impl<'a> Searches<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<PointEstimate>> {
         let count = points.len() as u32;
-        let points = pass.gpu.storage_with("single points", points)?;
+        let points: Vec<_> = points.iter().map(bare).collect();
+        let points = pass.gpu.storage_with("single points", &points)?;
         self.estimates_at(pass, maps, settings, (&points, count), progress)
     }
 

@@ -52,8 +52,8 @@ pub(crate) trait Gatherer {
         BrightPlaces::default()
     }
 
-    /// Receives the same with rays that are aimed at bright places. The default does nothing with
-    /// it.
+    /// Receives a preview whose rays are aimed at the bright places, if there are any. The default
+    /// does nothing with it.
     fn prepare_aimed(&mut self, _aimed: &CameraPass, _stats: &mut Stats, _progress: &dyn Progress) -> Result<()> {
         Ok(())
     }
