@@ -1,9 +1,10 @@
 //! Cells of space with one irradiance for each surface in them, chosen and kept in a hash table on
 //! the CPU; `reuse_irradiance` reads it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{HashMap, HashSet};
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use crate::{
     error::Result,
@@ -80,23 +81,26 @@ impl CellTable {
 
     /// Has entries for those surfaces of further marks that have none.
     pub fn add(&mut self, marks: &[VisiblePoint], irradiances: &mut Irradiances) -> Result<()> {
-        let mut known: BTreeMap<(u32, [i32; 3]), Vec<IrradianceCell>> = BTreeMap::new();
+        let mut known: HashMap<(u32, [i32; 3]), Vec<IrradianceCell>> = HashMap::new();
         for entry in &self.entries {
             known.entry((entry.level - 1, entry.coordinates)).or_default().push(*entry);
         }
         let mut open: Vec<&VisiblePoint> = marks.iter().collect();
         for level in 0..LEVELS {
             let per_metre = at_level(self.per_metre, level);
-            let (mut new, mut split) = (Vec::new(), Vec::new());
-            for mark in open {
+            let fate = |mark: &&VisiblePoint| {
                 let cell = known.get(&(level, cell_at(mark, per_metre))).map_or(&[][..], Vec::as_slice);
                 let is_own = |entry: &&IrradianceCell| is_flat((entry.position, entry.normal), mark, per_metre);
                 match cell.iter().find(is_own) {
-                    Some(entry) if entry.split == WHOLE_CELL => {}
-                    None if cell.len() < CELL_SURFACES as usize => new.push(mark),
-                    _ => split.push(mark),
+                    Some(entry) if entry.split == WHOLE_CELL => Fate::Covered,
+                    None if cell.len() < CELL_SURFACES as usize => Fate::New,
+                    _ => Fate::Split,
                 }
-            }
+            };
+            let fates: Vec<Fate> = open.par_iter().map(fate).collect();
+            let of =
+                |fate| open.iter().zip(&fates).filter(move |(_, its)| **its == fate).map(|(mark, _)| *mark).collect();
+            let (new, split): (Vec<_>, Vec<_>) = (of(Fate::New), of(Fate::Split));
             open = split;
             let (surfaces, crowd) = surfaces(&new, per_metre);
             if self.entries.len() + surfaces.len() > MAX_ENTRIES {
@@ -108,7 +112,7 @@ impl CellTable {
             // Clutter takes the light of similar normals. Elsewhere, further surfaces have narrower
             // cells.
             let own = surfaces.iter().zip(&found);
-            let cluttered: BTreeSet<[i32; 3]> =
+            let cluttered: HashSet<[i32; 3]> =
                 own.filter(|(_, estimate)| estimate.is_narrow).map(|(surface, _)| surface.coordinates).collect();
             open.extend(crowd.into_iter().filter(|mark| !cluttered.contains(&cell_at(mark, per_metre))));
             for ((surface, estimate), contrasts) in surfaces.into_iter().zip(found).zip(contrasts) {
@@ -156,6 +160,17 @@ impl CellTable {
     }
 }
 
+/// What becomes of a mark at a level.
+#[derive(Clone, Copy, PartialEq)]
+enum Fate {
+    /// An entry has its light.
+    Covered,
+    /// Its cell has room for an entry.
+    New,
+    /// It is left to narrower cells.
+    Split,
+}
+
 /// Coordinates of the cell of a point.
 fn cell_at(point: &VisiblePoint, per_metre: f32) -> [i32; 3] {
     (Vec3::from(point.position) * per_metre).floor().as_ivec3().to_array()
@@ -174,25 +189,31 @@ struct Surface<'a> {
 
 /// Groups marks by cell and surface, and returns those for whose surfaces a cell has no room.
 fn surfaces<'a>(marks: &[&'a VisiblePoint], per_metre: f32) -> (Vec<Surface<'a>>, Vec<&'a VisiblePoint>) {
-    let mut cells: BTreeMap<[i32; 3], Vec<(f32, &VisiblePoint)>> = BTreeMap::new();
-    for mark in marks {
+    let placed = |(number, mark): (usize, &&'a VisiblePoint)| {
         let at = Vec3::from(mark.position) * per_metre;
         let from_centre = at.distance_squared(at.floor() + 0.5);
-        cells.entry(cell_at(mark, per_metre)).or_default().push((from_centre, mark));
-    }
-    let (mut surfaces, mut crowd) = (Vec::new(), Vec::new());
-    for (coordinates, mut marks) in cells {
-        marks.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let first = surfaces.len();
-        for (_, mark) in marks {
-            let found: &mut [Surface] = &mut surfaces[first..];
-            if let Some(surface) = found.iter_mut().find(|s| is_flat(plane_of(s.marks[0]), mark, per_metre)) {
-                surface.marks.push(mark);
-            } else if found.len() < CELL_SURFACES as usize {
-                surfaces.push(Surface { coordinates, marks: vec![mark] });
-            } else {
-                crowd.push(mark);
-            }
+        (cell_at(mark, per_metre), from_centre, number, *mark)
+    };
+    let mut placed: Vec<_> = marks.par_iter().enumerate().map(placed).collect();
+    placed.par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+    let cells: Vec<_> = placed.par_chunk_by(|a, b| a.0 == b.0).map(|cell| surfaces_of_cell(cell, per_metre)).collect();
+    let (surfaces, crowds): (Vec<_>, Vec<_>) = cells.into_iter().unzip();
+    (surfaces.into_iter().flatten().collect(), crowds.into_iter().flatten().collect())
+}
+
+/// The same for the marks of one cell, of which the nearest to its centre come first.
+fn surfaces_of_cell<'a>(
+    marks: &[([i32; 3], f32, usize, &'a VisiblePoint)],
+    per_metre: f32,
+) -> (Vec<Surface<'a>>, Vec<&'a VisiblePoint>) {
+    let (mut surfaces, mut crowd) = (Vec::<Surface>::new(), Vec::new());
+    for &(coordinates, _, _, mark) in marks {
+        if let Some(surface) = surfaces.iter_mut().find(|s| is_flat(plane_of(s.marks[0]), mark, per_metre)) {
+            surface.marks.push(mark);
+        } else if surfaces.len() < CELL_SURFACES as usize {
+            surfaces.push(Surface { coordinates, marks: vec![mark] });
+        } else {
+            crowd.push(mark);
         }
     }
     (surfaces, crowd)
