@@ -203,11 +203,11 @@ impl Gatherer for MapGatherer<'_> {
         let mut rays_done = 0;
         progress.report(Stage::Records, 0, expected);
         coarse.for_each_tile(None, stats, progress, &mut |tile, stats, _| {
-            let (found, count) = timed(&mut stats.seconds.gather, || {
+            let (points, light, arriving, count) = timed(&mut stats.seconds.gather, || {
                 self.light_blurred(coarse, tile);
                 // Irradiance itself, by the geometric normal.
-                let flat = |point: &VisiblePoint| VisiblePoint { ns: point.ng, ..bare(point) };
-                let points: Vec<_> = coarse.points(tile)?.iter().map(flat).collect();
+                let mut points = coarse.points(tile)?;
+                points.iter_mut().for_each(|point| *point = VisiblePoint { ns: point.ng, ..bare(point) });
                 coarse.clear_arriving();
                 coarse.set_points(&points);
                 coarse.set_radiance(&vec![[0.0; 4]; points.len()]);
@@ -216,17 +216,15 @@ impl Gatherer for MapGatherer<'_> {
                     progress.report(Stage::Records, rays_done, expected.max(rays_done));
                 };
                 let count = self.gather_finally(coarse, tile, &mut report, progress)?;
-                let light = coarse.radiance(tile)?.into_iter().zip(coarse.arriving(tile)?);
-                Ok((points.into_iter().zip(light).collect::<Vec<_>>(), count))
+                Ok((points, coarse.radiance(tile)?, coarse.arriving(tile)?, count))
             })?;
             stats.non_finite.gather += count.non_finite;
             tally::add_step(stats, count);
-            for (pixel, slots) in (0..).zip(found.chunks(coarse.tracer.branches() as usize)) {
-                let Some(pixel) = coarse.tracer.pixel(tile, pixel) else { continue };
-                for (branch, (point, (light, arriving))) in
-                    (0..).zip(slots).filter(|(_, (point, _))| point.next_map != 0)
-                {
-                    taken.put(pixel, branch, point, *light, arriving, coarse.final_rays());
+            let branches = coarse.tracer.branches();
+            let found = (0..).zip(points.iter().zip(light).zip(&arriving)).filter(|(_, ((p, _), _))| p.next_map != 0);
+            for (slot, ((point, light), arriving)) in found {
+                if let Some(pixel) = coarse.tracer.pixel(tile, slot / branches) {
+                    taken.put(pixel, (slot % branches) as usize, point, light, arriving, coarse.final_rays());
                 }
             }
             Ok(())
@@ -246,7 +244,8 @@ impl Gatherer for MapGatherer<'_> {
             reach,
             footprint: filter_footprint(self.estimate.gather_radius, spacing),
         };
-        let radius = |position| reach * coarse.tracer.scale_at(position);
+        let tracer = &coarse.tracer;
+        let radius = |position| reach * tracer.scale_at(position);
         let obstacles = coarse.obstacles;
         let between = |from, to| obstacles.first_between(from, to);
         let records = timed(&mut stats.seconds.gather, || taken.finish(self.estimate.gather_reach, radius, between));

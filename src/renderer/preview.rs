@@ -35,7 +35,8 @@ pub fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progres
     let mut ends = Ends::default();
     pass.for_each_tile(Some(Stage::Cells), stats, progress, &mut |tile, stats, _| {
         let gather = || {
-            let points: Vec<_> = pass.points(tile)?.iter().map(bare).collect();
+            let mut points = pass.points(tile)?;
+            points.iter_mut().for_each(|point| *point = bare(point));
             pass.set_points(&points);
             pass.gather_finally(tile, progress, &mut |gather, rays, chosen| {
                 let marks: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;

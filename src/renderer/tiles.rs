@@ -305,7 +305,8 @@ impl<'a> CameraPass<'a> {
     /// Number of times that the samples of each of the tile's pixels double.
     fn doubled_pixels(&self, tile: &Tile, sums: &[PixelSums]) -> Vec<u32> {
         let (columns, rows) = tile.sides();
-        let is_in = |column, row| tile.first_column + column < self.size.0 && tile.first_row + row < self.size.1;
+        let size = self.size;
+        let is_in = |column, row| tile.first_column + column < size.0 && tile.first_row + row < size.1;
         let of = |column, row| is_in(column, row).then(|| &sums[morton_number(column, row) as usize]);
         let square = Square { columns, rows, samples: tile.samples, sums: &of };
         let mut doubled = vec![0; tile.pixels as usize];

@@ -7,6 +7,8 @@
 
 use std::array::from_fn;
 
+use rayon::prelude::*;
+
 use crate::layout::{LAYER_ROWS, PixelSums};
 
 /// Squared relative error of the mean of its samples above which a pixel is uneven.
@@ -24,14 +26,15 @@ pub struct Square<'a> {
     /// Samples of each pixel, two at least.
     pub samples: u32,
     /// Their sums in the pixel of a column and a row; `None` outside of the picture.
-    pub sums: &'a dyn Fn(u32, u32) -> Option<&'a PixelSums>,
+    pub sums: &'a (dyn Fn(u32, u32) -> Option<&'a PixelSums> + Sync),
 }
 
 impl Square<'_> {
     /// Columns and rows of the pixels between uneven ones, row by row, with the error that these
     /// have.
     pub fn uneven(&self) -> Vec<((u32, u32), f32)> {
-        let places = || (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| (column, row)));
+        let in_row = |row| (0..self.columns).map(move |column| (column, row));
+        let places = || (0..self.rows).into_par_iter().flat_map_iter(in_row);
         let spread = |(column, row)| (self.sums)(column, row).map(|sums| Spread::of(sums, self.samples));
         let spreads: Vec<Option<Spread>> = places().map(spread).collect();
         let at = |column: i32, row: i32| {

@@ -2,6 +2,7 @@
 //! them. Kernel: `filter_irradiance`.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::record_walls::wall_distances;
 use crate::{
@@ -111,17 +112,19 @@ impl Records {
     pub fn finish(
         mut self,
         fraction: f32,
-        radius: impl Fn(Vec3) -> f32,
+        radius: impl Fn(Vec3) -> f32 + Sync,
         between: impl Fn(Vec3, Vec3) -> Option<f32> + Sync,
     ) -> (Vec<IrradianceRecord>, Vec<LightDirections>) {
         let walls = wall_distances(&self.records, (self.columns, self.branches), between);
-        for (slot, wall) in walls.into_iter().enumerate() {
-            let distance = self.distance(slot);
-            let record = &mut self.records[slot];
-            let radius = radius(record.position.into());
+        let reaches = |(slot, wall): (usize, f32)| {
+            let (distance, radius) = (self.distance(slot), radius(self.records[slot].position.into()));
             let reach = |metres: f32| (metres / radius).clamp(1e-3, MAX_REACH);
-            record.reach = reach(wall.min(fraction * distance));
-            self.directions[slot].open_reach = reach(fraction * distance);
+            (reach(wall.min(fraction * distance)), reach(fraction * distance))
+        };
+        let reaches: Vec<_> = walls.into_par_iter().enumerate().map(reaches).collect();
+        for (slot, (reach, open_reach)) in reaches.into_iter().enumerate() {
+            self.records[slot].reach = reach;
+            self.directions[slot].open_reach = open_reach;
         }
         // All that lies beyond the grid has the slot behind all others.
         self.records.push(NO_RECORD);
