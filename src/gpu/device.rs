@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, mpsc},
+    sync::{Arc, Mutex, PoisonError, mpsc},
 };
 
 use super::{
@@ -11,6 +11,7 @@ use super::{
     commands::{Commands, HUNG_AFTER, Submissions},
     compiler::Compiler,
     fault::Faults,
+    lanes::Lanes,
     pace::Pacing,
 };
 use crate::{
@@ -39,22 +40,20 @@ pub struct Gpu {
     pub batch: u64,
     pub(super) submissions: Submissions,
     pub(super) compiler: Compiler,
-    /// The kernels' overrides `LANES` and `HAS_SEVERAL_GROUPS`.
-    pub(super) lanes: u32,
-    pub(super) several_groups: bool,
-    /// Whether the device is software: searches run some queries ahead of the others then, the
-    /// kernels' override `HAS_PILOTS`.
+    /// How lanes share the work of a search.
+    pub(crate) lanes: Lanes,
+    /// Whether the device is software.
     pub(crate) is_software: bool,
     /// Maximum number of nodes and primitives that a ray visits, at least [`SHORT_LOOPS`].
     pub(crate) trace_budget: u32,
+    /// Memory for what is read back, kept for the next time: to get some takes a GPU's driver longer
+    /// than most reads.
+    spare_reader: Mutex<Option<Buffer>>,
     faults: Faults,
 }
 
-/// Maximum number of lanes of a group that share the children of a cell, one each: as many as a
-/// cell has children.
-const MAX_LANES: u32 = crate::layout::CELL_FAN;
-/// Minimum number of lanes of a group.
-const MIN_LANES: u32 = super::adapter::NEEDED_SUBGROUP;
+/// Bytes that are read back at once: a power of 2.
+const READ_AT_ONCE: u64 = 1 << 23;
 
 /// Maximum number of nodes and primitives that a ray visits on software: Lavapipe ends loops
 /// silently after 65,535 iterations of the 8 invocations of a subgroup.
@@ -103,13 +102,9 @@ impl Gpu {
         .map_err(|e| Error::Device(format!("adapter {} cannot be opened: {e}", chosen.name)))?;
         let faults = Faults::of(&device);
         let submissions = Submissions::new(&device, &queue, pacing);
-        // Smaller groups are faster where a subgroup has several: queries of few share less, and
-        // wait for fewer others.
-        let (least, most) = chosen.subgroup;
-        let lanes = if most > MAX_LANES { MIN_LANES } else { least.min(MAX_LANES) };
-        let several_groups = most > lanes;
-        let batch = batch_of(chosen.kind);
         let is_software = chosen.kind == "software";
+        let lanes = Lanes::new(chosen.subgroup, is_software);
+        let batch = batch_of(chosen.kind);
         let trace_budget = if is_software { SHORT_LOOPS } else { LONG_LOOPS };
         let (limits, name, driver) = (chosen.limits, chosen.name, chosen.driver);
         let memory = Arc::<MemoryCount>::default();
@@ -129,9 +124,9 @@ impl Gpu {
             submissions,
             compiler,
             lanes,
-            several_groups,
             is_software,
             trace_budget,
+            spare_reader: Mutex::default(),
             faults,
         })
     }
@@ -141,6 +136,20 @@ impl Gpu {
     #[must_use]
     pub fn with_trace_budget(self, visits: u32) -> Self {
         Self { trace_budget: visits, ..self }
+    }
+
+    /// Spreads packets of queries over lanes as on a GPU: for tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_spread_packets(self) -> Self {
+        Self { lanes: self.lanes.spread(), ..self }
+    }
+
+    /// Whether several lanes answer a packet of queries together: for tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn spreads_packets(&self) -> bool {
+        self.lanes.of_packet > 1
     }
 
     /// Number of dispatches recorded so far; each chunk of a cut one counts.
@@ -297,25 +306,45 @@ impl Gpu {
             self.wait()?;
             return Ok(Vec::new());
         }
+        let mut data: Vec<T> = bytemuck::zeroed_vec(count as usize);
+        let mut from = offset;
+        for piece in bytemuck::cast_slice_mut::<T, u8>(&mut data).chunks_mut(READ_AT_ONCE as usize) {
+            self.read_piece(buffer, from, piece)?;
+            from += piece.len() as u64;
+        }
+        Ok(data)
+    }
+
+    /// Reads bytes from byte `offset` on, at most [`READ_AT_ONCE`].
+    fn read_piece(&self, buffer: &Buffer, offset: u64, into: &mut [u8]) -> Result<()> {
+        let bytes = into.len() as u64;
+        let spare = || self.spare_reader.lock().unwrap_or_else(PoisonError::into_inner);
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        let staging = self.buffer("data to read back", bytes, usage)?;
+        let kept = spare().take().filter(|kept| kept.size() >= bytes);
+        let reader = match kept {
+            Some(kept) => kept,
+            None => self.buffer("data to read back", bytes.next_power_of_two(), usage)?,
+        };
         let mut encoder = self.encoder();
-        encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
+        encoder.copy_buffer_to_buffer(buffer, offset, &reader, 0, bytes);
         self.submit(encoder);
         let (sender, receiver) = mpsc::channel();
-        staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+        reader.slice(..bytes).map_async(wgpu::MapMode::Read, move |result| {
             // The receiver is gone where the wait below failed.
             let _ = sender.send(result.is_ok());
         });
         self.wait()?;
         // Another thread's wait may run the callback, a moment after this wait has ended.
         let is_mapped = receiver.recv_timeout(HUNG_AFTER).unwrap_or(false);
-        let mapped = is_mapped.then(|| staging.slice(..).get_mapped_range().ok()).flatten();
+        let mapped = is_mapped.then(|| reader.slice(..bytes).get_mapped_range().ok()).flatten();
         // Without a fault only the loss of the device is left.
         let lost = || Error::Lost {
             adapter: format!("{} ({})", self.name, self.driver),
             why: "it gave nothing back".to_string(),
         };
-        mapped.map(|bytes| bytemuck::pod_collect_to_vec(&bytes)).ok_or_else(lost)
+        into.copy_from_slice(&mapped.ok_or_else(lost)?);
+        reader.unmap();
+        *spare() = Some(reader);
+        Ok(())
     }
 }

@@ -43,9 +43,10 @@ impl Kernel {
         }
         let flag = |is: bool| f64::from(u8::from(is));
         let of_device = [
-            ("LANES", f64::from(gpu.lanes)),
-            ("HAS_SEVERAL_GROUPS", flag(gpu.several_groups)),
-            ("HAS_PILOTS", flag(gpu.is_software)),
+            ("LANES", f64::from(gpu.lanes.group)),
+            ("HAS_SEVERAL_GROUPS", flag(gpu.lanes.several_groups)),
+            ("PACKET_LANES", f64::from(gpu.lanes.of_packet)),
+            ("HAS_PILOTS", flag(gpu.lanes.of_packet == 1)),
         ];
         let value = |name: &str| overrides.iter().chain(&of_device).find(|(n, _)| *n == name).map(|(_, value)| *value);
         let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();

@@ -9,6 +9,7 @@ mod device;
 mod fault;
 mod hide_uniforms;
 mod kernel;
+mod lanes;
 mod pace;
 mod program;
 #[doc(hidden)]

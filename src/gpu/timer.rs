@@ -4,7 +4,7 @@
 use std::{
     mem,
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -42,6 +42,8 @@ pub(super) struct Timer {
     tick: f64,
     /// Submissions whose times were not collected yet.
     pending: Mutex<Vec<Pending>>,
+    /// Buffers of those that were, for further ones.
+    spare: Mutex<Vec<wgpu::Buffer>>,
 }
 
 #[derive(Debug)]
@@ -68,6 +70,7 @@ impl Timer {
             }),
             tick: f64::from(queue.get_timestamp_period()) * 1e-9,
             pending: Mutex::default(),
+            spare: Mutex::default(),
         })
     }
 
@@ -95,41 +98,50 @@ impl Timer {
             queue.submit([encoder.finish()]);
             return;
         }
-        let times = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("times read back"),
-            size: bytes,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
+        let spare = locked(&self.spare).pop();
+        let times = spare.unwrap_or_else(|| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("times read back"),
+                size: 2 * ROOM as u64 * TIME,
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
         });
         encoder.resolve_query_set(&self.set, 0..2 * timings.0.len() as u32, &self.resolved, 0);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &times, 0, bytes);
         queue.submit([encoder.finish()]);
         let is_mapped = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&is_mapped);
-        times.slice(..).map_async(wgpu::MapMode::Read, move |result| flag.store(result.is_ok(), Ordering::Release));
-        self.pending().push(Pending { times, is_mapped, timings });
+        times
+            .slice(..bytes)
+            .map_async(wgpu::MapMode::Read, move |result| flag.store(result.is_ok(), Ordering::Release));
+        locked(&self.pending).push(Pending { times, is_mapped, timings });
     }
 
     /// Tells the pace the times read back so far. To be called when the device has finished all
     /// submitted work.
     pub fn collect(&self, pace: &Pace) {
-        for Pending { times, is_mapped, timings } in mem::take(&mut *self.pending()) {
+        for Pending { times, is_mapped, timings } in mem::take(&mut *locked(&self.pending)) {
+            let bytes = 2 * timings.0.len() as u64 * TIME;
             // Times of a lost device never arrive.
             let Some(mapped) =
-                is_mapped.load(Ordering::Acquire).then(|| times.slice(..).get_mapped_range().ok()).flatten()
+                is_mapped.load(Ordering::Acquire).then(|| times.slice(..bytes).get_mapped_range().ok()).flatten()
             else {
                 continue;
             };
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped);
+            drop(mapped);
+            times.unmap();
+            locked(&self.spare).push(times);
             for (Timed { stem, invocations }, span) in timings.0.into_iter().zip(ticks.chunks_exact(2)) {
                 pace.measured(stem, invocations, span[1].saturating_sub(span[0]) as f64 * self.tick);
             }
         }
     }
+}
 
-    fn pending(&self) -> std::sync::MutexGuard<'_, Vec<Pending>> {
-        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! The k nearest photons of the grid are those of brute force, at every size, density and k.
 
+use std::sync::LazyLock;
+
 use caustica::{
     density::{Density, DensityKernel},
     gpu::{Buffer, Gpu},
@@ -36,7 +38,19 @@ const CONE: Density = Density { kernel: DensityKernel::Cone, cone_constant: 2.0 
 
 impl Bench {
     fn open() -> Self {
-        let gpu = support::gpu();
+        Self::on(support::gpu())
+    }
+
+    /// One for each way in which lanes share the work.
+    fn each() -> impl Iterator<Item = Self> {
+        static SPREAD: LazyLock<Gpu> =
+            LazyLock::new(|| Gpu::open(None).expect("tests need an adapter").with_spread_packets());
+        let both = [support::gpu(), &SPREAD];
+        let differ = both[0].spreads_packets() != both[1].spreads_packets();
+        both.into_iter().take(if differ { 2 } else { 1 }).map(Self::on)
+    }
+
+    fn on(gpu: &'static Gpu) -> Self {
         let kernels = MapKernels::new(gpu);
         let one_sided = Gather::new(gpu, GatherOptions::default());
         let two_sided = Gather::new(gpu, GatherOptions { side_test: false, ..GatherOptions::default() });
@@ -138,14 +152,15 @@ fn check(bench: &mut Bench, photons: &[Photon], points: &[VisiblePoint], setting
 
 #[test]
 fn nearest_photons_equal_brute_force_at_awkward_sizes() {
-    let mut bench = Bench::open();
-    let mut random = Random(1);
-    for size in [1, 2, 10, 31, 32, 33, 63, 64, 65, 257, 1000, 5000] {
-        let photons = uniform_box(&mut random, size);
-        let points: Vec<_> = (0..150).map(|i| point(&mut random, i % 3 == 0)).collect();
-        for k in [1, 10, 50, 1000] {
-            check(&mut bench, &photons, &points, &settings(k), true);
-            check(&mut bench, &photons, &points, &settings(k), false);
+    for mut bench in Bench::each() {
+        let mut random = Random(1);
+        for size in [1, 2, 10, 31, 32, 33, 63, 64, 65, 257, 1000, 5000] {
+            let photons = uniform_box(&mut random, size);
+            let points: Vec<_> = (0..150).map(|i| point(&mut random, i % 3 == 0)).collect();
+            for k in [1, 10, 50, 1000] {
+                check(&mut bench, &photons, &points, &settings(k), true);
+                check(&mut bench, &photons, &points, &settings(k), false);
+            }
         }
     }
 }
@@ -179,39 +194,41 @@ fn an_empty_map_gives_nothing() {
 
 #[test]
 fn nearest_photons_are_exact_in_dense_caustics_and_far_outside() {
-    let mut bench = Bench::open();
-    let mut random = Random(2);
-    // 20,000 photons within a thousandth of the box, 5000 on its walls.
-    let photons = caustic_box(&mut random, 25_000, 0.8, 1e-3);
-    let mut points: Vec<_> = (0..60).map(|i| point(&mut random, i % 2 == 0)).collect();
-    for (i, p) in points.iter_mut().enumerate() {
-        match i % 4 {
-            0 => p.position = photons[i * 100].position,
-            1 => p.position = p.position.map(|x| x * 1e4),
-            _ => {}
+    for mut bench in Bench::each() {
+        let mut random = Random(2);
+        // 20,000 photons within a thousandth of the box, 5000 on its walls.
+        let photons = caustic_box(&mut random, 25_000, 0.8, 1e-3);
+        let mut points: Vec<_> = (0..60).map(|i| point(&mut random, i % 2 == 0)).collect();
+        for (i, p) in points.iter_mut().enumerate() {
+            match i % 4 {
+                0 => p.position = photons[i * 100].position,
+                1 => p.position = p.position.map(|x| x * 1e4),
+                _ => {}
+            }
         }
-    }
-    for k in [1, 50, 1000] {
-        check(&mut bench, &photons, &points, &settings(k), true);
-        check(&mut bench, &photons, &points, &settings(k), false);
+        for k in [1, 50, 1000] {
+            check(&mut bench, &photons, &points, &settings(k), true);
+            check(&mut bench, &photons, &points, &settings(k), false);
+        }
     }
 }
 
 #[test]
 fn photons_on_one_spot_neither_hang_nor_give_nonsense() {
-    let mut bench = Bench::open();
-    let mut random = Random(3);
-    let photons = coincident(&mut random, 20_000, 3000);
-    let spot = Vec3::from(photons.last().unwrap().position);
-    let mut points: Vec<_> = (0..40).map(|_| point(&mut random, false)).collect();
-    points[0].position = spot.into();
-    points[1].position = (spot + Vec3::X * 1e-6).into();
-    for k in [1, 100, 1000] {
-        check(&mut bench, &photons, &points, &settings(k), true);
-        check(&mut bench, &photons, &points, &settings(k), false);
-        let map = bench.map(&photons);
-        let answer = bench.ask(false, &map, &points, &settings(k));
-        assert!(answer.radiance.iter().flatten().all(|x| x.is_finite()));
+    for mut bench in Bench::each() {
+        let mut random = Random(3);
+        let photons = coincident(&mut random, 20_000, 3000);
+        let spot = Vec3::from(photons.last().unwrap().position);
+        let mut points: Vec<_> = (0..40).map(|_| point(&mut random, false)).collect();
+        points[0].position = spot.into();
+        points[1].position = (spot + Vec3::X * 1e-6).into();
+        for k in [1, 100, 1000] {
+            check(&mut bench, &photons, &points, &settings(k), true);
+            check(&mut bench, &photons, &points, &settings(k), false);
+            let map = bench.map(&photons);
+            let answer = bench.ask(false, &map, &points, &settings(k));
+            assert!(answer.radiance.iter().flatten().all(|x| x.is_finite()));
+        }
     }
 }
 
@@ -236,58 +253,60 @@ fn a_maximal_radius_bounds_the_search() {
 
 #[test]
 fn every_kernel_sums_what_its_formula_says() {
-    let mut bench = Bench::open();
-    let mut random = Random(11);
-    let photons = caustic_box(&mut random, 5000, 0.5, 1e-2);
-    let points: Vec<_> = (0..100).map(|i| point(&mut random, i % 9 == 0)).collect();
-    for kernel in DensityKernel::ALL {
-        for k in [30, 1000] {
-            check(
-                &mut bench,
-                &photons,
-                &points,
-                &GatherSettings { density: Density { kernel, ..CONE }, ..settings(k) },
-                true,
+    for mut bench in Bench::each() {
+        let mut random = Random(11);
+        let photons = caustic_box(&mut random, 5000, 0.5, 1e-2);
+        let points: Vec<_> = (0..100).map(|i| point(&mut random, i % 9 == 0)).collect();
+        for kernel in DensityKernel::ALL {
+            for k in [30, 1000] {
+                check(
+                    &mut bench,
+                    &photons,
+                    &points,
+                    &GatherSettings { density: Density { kernel, ..CONE }, ..settings(k) },
+                    true,
+                );
+            }
+            let density = Density { kernel, cone_constant: 1.2 };
+            let bounded = GatherSettings { max_radius: Some(0.2), density, ..settings(100) };
+            check(&mut bench, &photons, &points, &bounded, true);
+            // Control: another kernel gives another result.
+            let other = Density { kernel: DensityKernel::ALL[(kernel as usize + 1) % 5], ..density };
+            let map = bench.map(&photons);
+            let answer = bench.ask(true, &map, &points, &bounded);
+            let (photons, fluxes) = map.read(bench.gpu).unwrap();
+            let asked = GatherSettings { density: other, ..bounded };
+            assert!(
+                differences(&answer, (&photons, &fluxes), &points, &asked, true) > 50,
+                "{kernel:?} passes for {other:?}"
             );
         }
-        let density = Density { kernel, cone_constant: 1.2 };
-        let bounded = GatherSettings { max_radius: Some(0.2), density, ..settings(100) };
-        check(&mut bench, &photons, &points, &bounded, true);
-        // Control: another kernel gives another result.
-        let other = Density { kernel: DensityKernel::ALL[(kernel as usize + 1) % 5], ..density };
-        let map = bench.map(&photons);
-        let answer = bench.ask(true, &map, &points, &bounded);
-        let (photons, fluxes) = map.read(bench.gpu).unwrap();
-        let asked = GatherSettings { density: other, ..bounded };
-        assert!(
-            differences(&answer, (&photons, &fluxes), &points, &asked, true) > 50,
-            "{kernel:?} passes for {other:?}"
-        );
     }
 }
 
 #[test]
 fn all_photons_within_a_radius_are_summed() {
-    let mut bench = Bench::open();
-    let mut random = Random(12);
-    let photons = caustic_box(&mut random, 5000, 0.5, 1e-2);
-    let mut points: Vec<_> = (0..100).map(|i| point(&mut random, i % 9 == 0)).collect();
-    points[1].position = [30.0, 0.0, 0.0];
-    let map = bench.map(&photons);
-    for radius in [1e-3, 0.1, 0.5, 100.0] {
-        // A kernel that falls to 0 at the edge of the disc weights two or three photons by
-        // differences of nearly equal numbers.
-        let last = if radius < 0.5 { DensityKernel::Gaussian } else { DensityKernel::Silverman };
-        for kernel in [DensityKernel::Cone, last] {
-            let density = Density { kernel, ..CONE };
-            // The number of neighbours and the maximum radius have no effect.
-            let within = GatherSettings { radius: Some(radius), max_radius: Some(0.01), density, ..settings(3) };
-            check(&mut bench, &photons, &points, &within, true);
-            let answer = bench.ask(true, &map, &points, &within);
-            let far = (answer.gathered[1].count, &answer.radiance[1][..3]);
-            assert!(radius > 10.0 || far == (0, &[0.0; 3]), "no photon, no light: {far:?}");
-            let other = bench.ask(true, &map, &points, &GatherSettings { radius: Some(radius * 1.1), ..within });
-            assert!(radius < 0.01 || answer.radiance != other.radiance, "control: the radius matters");
+    for mut bench in Bench::each() {
+        let mut random = Random(12);
+        let photons = caustic_box(&mut random, 5000, 0.5, 1e-2);
+        let mut points: Vec<_> = (0..100).map(|i| point(&mut random, i % 9 == 0)).collect();
+        points[1].position = [30.0, 0.0, 0.0];
+        let map = bench.map(&photons);
+        for radius in [1e-3, 0.1, 0.5, 100.0] {
+            // A kernel that falls to 0 at the edge of the disc weights two or three photons by
+            // differences of nearly equal numbers.
+            let last = if radius < 0.5 { DensityKernel::Gaussian } else { DensityKernel::Silverman };
+            for kernel in [DensityKernel::Cone, last] {
+                let density = Density { kernel, ..CONE };
+                // The number of neighbours and the maximum radius have no effect.
+                let within = GatherSettings { radius: Some(radius), max_radius: Some(0.01), density, ..settings(3) };
+                check(&mut bench, &photons, &points, &within, true);
+                let answer = bench.ask(true, &map, &points, &within);
+                let far = (answer.gathered[1].count, &answer.radiance[1][..3]);
+                assert!(radius > 10.0 || far == (0, &[0.0; 3]), "no photon, no light: {far:?}");
+                let other = bench.ask(true, &map, &points, &GatherSettings { radius: Some(radius * 1.1), ..within });
+                assert!(radius < 0.01 || answer.radiance != other.radiance, "control: the radius matters");
+            }
         }
     }
 }
@@ -345,25 +364,45 @@ fn the_side_test_takes_only_photons_before_the_surface() {
 
 #[test]
 fn a_tiny_budget_goes_on_in_further_dispatches_with_the_same_bits() {
-    let mut bench = Bench::open();
-    let mut random = Random(6);
-    let photons = caustic_box(&mut random, 30_000, 0.3, 1e-2);
-    // Enough points for pilots of both strides; they lie far apart.
-    let points: Vec<_> = (0..2500).map(|_| point(&mut random, false)).collect();
-    let map = bench.map(&photons);
-    for (budget, k, count) in
-        [(3, 200, 200), (100, 20, 2500), (1000, 200, 2500), (1000, 1000, 2500), (5000, 1000, 2500)]
-    {
-        let whole = bench.ask(true, &map, &points[..count], &settings(k));
-        let mut tiny = Gather::new(bench.gpu, GatherOptions { step_budget: budget, ..GatherOptions::default() });
-        let pieces = run(bench.gpu, &mut tiny, &map, &points[..count], &settings(k));
-        assert!(pieces.stats.dispatches > 2 * whole.stats.dispatches, "{:?} {:?}", pieces.stats, whole.stats);
-        assert!(pieces.gathered == whole.gathered, "other sets: budget {budget}, k = {k}");
-        assert!(pieces.radiance == whole.radiance, "other bits: budget {budget}, k = {k}");
-        // Control: the result depends on k.
-        let other = bench.ask(true, &map, &points[..count], &settings(k - 1));
-        assert!(other.gathered != whole.gathered, "the control");
+    for mut bench in Bench::each() {
+        let mut random = Random(6);
+        let photons = caustic_box(&mut random, 30_000, 0.3, 1e-2);
+        // Enough points for pilots of both strides; they lie far apart.
+        let points: Vec<_> = (0..2500).map(|_| point(&mut random, false)).collect();
+        let map = bench.map(&photons);
+        for (budget, k, count) in
+            [(3, 200, 200), (100, 20, 2500), (1000, 200, 2500), (1000, 1000, 2500), (5000, 1000, 2500)]
+        {
+            let whole = bench.ask(true, &map, &points[..count], &settings(k));
+            // Lanes that share a packet look at a cell in fewer steps.
+            let step_budget = if bench.gpu.spreads_packets() { budget / 10 } else { budget };
+            let mut tiny = Gather::new(bench.gpu, GatherOptions { step_budget, ..GatherOptions::default() });
+            let pieces = run(bench.gpu, &mut tiny, &map, &points[..count], &settings(k));
+            assert!(pieces.stats.dispatches > 2 * whole.stats.dispatches, "{:?} {:?}", pieces.stats, whole.stats);
+            assert!(pieces.gathered == whole.gathered, "other sets: budget {budget}, k = {k}");
+            assert!(pieces.radiance == whole.radiance, "other bits: budget {budget}, k = {k}");
+            // Control: the result depends on k.
+            let other = bench.ask(true, &map, &points[..count], &settings(k - 1));
+            assert!(other.gathered != whole.gathered, "the control");
+        }
     }
+}
+
+#[test]
+fn answers_do_not_depend_on_how_lanes_share_the_work() {
+    let photons = caustic_box(&mut Random(14), 50_000, 0.3, 1e-2);
+    let points: Vec<_> = (0..3000).map(|i| point(&mut Random(i), i % 7 == 0)).collect();
+    let answers = |k| {
+        let answer = |bench: Bench| {
+            let options = GatherOptions { fingerprint: true, ..GatherOptions::default() };
+            let mut gather = Gather::new(bench.gpu, options);
+            run(bench.gpu, &mut gather, &bench.map(&photons), &points, &settings(k)).gathered
+        };
+        Bench::each().map(answer).collect::<Vec<_>>()
+    };
+    let (found, other) = (answers(50), answers(49));
+    assert!(found.iter().all(|answer| *answer == found[0]));
+    assert!(other[0] != found[0], "control: another number of photons");
 }
 
 #[test]
@@ -411,30 +450,31 @@ fn nearest_photons_equal_a_tree_at_a_million() {
 
 #[test]
 fn photons_in_several_windows_are_found_as_in_one() {
-    let mut bench = Bench::open();
-    let mut random = Random(10);
-    let photons = caustic_box(&mut random, 5000, 0.3, 1e-2);
-    let points: Vec<_> = (0..200).map(|_| point(&mut random, false)).collect();
-    let whole = bench.map(&photons);
-    let kernels = MapKernels::segmented(bench.gpu, 4096);
-    let split = |photons: &[Photon]| {
-        let store = PhotonStore::segmented(bench.gpu, 5000, 1024).unwrap();
-        store.write(bench.gpu, photons);
-        PhotonMap::build(bench.gpu, &kernels, store, 5000, EMITTED).unwrap()
-    };
-    let segmented = split(&photons);
-    assert_eq!((whole.segments(), segmented.segments()), (1, 2));
-    assert!(whole.read(bench.gpu).unwrap() == segmented.read(bench.gpu).unwrap());
-    let mut fewer = photons.clone();
-    fewer[4999] = fewer[0];
-    let other = split(&fewer);
-    for k in [10, 500] {
-        let expected = bench.ask(true, &whole, &points, &settings(k));
-        assert_eq!(bench.ask(true, &segmented, &points, &settings(k)), expected);
-        assert!(
-            k < 500 || bench.ask(true, &other, &points, &settings(k)) != expected,
-            "the control: another last photon"
-        );
+    for mut bench in Bench::each() {
+        let mut random = Random(10);
+        let photons = caustic_box(&mut random, 5000, 0.3, 1e-2);
+        let points: Vec<_> = (0..200).map(|_| point(&mut random, false)).collect();
+        let whole = bench.map(&photons);
+        let kernels = MapKernels::segmented(bench.gpu, 4096);
+        let split = |photons: &[Photon]| {
+            let store = PhotonStore::segmented(bench.gpu, 5000, 1024).unwrap();
+            store.write(bench.gpu, photons);
+            PhotonMap::build(bench.gpu, &kernels, store, 5000, EMITTED).unwrap()
+        };
+        let segmented = split(&photons);
+        assert_eq!((whole.segments(), segmented.segments()), (1, 2));
+        assert!(whole.read(bench.gpu).unwrap() == segmented.read(bench.gpu).unwrap());
+        let mut fewer = photons.clone();
+        fewer[4999] = fewer[0];
+        let other = split(&fewer);
+        for k in [10, 500] {
+            let expected = bench.ask(true, &whole, &points, &settings(k));
+            assert_eq!(bench.ask(true, &segmented, &points, &settings(k)), expected);
+            assert!(
+                k < 500 || bench.ask(true, &other, &points, &settings(k)) != expected,
+                "the control: another last photon"
+            );
+        }
     }
 }
 

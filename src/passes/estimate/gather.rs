@@ -219,7 +219,8 @@ impl<'s> Gather<'s> {
             ("gathered", gathered),
         ]);
         let with_info = |info| [buffers.as_slice(), &[("gather_info", info)]].concat();
-        let strides = if gpu.is_software { &STRIDES[..] } else { &[1] };
+        let lanes = u64::from(gpu.lanes.of_packet);
+        let strides = if lanes == 1 { &STRIDES[..] } else { &[1] };
         let info = |stride| gpu.uniform("gather info", &GatherInfo { count: waiting, stride, ..*info });
         let infos: Vec<_> = strides.iter().map(|&stride| info(stride)).collect();
         let search_bindings: Vec<_> = infos.iter().map(|info| search.bind(gpu, &with_info(info))).collect();
@@ -241,13 +242,13 @@ impl<'s> Gather<'s> {
             encoder.clear_buffer(&scratch.open, 0, None);
             for (bindings, &stride) in search_bindings.iter().zip(strides) {
                 let packets = packets.div_ceil(BLOCK).div_ceil(stride.into()) * BLOCK;
-                search.dispatch(&mut encoder, bindings, packets);
+                search.dispatch(&mut encoder, bindings, packets * lanes);
             }
             encoder.clear_buffer(&scratch.listed, 0, Some(SURVEY_LISTS * size_of::<u32>() as u64));
             for (survey, bindings) in survey.iter().flatten() {
                 survey.dispatch(&mut encoder, bindings, waiting.into());
             }
-            sum.dispatch(&mut encoder, &sum_bindings, packets);
+            sum.dispatch(&mut encoder, &sum_bindings, packets * lanes);
             finish.dispatch(&mut encoder, &finish_bindings, waiting.into());
             gpu.submit(encoder);
             dispatches += 1;
