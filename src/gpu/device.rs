@@ -46,8 +46,8 @@ pub struct Gpu {
     pub(crate) is_software: bool,
     /// Maximum number of nodes and primitives that a ray visits, at least [`SHORT_LOOPS`].
     pub(crate) trace_budget: u32,
-    /// Memory for what is read back, kept for the next time: to get some takes a GPU's driver longer
-    /// than most reads.
+    /// Memory for what is read back, kept for the next time: to get some takes a GPU's driver
+    /// longer than most reads.
     spare_reader: Mutex<Option<Buffer>>,
     faults: Faults,
 }

@@ -18,8 +18,8 @@ pub(crate) struct Lanes {
 }
 
 impl Lanes {
-    /// Lanes of software, each of which has a packet of its own, or of a GPU, where the photons of a
-    /// packet are spread over lanes if there are enough: one for each photon of a cell.
+    /// Lanes of software, each of which has a packet of its own, or of a GPU, where the photons of
+    /// a packet are spread over lanes if there are enough: one for each photon of a cell.
     pub fn new(subgroup: (u32, u32), is_software: bool) -> Self {
         let (least, most) = subgroup;
         let of_packet = if !is_software && least >= CELL_FAN { least.min(CELL_PHOTONS) } else { 1 };

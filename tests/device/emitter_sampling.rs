@@ -171,6 +171,31 @@ fn check_density(lamps: &Lamps) {
     assert!(!other.fits(), "control: lamps chosen for another normal: {other:?}");
 }
 
+#[test]
+fn strips_nearby_light_a_surface_with_little_noise() {
+    // 3 m long and 1 cm wide, 30 cm above.
+    let (height, half, from, width) = (0.3, 1.5, 0.02, 0.01);
+    let mut scene = scene(&[]);
+    scene.materials.push(emissive("strip", 0.0, 1.0, false));
+    add_quad(&mut scene, vec3(-half, height, from), 2.0 * half * Vec3::X, width * Vec3::Z, 0);
+    let drawn = drawn_and_met(&Lamps { scene, count: 2 }, &lamp_samples(), Vec3::Y, Vec3::Y);
+    assert!(drawn.iter().all(|(d, met)| within((*met).into(), d[3].into(), 0.01)), "both ways have one density");
+    // Mean and relative variance of the light that each sample gives.
+    let of = |light: &[f64]| {
+        let mean = |power: i32| light.iter().map(|x| x.powi(power)).sum::<f64>() / light.len() as f64;
+        (mean(1), mean(2) / mean(1).powi(2) - 1.0)
+    };
+    let by_area = |i: u32| {
+        let x = f64::from(2.0 * half) * ((f64::from(i) + 0.5) / 1e5 - 0.5);
+        let (h, z) = (f64::from(height), f64::from(from + 0.5 * width));
+        f64::from(2.0 * half * width) * h * h / (x * x + h * h + z * z).powi(2)
+    };
+    let (found, noise) = of(&drawn.iter().map(|(d, _)| f64::from(d[1] / d[3])).collect::<Vec<_>>());
+    let (right, control) = of(&(0..100_000).map(by_area).collect::<Vec<_>>());
+    assert!(within(found, right, 0.005), "{found} instead of {right}");
+    assert!(noise < 0.1 && control > 2.5, "{noise}, and {control} of even points of the strip");
+}
+
 /// Weights of directions drawn with the first density, where another technique draws them with the
 /// second.
 fn weights(densities: &[[f32; 2]]) -> Vec<f64> {
