@@ -10,6 +10,7 @@
 //! | linear | from a to b | from b to a |
 //! | sampler | one number of a set is uniform over the seeds, alone and with another dimension | a whole set is too even; a dimension with itself |
 //! | cells | host and kernels have the same hash | that of the next cell |
+//! | patches | what is drawn on the rim has the density of the disc | it is at the rim |
 
 use caustica::passes::estimate::cell_hash;
 use glam::{Vec3, vec3};
@@ -21,6 +22,33 @@ use super::{
 };
 
 const AXES: [Vec3; 4] = [Vec3::Z, Vec3::NEG_Z, Vec3::X, vec3(0.48, -0.6, -0.64)];
+
+#[test]
+fn directions_drawn_at_the_rim_of_a_bright_patch_are_within_it() {
+    let mut random = Random(3);
+    let mut row = || {
+        let [x, y, away] = [0; 3].map(|_| 6.0 * random.unit() - 3.0);
+        let radius = 0.01 + 0.05 * random.unit();
+        // Small first numbers are at the rim.
+        let rim = (64.0 * random.unit()).floor() / 16_777_216.0;
+        [[rim, random.unit(), x, y], [0.2, -0.1, 4.0 + away, radius]]
+    };
+    let densities = |rows: &[Row]| Probe::new("probe_patch").run(rows).into_iter().map(|d| d[3]).collect::<Vec<_>>();
+    let at_rim: Vec<Row> = (0..100_000).map(|_| row()).collect();
+    let outside = densities(&at_rim).iter().filter(|density| **density <= 0.0).count();
+    assert_eq!(outside, 0, "directions without the density that they were drawn with");
+    let directions = Probe::new("probe_patch").run(&at_rim);
+    let is_inside = |(row, d): (&Row, &[f32; 4])| {
+        let to = Vec3::from_slice(&row[1]).as_dvec3() - vec3(row[0][2], row[0][3], 0.0).as_dvec3();
+        let direction = Vec3::from_slice(d).as_dvec3();
+        to.length() * direction.cross(to).length() / direction.dot(to) < 0.999 * f64::from(row[1][3])
+    };
+    assert_eq!(
+        at_rim.iter().zip(&directions).filter(|pair| is_inside(*pair)).count(),
+        0,
+        "control: they are at the rim"
+    );
+}
 
 /// Directions against a density of which `fraction` is what lies below a height, 1 − cos, about
 /// the axis.

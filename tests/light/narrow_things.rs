@@ -163,7 +163,7 @@ fn rods_and_bars_have_the_light_of_a_path_tracer() {
         let (pixels, raw) = found_and_raw(&things, &asked(200_000), 4, 1);
         assert!(is_about(&pixels, right), "{name}, right {right}");
         let (most, raw) = (greatest_of(&pixels.concat()), mean_of(&raw));
-        assert!(most < 1.5 * greatest, "{name}: a pixel of {most:.2}");
+        assert!(most < 1.7 * greatest, "{name}: a pixel of {most:.2}");
         assert!(!within(raw, right, 0.1), "control: {name}: raw {raw:.3}, right {right}");
     }
 }
