@@ -183,7 +183,8 @@ fn patch(Target { center, radius }: Target, power: f64) -> Option<BrightPatch> {
     // Intensity, the sum of the channels.
     let power = (3.0 * power / (2.0 * f64::from(TAU))) as f32;
     let is_one = (radius * radius).is_normal() && power.is_normal();
-    is_one.then(|| BrightPatch { position: center.to_array(), radius, normal: [0.0; 3], power })
+    let of_all_sides = BrightPatch { normal: [0.0; 3], tangent: [0.0; 3], narrow: radius, ..BrightPatch::default() };
+    is_one.then(|| BrightPatch { position: center.to_array(), radius, power, ..of_all_sides })
 }
 
 #[cfg(test)]

@@ -203,18 +203,23 @@ pub struct FinalStep {
 /// Bright patches of a picture at most, lamps in glass among them.
 pub const MAX_PATCHES: usize = 128;
 
-/// A small part of a surface from which much light comes: a disc.
+/// A small part of a surface from which much light comes: an ellipse, or a disc that faces all
+/// points.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BrightPatch {
     /// Centre, metres.
     pub position: [f32; 3],
-    /// Metres.
+    /// The greatest, metres.
     pub radius: f32,
-    /// Unit, on the bright side.
+    /// Unit, on the bright side; 0: it faces all points.
     pub normal: [f32; 3],
     /// Radiance times area.
     pub power: f32,
+    /// Unit, the direction of the greatest radius.
+    pub tangent: [f32; 3],
+    /// The least, metres.
+    pub narrow: f32,
 }
 
 /// Sums over the rays of final gathering of a point, by the directions from which light of each

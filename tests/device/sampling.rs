@@ -35,8 +35,11 @@ fn directions_drawn_at_the_rim_of_a_bright_patch_are_within_it() {
     };
     let densities = |rows: &[Row]| Probe::new("probe_patch").run(rows).into_iter().map(|d| d[3]).collect::<Vec<_>>();
     let at_rim: Vec<Row> = (0..100_000).map(|_| row()).collect();
-    let outside = densities(&at_rim).iter().filter(|density| **density <= 0.0).count();
-    assert_eq!(outside, 0, "directions without the density that they were drawn with");
+    let long: Vec<Row> = at_rim.iter().map(|[a, [x, y, z, radius]]| [*a, [*x, *y, *z, -radius]]).collect();
+    for rows in [&at_rim, &long] {
+        let outside = densities(rows).iter().filter(|density| **density <= 0.0).count();
+        assert_eq!(outside, 0, "directions without the density that they were drawn with");
+    }
     let directions = Probe::new("probe_patch").run(&at_rim);
     let is_inside = |(row, d): (&Row, &[f32; 4])| {
         let to = Vec3::from_slice(&row[1]).as_dvec3() - vec3(row[0][2], row[0][3], 0.0).as_dvec3();
@@ -48,6 +51,27 @@ fn directions_drawn_at_the_rim_of_a_bright_patch_are_within_it() {
         0,
         "control: they are at the rim"
     );
+}
+
+#[test]
+fn directions_over_a_long_bright_patch_have_its_solid_angle() {
+    let mut random = Random(4);
+    let mut rows = |away: f32, radius: f32| -> Vec<Row> {
+        // In front of an ellipse, to its side.
+        (0..40_000).map(|_| [[random.unit(), random.unit(), 1.5, -0.5], [0.0, 0.0, away, radius]]).collect()
+    };
+    let mut solid_angle = |away: f32, radius: f32| {
+        let found = Probe::new("probe_patch").run(&rows(away, radius));
+        found.iter().map(|d| 1.0 / f64::from(d[3])).sum::<f64>() / found.len() as f64
+    };
+    for (away, radius) in [(3.0_f32, 0.1_f32), (0.8, 0.02)] {
+        let distance = f64::from(away).hypot(1.5).hypot(0.5);
+        let projected = f64::from(away) / distance.powi(3);
+        let right = std::f64::consts::PI * 0.1 * f64::from(radius).powi(2) * projected;
+        let found = solid_angle(away, -radius);
+        assert!((found / right - 1.0).abs() < 0.01, "{found} instead of {right}");
+        assert!(solid_angle(away, radius) > 5.0 * right, "control: a disc");
+    }
 }
 
 /// Directions against a density of which `fraction` is what lies below a height, 1 − cos, about

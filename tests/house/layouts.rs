@@ -62,7 +62,7 @@ fn twins() -> Vec<Twin> {
         Store { staged, first_photon, photons, kind }
         CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, gathers, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, cells_from, listed, listed_at, left_out, shift, square_bits, patches, other_light, merges_layers, lobe_patches, pad0, pad1, pad2 }
         FinalStep { first_ray, rays_now, rays, chosen, seed, pad0, pad1, pad2 }
-        BrightPatch { position, radius, normal, power }
+        BrightPatch { position, radius, normal, power, tangent, narrow }
         CellGrid { per_metre, levels, mask, points, next_map, pad0, pad1, pad2 }
         ArrivingLight { red, green, blue, fluence, nearness }
         IrradianceRecord { position, ng, irradiance, reach }

@@ -236,7 +236,7 @@ fn small_bright_places_leave_no_spots() {
 
 #[test]
 fn long_and_mirrored_bright_places_leave_no_spots() {
-    // The greatest error by blocks, in the control's or of 2.5 %.
+    // The greatest error by blocks, 0.4 of the control's or that of 2.5 %.
     for (name, scene, most) in [
         ("a strip behind a ledge", with(cove), None),
         (
@@ -260,7 +260,7 @@ fn long_and_mirrored_bright_places_leave_no_spots() {
         let (spaced, classic) = (render_scene(&scene, &gathering(64, 2)), render_scene(&scene, &plain()));
         let (found, control) = (error_of_blocks(&spaced, &right), error_of_blocks(&classic, &right));
         println!("{name}: {found} {control} {}", mean(&spaced) / mean(&right));
-        assert!(found < most.unwrap_or(control), "{name}: {found}, and {control} by the photons around each point");
+        assert!(found < most.unwrap_or(0.4 * control), "{name}: {found}, and {control} by the photons around each point");
         assert!(within(mean(&spaced), mean(&right), 0.05), "{name}: {} instead of {}", mean(&spaced), mean(&right));
     }
 }

@@ -4,23 +4,24 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat2, DVec2, DVec3, Vec3};
 
 use crate::{
     emitters::lamps_in_glass::MAX_LAMP_PATCHES,
     layout::{BrightPatch, MAX_PATCHES},
 };
 
-/// Patches at most, and where light is uneven: every ray reads them all.
-const PATCHES: usize = 8;
-const PATCHES_OF_UNEVEN: usize = MAX_PATCHES - MAX_LAMP_PATCHES;
+/// Patches at most.
+const PATCHES: usize = MAX_PATCHES - MAX_LAMP_PATCHES;
+/// Fraction of the rays' mean square that a patch must cause: every ray reads them all.
+const LEAST_OF_PATCH: f64 = 0.005;
 /// Radiance of a bright end, in units of the mean over all rays.
 const BRIGHT: f64 = 8.0;
 /// Fraction of the rays' variance that bright ends must cause for any ray to be aimed.
 const LEAST_PART: f64 = 0.3;
 /// Widths of cells that are tried, in units of the narrowest: few ends are spread over few wide
-/// cells. The narrowest is taken that has enough; where light is uneven, this part of the most that
-/// any has.
+/// cells, and so is what is long. The narrowest is taken of which the places cause this part of the
+/// most that those of any do.
 const WIDTHS: [f32; 4] = [1.0, 2.0, 4.0, 8.0];
 const NEAR_MOST: f64 = 0.9;
 /// Mean square of the radiance over the square of its mean, above which few rays bring most of the
@@ -28,6 +29,9 @@ const NEAR_MOST: f64 = 0.9;
 const UNEVEN: f64 = 30.0;
 /// Ends that make a patch.
 const MIN_ENDS: usize = 3;
+/// Part of the variance along a patch, divided by the number of its ends, that is added to that along
+/// and across it.
+const FEW: f64 = 1.0;
 /// Length of a way, as a fraction of what is straight, from which on it has a corner.
 const STRAIGHT: f32 = 1.0001;
 
@@ -85,18 +89,17 @@ impl BrightPlaces {
     /// picture; those that met nothing are left out.
     #[must_use]
     pub fn find(ends: &[RayEnd], rays: f64, width: f32) -> Self {
-        let is_uneven = is_uneven(ends, rays);
-        let in_cells = |factor: &f32| Self::in_cells((ends, is_uneven), rays, width * factor);
+        let in_cells = |factor: &f32| Self::in_cells(ends, rays, width * factor);
         let found: Vec<(f64, Self)> = WIDTHS.iter().map(in_cells).collect();
         let most = found.iter().map(|(part, _)| *part).fold(0.0, f64::max);
-        let least = if is_uneven { LEAST_PART.max(NEAR_MOST * most) } else { LEAST_PART };
+        let least = LEAST_PART.max(NEAR_MOST * most);
         let enough = found.into_iter().find(|(part, _)| *part > least).map(|(_, places)| places);
         let none = || Self { other_light: irradiance(mean_radiance(ends, rays)), ..Self::default() };
-        Self { is_uneven, ..enough.unwrap_or_else(none) }
+        Self { is_uneven: is_uneven(ends, rays), ..enough.unwrap_or_else(none) }
     }
 
     /// The same by cells of one width, and the fraction of the variance that the places cause.
-    fn in_cells((ends, is_uneven): (&[RayEnd], bool), rays: f64, width: f32) -> (f64, Self) {
+    fn in_cells(ends: &[RayEnd], rays: f64, width: f32) -> (f64, Self) {
         let mean = mean_radiance(ends, rays);
         let mut cells: Vec<Cell> = Vec::new();
         let mut of_keys: BTreeMap<[i32; 5], usize> = BTreeMap::new();
@@ -116,14 +119,14 @@ impl BrightPlaces {
                 cells[cell].left += 1;
             }
         }
-        let most = if is_uneven { PATCHES_OF_UNEVEN } else { PATCHES };
         let (mut patches, mut light, mut squares) = (Vec::new(), 0.0, 0.0);
         let mut is_left = vec![true; ends.len()];
-        while patches.len() < most {
+        let all = ends.iter().map(|end| end.radiance.powi(2)).sum::<f64>();
+        while patches.len() < PATCHES {
             let brightest = (0..cells.len())
                 .filter(|i| cells[*i].left >= MIN_ENDS)
                 .max_by(|a, b| cells[*a].squares.total_cmp(&cells[*b].squares).then(b.cmp(a)));
-            let Some(brightest) = brightest else { break };
+            let Some(brightest) = brightest.filter(|i| cells[*i].squares > LEAST_OF_PATCH * all) else { break };
             let taken: Vec<(usize, Aim)> =
                 std::mem::take(&mut cells[brightest].ends).into_iter().filter(|(i, _)| is_left[*i]).collect();
             for (i, _) in &taken {
@@ -137,9 +140,8 @@ impl BrightPlaces {
             }
             patches.extend(patch(&taken.iter().map(|(i, aim)| (*aim, ends[*i].radiance)).collect::<Vec<_>>()));
         }
-        let all = ends.iter().map(|end| end.radiance.powi(2)).sum::<f64>();
         let other_light = irradiance(mean - light / rays);
-        let places = Self { patches, other_light, is_uneven };
+        let places = Self { patches, other_light, is_uneven: false };
         (if all > 0.0 { squares / all } else { 0.0 }, places)
     }
 }
@@ -185,23 +187,40 @@ impl RayEnd {
     }
 }
 
-/// The disc about what is aimed at, by radiance.
+/// The ellipse about what is aimed at, by radiance; a disc where it looks the same from all sides.
 fn patch(ends: &[(Aim, f64)]) -> Option<BrightPatch> {
     let light: f64 = ends.iter().map(|(_, radiance)| radiance).sum();
     let mean = |of: &dyn Fn(&Aim) -> Vec3| {
-        ends.iter().map(|(aim, radiance)| of(aim).as_dvec3() * (radiance / light)).sum::<DVec3>().as_vec3()
+        ends.iter().map(|(aim, radiance)| of(aim).as_dvec3() * (radiance / light)).sum::<DVec3>()
     };
     let position = mean(&|aim| aim.position);
-    let spread: f64 =
-        ends.iter().map(|(aim, radiance)| f64::from(aim.position.distance_squared(position)) * radiance / light).sum();
+    let normal = mean(&|aim| aim.normal).normalize_or_zero();
+    // Covariance in the plane, and what lies off it, which is added all around.
+    let (x, y) = normal.try_normalize().unwrap_or(DVec3::Z).any_orthonormal_pair();
+    let mut covariance = DMat2::ZERO;
+    let mut off = 0.0;
+    for (aim, radiance) in ends {
+        let aside = aim.position.as_dvec3() - position;
+        let in_plane = DVec2::new(aside.dot(x), aside.dot(y));
+        covariance += DMat2::from_cols(in_plane.x * in_plane, in_plane.y * in_plane) * (radiance / light);
+        off += (aside.length_squared() - in_plane.length_squared()).max(0.0) * radiance / light;
+    }
+    covariance += DMat2::from_diagonal(DVec2::splat(0.5 * off));
+    let half = 0.5 * (covariance.x_axis.x - covariance.y_axis.y);
+    let skew = covariance.x_axis.y;
+    let (middle, apart) = (0.5 * (covariance.x_axis.x + covariance.y_axis.y), half.hypot(skew));
+    let is_round = normal == DVec3::ZERO;
+    let [long, wide] = if is_round { [middle; 2] } else { [middle + apart, (middle - apart).max(0.0)] };
+    let (sin, cos) = (0.5 * skew.atan2(half)).sin_cos();
+    let tangent = if is_round { DVec3::ZERO } else { cos * x + sin * y };
     let count = ends.len() as f64;
-    // The mean square of the distance from the middle of an even disc is half of its squared
-    // radius. Twice that is taken, for what is darker at the rim.
-    let radius = 2.0 * (spread * (1.0 + 1.0 / count)).sqrt() as f32;
-    let power = (light / count * 2.0 * std::f64::consts::PI * spread) as f32;
-    let normal = mean(&|aim| aim.normal).normalize_or_zero().to_array();
-    Some(BrightPatch { position: position.to_array(), radius, normal, power })
-        .filter(|patch| patch.radius > 0.0 && patch.power.is_finite())
+    // The variance along an axis of an even ellipse is a quarter of its squared radius. Twice that
+    // is taken, for what is darker at the rim. Few ends may lie in a line by chance.
+    let radius = |variance: f64| (8.0 * (variance + FEW * long / count)).sqrt() as f32;
+    let power = (light / count * 4.0 * std::f64::consts::PI * (long * (wide + FEW * long / count)).sqrt()) as f32;
+    let [position, normal, tangent] = [position, normal, tangent].map(|v| v.as_vec3().to_array());
+    Some(BrightPatch { position, radius: radius(long), normal, power, tangent, narrow: radius(wide) })
+        .filter(|patch| patch.narrow > 0.0 && patch.power.is_finite())
 }
 
 #[cfg(test)]
@@ -233,7 +252,24 @@ mod tests {
         assert!((patch.power / (500.0 * 0.01 * std::f32::consts::PI) - 1.0).abs() < 0.1, "{patch:?}");
         assert!((bright.other_light / std::f32::consts::PI - 1.0).abs() < 0.02, "{bright:?}");
         let narrow = BrightPlaces::find(&ends(500.0), 10_000.0, 0.1).patches;
-        assert!(narrow.len() > 3 && narrow.len() <= PATCHES_OF_UNEVEN, "{narrow:?}");
+        assert!(narrow.len() > 3 && narrow.len() <= PATCHES, "{narrow:?}");
+    }
+
+    #[test]
+    fn a_long_bright_place_has_long_patches() {
+        // A strip of 2 cm along a diagonal of the floor.
+        let along = vec3(1.0, 0.0, 1.0).normalize();
+        let on_strip = |end: &RayEnd| end.position.dot(vec3(along.x, 0.0, -along.z)).abs() < 0.01;
+        let shine = |end: RayEnd| RayEnd { radiance: if on_strip(&end) { 500.0 } else { 1.0 }, ..end };
+        let strip: Vec<RayEnd> = ends(1.0).into_iter().map(shine).collect();
+        let long = BrightPlaces::find(&strip, 10_000.0, 0.5).patches;
+        assert!(long.len() > 2 && long.len() < 10, "{long:?}");
+        for patch in &long {
+            assert!(Vec3::from(patch.tangent).dot(along).abs() > 0.99, "{patch:?}");
+            assert!(patch.narrow < 0.4 * patch.radius, "{patch:?}");
+        }
+        let round = BrightPlaces::find(&ends(500.0), 10_000.0, 1.0).patches;
+        assert!(round[0].narrow > 0.8 * round[0].radius, "control: {round:?}");
     }
 
     #[test]
