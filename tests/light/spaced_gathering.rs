@@ -229,6 +229,7 @@ fn small_bright_places_leave_no_spots() {
         let spaced = render_scene(&scene, &sized(gathering(64, 2)));
         let classic = render_scene(&scene, &sized(plain()));
         let (found, control) = (error_of_blocks(&spaced, &right), error_of_blocks(&classic, &right));
+        println!("{name}: {found} {control} {}", mean(&spaced) / mean(&right));
         assert!(found < 0.5 * control, "{name}: {found}, and {control} by the photons around each point");
         assert!(within(mean(&spaced), mean(&right), 0.02), "{name}: {} instead of {}", mean(&spaced), mean(&right));
     }
@@ -260,7 +261,10 @@ fn long_and_mirrored_bright_places_leave_no_spots() {
         let (spaced, classic) = (render_scene(&scene, &gathering(64, 2)), render_scene(&scene, &plain()));
         let (found, control) = (error_of_blocks(&spaced, &right), error_of_blocks(&classic, &right));
         println!("{name}: {found} {control} {}", mean(&spaced) / mean(&right));
-        assert!(found < most.unwrap_or(0.4 * control), "{name}: {found}, and {control} by the photons around each point");
+        assert!(
+            found < most.unwrap_or(0.4 * control),
+            "{name}: {found}, and {control} by the photons around each point"
+        );
         assert!(within(mean(&spaced), mean(&right), 0.05), "{name}: {} instead of {}", mean(&spaced), mean(&right));
     }
 }

@@ -29,8 +29,8 @@ const NEAR_MOST: f64 = 0.9;
 const UNEVEN: f64 = 30.0;
 /// Ends that make a patch.
 const MIN_ENDS: usize = 3;
-/// Part of the variance along a patch, divided by the number of its ends, that is added to that along
-/// and across it.
+/// Part of the variance along a patch, divided by the number of its ends, that is added to that
+/// along and across it.
 const FEW: f64 = 1.0;
 /// Length of a way, as a fraction of what is straight, from which on it has a corner.
 const STRAIGHT: f32 = 1.0001;
