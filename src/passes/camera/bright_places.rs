@@ -29,9 +29,6 @@ const NEAR_MOST: f64 = 0.9;
 const UNEVEN: f64 = 30.0;
 /// Ends that make a patch.
 const MIN_ENDS: usize = 3;
-/// Part of the variance along a patch, divided by the number of its ends, that is added to that
-/// along and across it.
-const FEW: f64 = 1.0;
 /// Length of a way, as a fraction of what is straight, from which on it has a corner.
 const STRAIGHT: f32 = 1.0001;
 
@@ -216,8 +213,8 @@ fn patch(ends: &[(Aim, f64)]) -> Option<BrightPatch> {
     let count = ends.len() as f64;
     // The variance along an axis of an even ellipse is a quarter of its squared radius. Twice that
     // is taken, for what is darker at the rim. Few ends may lie in a line by chance.
-    let radius = |variance: f64| (8.0 * (variance + FEW * long / count)).sqrt() as f32;
-    let power = (light / count * 4.0 * std::f64::consts::PI * (long * (wide + FEW * long / count)).sqrt()) as f32;
+    let radius = |variance: f64| (8.0 * (variance + long / count)).sqrt() as f32;
+    let power = (light / count * 4.0 * std::f64::consts::PI * (long * (wide + long / count)).sqrt()) as f32;
     let [position, normal, tangent] = [position, normal, tangent].map(|v| v.as_vec3().to_array());
     Some(BrightPatch { position, radius: radius(long), normal, power, tangent, narrow: radius(wide) })
         .filter(|patch| patch.narrow > 0.0 && patch.power.is_finite())
