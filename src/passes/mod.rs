@@ -8,11 +8,11 @@ pub mod photons;
 pub mod wavefront;
 
 pub use camera::{
-    BrightPlaces, CameraKernels, CameraTracer, FinalGather, FinalRays, Leg, RayEnd, StepCount, Tile, morton_number,
+    BrightPlaces, CameraKernels, CameraTracer, FinalGather, FinalRays, Further, Leg, RayEnd, StepCount, Tile, morton_number,
 };
 pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,
-    PointEstimate, Records, SharedPoints, filter_footprint, record_spacing,
+    PointEstimate, QueryThinning, Records, SharedPoints, filter_footprint, record_spacing,
 };
 pub use maps::{MapKernels, PhotonMap, PhotonStore};
 pub use photons::{PathRange, PathRanges, PhotonTracer, RawMap, TracedPhotons};

@@ -15,7 +15,7 @@ use crate::{
     layout::{Gathered, RecordGrid, VisiblePoint},
     map_kind::MapKind,
     passes::{
-        BrightPlaces, EstimateRequest, EstimateSharing, GatherSettings, IrradianceCache, IrradianceRecords, Records,
+        BrightPlaces, EstimateRequest, EstimateSharing, GatherSettings, IrradianceCache, IrradianceRecords, QueryThinning, Records,
         StepCount, Tile, filter_footprint, record_spacing,
     },
     progress::{Progress, Stage},
@@ -34,6 +34,7 @@ pub(crate) struct MapGatherer<'a> {
     maps: &'a PhotonMaps,
     search: Searches<'a>,
     sharing: EstimateSharing,
+    thinning: QueryThinning,
     estimate: &'a EstimateSettings,
     observer: Option<&'a mut dyn Observer>,
     /// Light at the ends of final-gather rays.
@@ -63,6 +64,7 @@ impl<'a> MapGatherer<'a> {
             maps,
             search,
             sharing,
+            thinning: QueryThinning::new(gpu),
             estimate,
             observer,
             cache: None,
@@ -269,8 +271,20 @@ impl Gatherer for MapGatherer<'_> {
         let gathered_here = |kind: MapKind| !final_gathering || kind == MapKind::Caustic;
         let kinds: Vec<MapKind> = self.maps.by_kind().map(|(kind, _)| kind).collect();
         let here = (0..kinds.len()).filter(|&index| gathered_here(kinds[index]));
-        for (index, number) in here.zip(1..) {
-            self.gather_map(pass, tile, (index, number), (film, stats), progress)?;
+        let here: Vec<(usize, u32)> = here.zip(1..).collect();
+        let maps = here.len() as u32;
+        let thinning = self.thinning.clone();
+        let mut gather_here =
+            || here.iter().try_for_each(|&map| self.gather_map(pass, tile, map, (&mut *film, &mut *stats), progress));
+        match &tile.listed {
+            Some(listed) if final_gathering => {
+                let turns = (&*listed.one_in, &*pass.tracer.keys_of_pixels(tile));
+                thinning.run(pass.gpu, &pass.tracer.shared_points(tile), turns, maps, &mut gather_here)?;
+            }
+            None if final_gathering && maps > 0 && pass.may_go_on() => {
+                pass.keep_light_of_maps(tile, &mut gather_here)?;
+            }
+            _ => gather_here()?,
         }
         if let Some(records) = &self.records {
             let view = pass.tracer.tile_view(tile);

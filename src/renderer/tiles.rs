@@ -15,7 +15,7 @@ use crate::{
     gpu::{Buffer, Gpu},
     image::{Film, cryptomatte::hash, layers::LightComponent},
     layout::{ArrivingLight, PixelSums, VisiblePoint},
-    passes::{BrightPlaces, CameraTracer, FinalGather, FinalRays, GatherSettings, StepCount, Tile, morton_number},
+    passes::{BrightPlaces, CameraTracer, FinalGather, FinalRays, Further, GatherSettings, StepCount, Tile, morton_number},
     progress::{Progress, Stage},
     scene::Camera,
     settings::{Crop, EstimateSettings, ExtraLayers, PhotonSettings, PictureSettings, PixelGrid},
@@ -103,6 +103,9 @@ pub(crate) struct CameraPass<'a> {
     pub(super) obstacles: Obstacles<'a>,
     /// Sums of the tile's pixels when the last component of the light was finished.
     pub(super) finished: RefCell<Vec<[f32; 4]>>,
+    /// Light of the maps that are gathered at visible points, of each pixel of the tile, mean of its
+    /// samples and of the channels; empty where no one has asked for it.
+    pub(super) by_maps: RefCell<Vec<f32>>,
     /// Layers that the film has besides.
     pub(super) layers: Vec<ExtraLayers>,
     /// Hashes of names for mattes, of objects and of materials.
@@ -165,6 +168,7 @@ impl<'a> CameraPass<'a> {
             direct: photons.mode.direct_by_rays(),
             obstacles,
             finished: RefCell::default(),
+            by_maps: RefCell::default(),
             layers: picture.layers.clone(),
             hashes: [
                 geometry.objects.iter().map(|name| hash(name)).collect(),
@@ -225,8 +229,8 @@ impl<'a> CameraPass<'a> {
             if self.doublings == 0 {
                 return Ok(());
             }
-            let doubled = self.doubled_pixels(tile, &sums);
-            let extra_tiles = self.tracer.extra_tiles(tile, &doubled);
+            let further = self.further_samples(tile, &sums);
+            let extra_tiles = self.tracer.extra_tiles(tile, &further);
             for (i, extra) in extra_tiles.iter().enumerate() {
                 progress.check()?;
                 count.report(extra_tiles.len() - i);
@@ -235,7 +239,7 @@ impl<'a> CameraPass<'a> {
                 count.further += 1;
             }
             for (pixel, at) in (0..tile.pixels).filter_map(|pixel| Some((pixel, self.tracer.pixel(tile, pixel)?))) {
-                films.iter_mut().for_each(|film| film.weigh(at, doubled[pixel as usize]));
+                films.iter_mut().for_each(|film| film.weigh(at, further[pixel as usize].doublings));
             }
             Ok(())
         })?;
@@ -289,6 +293,7 @@ impl<'a> CameraPass<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<PixelSums>> {
         self.finished.borrow_mut().clear();
+        self.by_maps.borrow_mut().clear();
         self.finished_component(tile, LightComponent::Emission, &mut films[0])?;
         if self.direct {
             self.light_directly(tile, &mut films[0], stats)?;
@@ -302,18 +307,40 @@ impl<'a> CameraPass<'a> {
         Ok(sums)
     }
 
-    /// Number of times that the samples of each of the tile's pixels double.
-    fn doubled_pixels(&self, tile: &Tile, sums: &[PixelSums]) -> Vec<u32> {
+    /// What each of the tile's pixels has besides.
+    fn further_samples(&self, tile: &Tile, sums: &[PixelSums]) -> Vec<Further> {
         let (columns, rows) = tile.sides();
         let size = self.size;
         let is_in = |column, row| tile.first_column + column < size.0 && tile.first_row + row < size.1;
         let of = |column, row| is_in(column, row).then(|| &sums[morton_number(column, row) as usize]);
         let square = Square { columns, rows, samples: tile.samples, sums: &of };
-        let mut doubled = vec![0; tile.pixels as usize];
-        for ((column, row), error) in square.uneven() {
-            doubled[morton_number(column, row) as usize] = doublings(error).min(self.doublings);
+        let by_maps = self.by_maps.borrow();
+        let of_maps = |column, row| by_maps.get(morton_number(column, row) as usize).copied();
+        let mut further = vec![Further { doublings: 0, one_in: 1 }; tile.pixels as usize];
+        for (place, error) in square.uneven() {
+            let doublings = doublings(error).min(self.doublings);
+            let one_in = square.one_in(place, error, &of_maps);
+            further[morton_number(place.0, place.1) as usize] = Further { doublings, one_in };
         }
-        doubled
+        further
+    }
+
+    /// Whether pixels may have further samples.
+    pub fn may_go_on(&self) -> bool {
+        self.doublings > 0
+    }
+
+    /// Adds light of maps to the radiance at the tile's points by `gather`, and keeps what each
+    /// pixel has of it.
+    pub fn keep_light_of_maps(&self, tile: &Tile, gather: &mut dyn FnMut() -> Result<()>) -> Result<()> {
+        let light = || -> Result<Vec<f32>> {
+            let sums = self.tracer.resolve(self.gpu, tile)?;
+            Ok(sums.iter().map(|sums| sums[0][..3].iter().sum::<f32>() / (3 * tile.samples) as f32).collect())
+        };
+        let before = light()?;
+        gather()?;
+        *self.by_maps.borrow_mut() = light()?.iter().zip(before).map(|(after, before)| after - before).collect();
+        Ok(())
     }
 
     /// Adds direct light at the tile's visible points by shadow rays.

@@ -16,6 +16,9 @@ const UNEVEN: f32 = 0.005;
 /// Radiance below which errors count less, as a fraction of that around.
 const DARK: f32 = 0.1;
 
+/// One of that many samples has the light of maps at least.
+const LEAST_ONE_IN: u32 = 32;
+
 /// Steps to the neighbours of a pixel, in turn around it.
 const AROUND: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
@@ -54,6 +57,21 @@ impl Square<'_> {
             at(x, y).map(|_| ((column, row), through(&from_fn(toward))))
         };
         places().filter_map(error_through).filter(|(_, error)| *error > UNEVEN).collect()
+    }
+
+    /// One of how many samples of a pixel with that error needs the light of maps, a power of two:
+    /// where it stands for n of them, the variance of a sample grows by n - 1 squares of that light,
+    /// which is a sixteenth of it at most. `of_maps` is the mean of that light of each pixel: the
+    /// brightest of those around decides. The pixel's own samples may have a say in this, for it
+    /// does not change the mean.
+    pub fn one_in(&self, (column, row): (u32, u32), error: f32, of_maps: &dyn Fn(u32, u32) -> Option<f32>) -> u32 {
+        let light = (self.sums)(column, row).map_or(0.0, |sums| Spread::of(sums, self.samples).light());
+        let around = |at: u32, end: u32| at.saturating_sub(2)..(at + 3).min(end);
+        let places = around(row, self.rows).flat_map(|row| around(column, self.columns).map(move |column| (column, row)));
+        let brightest = places.map(|(column, row)| of_maps(column, row).unwrap_or(f32::INFINITY)).fold(0.0, f32::max);
+        let deviation = (error * self.samples as f32).sqrt() * light;
+        let most = (0.5 * deviation / brightest.max(f32::MIN_POSITIVE)).clamp(1.0, LEAST_ONE_IN as f32) as u32;
+        1 << most.ilog2()
     }
 }
 

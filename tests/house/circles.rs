@@ -233,6 +233,7 @@ const ORDERS: [(&str, &[&str]); 5] = [
             "gather_kernels",
             "gather",
             "share_estimates",
+            "thin_queries",
             "cell_table",
             "irradiance_cache",
             "record_walls",

@@ -15,4 +15,4 @@ pub use bright_places::{BrightPlaces, Leg, RayEnd};
 pub use camera_kernels::CameraKernels;
 pub use camera_tracer::CameraTracer;
 pub use final_gather::{FinalGather, FinalRays};
-pub use tile::{StepCount, Tile, morton_number};
+pub use tile::{Further, StepCount, Tile, morton_number};

@@ -47,8 +47,20 @@ impl Tile {
 pub struct Listed {
     /// Their numbers in Morton order.
     pub pixels: Arc<[u32]>,
+    /// [`Further::one_in`] of each.
+    pub one_in: Arc<[u32]>,
     /// Samples of each of these pixels when this tile is done.
     pub samples: u32,
+}
+
+/// What a pixel has besides the samples of every pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Further {
+    /// Number of times that its samples double.
+    pub doublings: u32,
+    /// One of that many further samples, a power of two, has the light of the caustic map, for all
+    /// of them.
+    pub one_in: u32,
 }
 
 /// Counts of one step, for the statistics.

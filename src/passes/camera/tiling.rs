@@ -2,7 +2,7 @@
 
 use super::{
     camera_tracer::CameraTracer,
-    tile::{Listed, PIXEL_SAMPLES, Tile, morton_place, tile_sides},
+    tile::{Further, Listed, PIXEL_SAMPLES, Tile, morton_place, tile_sides},
 };
 use crate::settings::Crop;
 
@@ -36,15 +36,15 @@ impl CameraTracer {
         tiles
     }
 
-    /// Tiles of the samples that pixels of a tile have besides, in order: `doubled` is the number
-    /// of times that those of each pixel double. Their indices follow each other from one far from
-    /// those of all other samples on.
+    /// Tiles of the samples that pixels of a tile have besides, in order. Their indices follow each
+    /// other from one far from those of all other samples on.
     #[must_use]
-    pub fn extra_tiles(&self, tile: &Tile, doubled: &[u32]) -> Vec<Tile> {
-        let most = doubled.iter().copied().max().unwrap_or(0);
+    pub fn extra_tiles(&self, tile: &Tile, further: &[Further]) -> Vec<Tile> {
+        let of = |pixel: &u32| further[*pixel as usize];
+        let most = further.iter().map(|pixel| pixel.doublings).max().unwrap_or(0);
         let mut tiles = Vec::new();
         for doubling in 1..=most {
-            let is_doubled = |pixel: &u32| doubled[*pixel as usize] >= doubling;
+            let is_doubled = |pixel: &u32| of(pixel).doublings >= doubling;
             let pixels: Vec<u32> = (0..tile.pixels).filter(is_doubled).collect();
             let samples = self.view.spp << doubling;
             let had = samples / 2;
@@ -52,11 +52,12 @@ impl CameraTracer {
             let at_once = (self.room as u32 / (self.view.branches * step)).max(1);
             for first in (had..samples).step_by(step as usize) {
                 for some in pixels.chunks(at_once as usize) {
+                    let one_in = some.iter().map(|pixel| of(pixel).one_in).collect();
                     tiles.push(Tile {
                         pixels: some.len() as u32,
                         first_sample: self.first_extra + first - self.view.spp,
                         samples: step.min(samples - first),
-                        listed: Some(Listed { pixels: some.into(), samples }),
+                        listed: Some(Listed { pixels: some.into(), one_in, samples }),
                         ..*tile
                     });
                 }
@@ -84,6 +85,13 @@ impl CameraTracer {
     pub(super) fn place(tile: &Tile, i: u32) -> (u32, u32) {
         let (column, row) = morton_place(tile.listed.as_ref().map_or(i, |listed| listed.pixels[i as usize]));
         (tile.first_column + column, tile.first_row + row)
+    }
+
+    /// Numbers that differ between a tile's pixels, its samples and seeds, for each of its pixels.
+    #[must_use]
+    pub fn keys_of_pixels(&self, tile: &Tile) -> Vec<[u32; 4]> {
+        let key = |(column, row)| [column, row, tile.first_sample, self.view.seed];
+        (0..tile.pixels).map(|i| key(Self::place(tile, i))).collect()
     }
 
     /// Column and row of the `i`-th pixel of a tile within the data window; `None` outside of it.

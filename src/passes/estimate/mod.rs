@@ -9,6 +9,7 @@ pub mod irradiance_records;
 mod query_order;
 mod record_walls;
 pub mod share_estimates;
+pub mod thin_queries;
 
 #[doc(hidden)]
 pub use cell_table::{PointEstimate, cell_hash};
@@ -16,3 +17,4 @@ pub use gather::{Gather, GatherOptions, GatherSettings};
 pub use irradiance_cache::IrradianceCache;
 pub use irradiance_records::{IrradianceRecords, Records, filter_footprint, record_spacing};
 pub use share_estimates::{EstimateRequest, EstimateSharing, SharedPoints};
+pub use thin_queries::QueryThinning;
