@@ -8,7 +8,8 @@ pub mod photons;
 pub mod wavefront;
 
 pub use camera::{
-    BrightPlaces, CameraKernels, CameraTracer, FinalGather, FinalRays, Further, Leg, RayEnd, StepCount, Tile, morton_number,
+    BrightPlaces, CameraKernels, CameraTracer, FinalGather, FinalRays, Further, Leg, RayEnd, StepCount, Tile,
+    morton_number,
 };
 pub use estimate::{
     EstimateRequest, EstimateSharing, Gather, GatherOptions, GatherSettings, IrradianceCache, IrradianceRecords,

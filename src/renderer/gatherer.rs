@@ -15,8 +15,8 @@ use crate::{
     layout::{Gathered, RecordGrid, VisiblePoint},
     map_kind::MapKind,
     passes::{
-        BrightPlaces, EstimateRequest, EstimateSharing, GatherSettings, IrradianceCache, IrradianceRecords, QueryThinning, Records,
-        StepCount, Tile, filter_footprint, record_spacing,
+        BrightPlaces, EstimateRequest, EstimateSharing, GatherSettings, IrradianceCache, IrradianceRecords,
+        QueryThinning, Records, StepCount, Tile, filter_footprint, record_spacing,
     },
     progress::{Progress, Stage},
     settings::EstimateSettings,
@@ -97,7 +97,6 @@ impl<'a> MapGatherer<'a> {
         let mut answer = |request: &EstimateRequest| search.answer(pass, maps, index, estimate, request, progress);
         timed(&mut stats.seconds.gather, || sharing.run(pass.gpu, number, &shared, &mut answer))?;
         let kind = self.maps.by_kind().nth(index).expect("one of the maps").0;
-        pass.finished_component(tile, LightComponent::Map(kind), film)?;
         pass.finished_estimates(tile, kind, film)?;
         if let Some(observer) = &mut self.observer {
             observer.observe(kind, &pass.gpu.read(gathered, 0, pass.tracer.point_count(tile).into())?);
@@ -274,8 +273,14 @@ impl Gatherer for MapGatherer<'_> {
         let here: Vec<(usize, u32)> = here.zip(1..).collect();
         let maps = here.len() as u32;
         let thinning = self.thinning.clone();
-        let mut gather_here =
-            || here.iter().try_for_each(|&map| self.gather_map(pass, tile, map, (&mut *film, &mut *stats), progress));
+        let mut gather_here = || {
+            here.iter().try_for_each(|&map| {
+                self.gather_map(pass, tile, map, (&mut *film, &mut *stats), progress)?;
+                // Light of thinned queries is not what it will be.
+                let kind = LightComponent::Map(kinds[map.0]);
+                if final_gathering { Ok(()) } else { pass.finished_component(tile, kind, film) }
+            })
+        };
         match &tile.listed {
             Some(listed) if final_gathering => {
                 let turns = (&*listed.one_in, &*pass.tracer.keys_of_pixels(tile));
@@ -285,6 +290,9 @@ impl Gatherer for MapGatherer<'_> {
                 pass.keep_light_of_maps(tile, &mut gather_here)?;
             }
             _ => gather_here()?,
+        }
+        if final_gathering {
+            pass.finished_component(tile, LightComponent::Map(MapKind::Caustic), film)?;
         }
         if let Some(records) = &self.records {
             let view = pass.tracer.tile_view(tile);

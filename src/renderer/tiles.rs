@@ -15,7 +15,9 @@ use crate::{
     gpu::{Buffer, Gpu},
     image::{Film, cryptomatte::hash, layers::LightComponent},
     layout::{ArrivingLight, PixelSums, VisiblePoint},
-    passes::{BrightPlaces, CameraTracer, FinalGather, FinalRays, Further, GatherSettings, StepCount, Tile, morton_number},
+    passes::{
+        BrightPlaces, CameraTracer, FinalGather, FinalRays, Further, GatherSettings, StepCount, Tile, morton_number,
+    },
     progress::{Progress, Stage},
     scene::Camera,
     settings::{Crop, EstimateSettings, ExtraLayers, PhotonSettings, PictureSettings, PixelGrid},

@@ -67,7 +67,8 @@ impl Square<'_> {
     pub fn one_in(&self, (column, row): (u32, u32), error: f32, of_maps: &dyn Fn(u32, u32) -> Option<f32>) -> u32 {
         let light = (self.sums)(column, row).map_or(0.0, |sums| Spread::of(sums, self.samples).light());
         let around = |at: u32, end: u32| at.saturating_sub(2)..(at + 3).min(end);
-        let places = around(row, self.rows).flat_map(|row| around(column, self.columns).map(move |column| (column, row)));
+        let places =
+            around(row, self.rows).flat_map(|row| around(column, self.columns).map(move |column| (column, row)));
         let brightest = places.map(|(column, row)| of_maps(column, row).unwrap_or(f32::INFINITY)).fold(0.0, f32::max);
         let deviation = (error * self.samples as f32).sqrt() * light;
         let most = (0.5 * deviation / brightest.max(f32::MIN_POSITIVE)).clamp(1.0, LEAST_ONE_IN as f32) as u32;
@@ -157,6 +158,25 @@ mod tests {
             assert!(found.len() < 3 * on_edge.count(), "slope {slope}: {found:?}");
         }
         assert!(uneven(|_, _| 4).is_empty() && uneven(|_, _| 0).is_empty(), "nothing where all samples are alike");
+    }
+
+    #[test]
+    fn faint_light_of_maps_is_for_few_samples() {
+        let pixels = [pixel(4)];
+        let sums = |column: u32, row: u32| (column < 8 && row < 8).then_some(&pixels[0]);
+        let square = Square { columns: 8, rows: 8, samples: 4, sums: &sums };
+        let one_in = |of_maps: f32, error| square.one_in((4, 4), error, &|_, _| Some(of_maps));
+        // The deviation of a sample is 0.2 at a light of 1.
+        let error = 0.01;
+        assert_eq!([1.0, 0.2, 0.06, 0.045, 0.02, 0.003, 0.0].map(|of| one_in(of, error)), [1, 1, 1, 2, 4, 32, 32]);
+        for of in [0.04, 0.02, 0.01] {
+            let n = one_in(of, error) as f32;
+            assert!((n - 1.0) * of * of <= 0.04 / 16.0, "a sixteenth of the variance at most: {n} for {of}");
+        }
+        assert_eq!(one_in(0.02, 16.0 * error), 16, "among others that differ more");
+        let bright_at = |place| square.one_in((4, 4), error, &|x, y| Some(if (x, y) == place { 1.0 } else { 0.0 }));
+        assert_eq!([(4, 4), (6, 2), (6, 6), (7, 4)].map(bright_at), [1, 1, 1, 32], "a bright place is two pixels away");
+        assert_eq!(square.one_in((4, 4), error, &|_, _| None), 1, "nothing is known");
     }
 
     #[test]

@@ -21,4 +21,5 @@ mod openings;
 mod probe;
 mod rough_dielectric;
 mod sampling;
+mod thinning;
 mod traversal;

@@ -5,6 +5,7 @@
 //! | progress | tiles of further samples are counted before they are done | every pixel's samples alone have fewer |
 //! | edges | edges, also in mirrors and glass, and penumbrae have the error of many samples | the samples that every pixel has alone |
 //! | small lights | lights smaller than a pixel keep their mean | pixels whose own samples decide get darker |
+//! | caustics | faint caustics keep their mean, though few of the further samples have them | they are there, and faint |
 //! | crop | a crop has the bits of the whole | another seed |
 //! | layers | mattes cover what alpha says, in finer steps than every pixel's samples make | these alone |
 //! | passes | passes have further samples of their own, and merge to the same mean | one pass alone |
@@ -127,6 +128,42 @@ fn small_lights_keep_their_mean() {
         sums.sum::<f64>() / f64::from(48 * 48)
     });
     assert!(own.mean < 0.9 * expected, "control: {own:?} and {expected}");
+}
+
+#[test]
+fn faint_caustics_keep_their_mean() {
+    // Stripes of two colours are what the further samples are for.
+    let mut scene = room();
+    scene.materials.push(emissive("stripe", 0.2, 0.0, true));
+    for i in 0..20 {
+        add_quad(&mut scene, vec3(-1.0 + 0.1 * i as f32, -0.999, -1.0), Vec3::Z * 2.0, Vec3::X * 0.05, 5);
+    }
+    // Light of caustics, and of the lamp itself.
+    let means = |seed: u32, most: u32| {
+        let settings = sampled(64, most).with(|s| {
+            s.photons.mode = Mode::Hybrid;
+            (s.photons.seed, s.photons.global, s.photons.caustic, s.photons.final_gather) = (seed, 2000, 2000, 4);
+            s.estimate.gather_spacing = 2;
+            s.picture.layers = vec![ExtraLayers::Components];
+        });
+        let render = render_scene(&scene, &settings);
+        assert_eq!(
+            render.stats.extra_samples > 2 * 64 * 64,
+            most > 4,
+            "{} further samples",
+            render.stats.extra_samples
+        );
+        ["caustic.G", "direct.G"].map(|layer| {
+            let (_, light) = render.frame.extras().find(|(name, _)| *name == layer).expect("a layer");
+            light.iter().map(|&light| f64::from(light)).sum::<f64>() / f64::from(64 * 64)
+        })
+    };
+    // Of the same photons.
+    let ratio = Estimate::over_seeds(6, |seed| means(seed, 64)[0] / means(seed, 0)[0]);
+    println!("{ratio:?} of the caustics with every pixel's samples alone");
+    assert!(ratio.z(1.0) < 4.0 && within(ratio.mean, 1.0, 0.01), "{ratio:?}");
+    let [caustics, direct] = means(0, 0);
+    assert!(caustics > 0.0 && caustics < 0.1 * direct, "control: {caustics} of {direct} are faint");
 }
 
 #[test]
