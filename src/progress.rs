@@ -14,12 +14,12 @@ pub enum Stage {
     Photons,
     /// Sorting photons into the grid.
     Grid,
-    /// Estimates of irradiance where rays of final gathering will end. Units are tiles of the small
-    /// picture that shows where that is.
+    /// Estimates of irradiance where rays of final gathering will end. Units are camera samples
+    /// of the small picture that shows where that is.
     Cells,
     /// Final gathering at spaced points. Units are rays; their total is estimated before.
     Records,
-    /// Camera rays, direct light and gather. Units are tiles of camera samples.
+    /// Camera rays, direct light and gather. Units are camera samples.
     Camera,
     /// The camera pass of a comparison, which gathers each tile twice. Units as in
     /// [`Stage::Camera`].

@@ -18,6 +18,8 @@ const SKY_SAMPLE: f64 = 2.0;
 /// Samples that a pixel has besides for each time that some may double, as a fraction of those of
 /// every pixel.
 const UNEVEN: f64 = 0.05;
+/// Time of a further sample, in times of one of those of every pixel: it has fewer queries.
+const FURTHER: f64 = 0.6;
 /// Part of a stage that has to be done, beyond its first report, before its pace is trusted: the
 /// top of a picture may be sky. More where something is known already.
 const TRUSTED: f64 = 1.0 / 16.0;
@@ -28,6 +30,8 @@ const TRUSTED_AFTER: f64 = 1.0 / 4.0;
 pub struct Plan {
     /// Time of the camera pass, in times of that of the records; `None` without records.
     camera: Option<f64>,
+    /// Further samples that were counted in, as a fraction of those of every pixel.
+    further: f64,
     /// Groups of lights, each of which has photons and a camera pass of its own.
     groups: usize,
 }
@@ -47,10 +51,11 @@ impl Plan {
             + light_sample * f64::from(picture.light_samples)
             + if scene.has_specular() { CAUSTICS } else { 0.0 };
         let rays = f64::from(photons.final_gather) / f64::from(estimate.gather_spacing).powi(2);
-        let samples = f64::from(picture.spp) * (1.0 + UNEVEN * f64::from(picture.doublings()));
+        let further = UNEVEN * f64::from(picture.doublings());
+        let samples = f64::from(picture.spp) * (1.0 + further);
         let by_group = picture.layers.contains(&ExtraLayers::Lights);
         let groups = if by_group { scene.light_groups()?.len().max(1) } else { 1 };
-        Ok(Self { camera: has_records.then(|| samples * sample / rays), groups })
+        Ok(Self { camera: has_records.then(|| samples * sample / rays), further, groups })
     }
 }
 
@@ -77,11 +82,13 @@ pub struct Outlook {
     group_began: f64,
     /// Seconds left, and when that was said.
     left: Option<(f64, f64)>,
+    /// Seconds that the camera pass was expected to take when it began, and its samples then.
+    camera: Option<(f64, u64)>,
 }
 
 impl Outlook {
     pub fn new(plan: Plan) -> Self {
-        Self { plan, pace: None, groups: 0, group_began: 0.0, left: None }
+        Self { plan, pace: None, groups: 0, group_began: 0.0, left: None, camera: None }
     }
 
     /// Takes a report of the render at a time in seconds, and says how many are left, once that is
@@ -96,14 +103,27 @@ impl Outlook {
             (self.groups, self.group_began) = (self.groups + 1, now);
         }
         self.pace = Some(Pace { warm: pace.warm.or((done > 0).then_some((now, done))), done, ..pace });
+        if begins && stage == Stage::Camera && self.plan.groups <= 1 {
+            self.camera = self.plan.camera.and(self.left).map(|(left, told)| (left - (now - told), total));
+        }
         // A report of nothing new says nothing of the pace.
         let measured = if done > pace.done { self.measured(pace, done, total, now) } else { None };
+        let measured = measured.or_else(|| self.by_samples(stage, done, total));
         if let Some(left) = measured {
             let groups_left = self.plan.groups.saturating_sub(self.groups.max(1));
             let of_group = now - self.group_began + left;
             self.left = Some((left + groups_left as f64 * of_group, now));
         }
         self.left.map(|(left, told)| (left - (now - told)).max(0.0))
+    }
+
+    /// Seconds left where pixels need more samples than were counted in, as the first tile shows.
+    fn by_samples(&self, stage: Stage, done: u64, total: u64) -> Option<f64> {
+        let (seconds, even) = self.camera.filter(|_| stage == Stage::Camera)?;
+        let further = total as f64 / even as f64 - 1.0;
+        let needed = (1.0 + FURTHER * further) / (1.0 + self.plan.further);
+        let is_told_by_pace = done as f64 >= TRUSTED_AFTER * total as f64;
+        (needed > 1.0 && !is_told_by_pace).then(|| seconds * needed * (1.0 - done as f64 / total as f64))
     }
 
     /// Seconds left of this group of lights, by the pace of a stage that says something of it.
@@ -115,8 +135,8 @@ impl Outlook {
         };
         let (since, before) = match pace.warm {
             Some((time, units)) if done > units => (time, units),
-            // Of two units, one has to do.
-            None if done > 0 && total <= 2 => (pace.began, 0),
+            // Of two steps, one has to do.
+            None if 2 * done >= total => (pace.began, 0),
             _ => return None,
         };
         let is_known = pace.stage == Stage::Camera && self.plan.camera.is_some();
@@ -134,7 +154,7 @@ mod tests {
     use super::*;
 
     fn outlook(camera: Option<f64>, groups: usize) -> Outlook {
-        Outlook::new(Plan { camera, groups })
+        Outlook::new(Plan { camera, further: 0.0, groups })
     }
 
     #[test]
@@ -154,11 +174,26 @@ mod tests {
     }
 
     #[test]
-    fn without_records_the_tiles_tell() {
+    fn more_samples_than_expected_take_longer() {
+        let mut one = Outlook::new(Plan { camera: Some(1.0), further: 0.2, groups: 1 });
+        let mut at = |stage, done, total, now| one.left(stage, done, total, now);
+        at(Stage::Records, 0, 64, 0.0);
+        at(Stage::Records, 32, 64, 4.0);
+        assert_eq!(at(Stage::Records, 64, 64, 8.0), Some(8.0));
+        assert_eq!(at(Stage::Camera, 0, 4, 8.0), Some(8.0), "nothing is known yet");
+        assert_eq!(at(Stage::Camera, 0, 4, 9.0), Some(7.0), "a tile has no further samples");
+        assert_eq!(at(Stage::Camera, 0, 24, 10.0), Some(8.0 * 4.0 / 1.2), "five further samples for each");
+        assert_eq!(at(Stage::Camera, 3, 24, 13.0), Some(7.0 * 4.0 / 1.2));
+        // From here on, by 2 s a sample.
+        assert_eq!(at(Stage::Camera, 9, 24, 25.0), Some(30.0));
+    }
+
+    #[test]
+    fn without_records_the_samples_tell() {
         let mut one = outlook(None, 1);
         let mut at = |done, total, now| one.left(Stage::Camera, done, total, now);
         assert_eq!(at(0, 2, 1.0), None);
-        assert_eq!(at(1, 2, 3.0), Some(2.0), "of two tiles, the first has to do");
+        assert_eq!(at(1, 2, 3.0), Some(2.0), "of two steps, the first has to do");
     }
 
     #[test]

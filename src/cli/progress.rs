@@ -11,6 +11,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::{outlook::Outlook, say::say, signals, values::words_of_seconds};
 
+/// Ratio to the time that was told above which it is told anew.
+const MUCH_LONGER: f64 = 1.5;
+
 /// Destination of the progress reports.
 #[derive(Debug)]
 enum Target {
@@ -33,8 +36,8 @@ pub struct Display {
 struct Expected {
     outlook: Outlook,
     began: Instant,
-    /// The time of all of it was told.
-    is_told: bool,
+    /// The time of all of it that was told, seconds.
+    told: Option<f64>,
 }
 
 impl Display {
@@ -54,17 +57,21 @@ impl Display {
     /// Tells the time of a picture that began then, as soon as it is known, and from there on what
     /// is left of it.
     pub fn expect(&self, outlook: Outlook, began: Instant) {
-        *lock(&self.outlook) = Some(Expected { outlook, began, is_told: false });
+        *lock(&self.outlook) = Some(Expected { outlook, began, told: None });
     }
 
-    /// The time that is left, in words; tells that of the whole once.
+    /// The time that is left, in words; tells that of the whole once, and again if it turns out to
+    /// be much longer.
     fn left(&self, stage: Stage, done: u64, total: u64) -> String {
         let mut outlook = lock(&self.outlook);
-        let Some(Expected { outlook, began, is_told }) = &mut *outlook else { return String::new() };
+        let Some(Expected { outlook, began, told }) = &mut *outlook else { return String::new() };
         let now = began.elapsed().as_secs_f64();
         let Some(left) = outlook.left(stage, done, total, now) else { return String::new() };
-        if !std::mem::replace(is_told, true) {
-            self.note(&format!("about {} in all", words_of_seconds(now + left)));
+        let all = now + left;
+        if told.is_none_or(|told| all > MUCH_LONGER * told) {
+            let more = if told.is_some() { ", more than expected" } else { "" };
+            self.note(&format!("about {} in all{more}", words_of_seconds(all)));
+            *told = Some(all);
         }
         if left < 0.5 { String::new() } else { format!(", {} left", words_of_seconds(left)) }
     }
@@ -196,7 +203,7 @@ fn unit(stage: Stage, total: u64) -> Option<&'static str> {
         Stage::Photons => "photons",
         Stage::Records => "rays",
         Stage::Bvh => "primitives",
-        _ => "tiles",
+        _ => "samples",
     };
     (total > 1 && (is_counted(stage) || stage == Stage::Bvh)).then_some(unit)
 }
@@ -266,7 +273,7 @@ mod tests {
         assert_eq!(line(Stage::Camera, 0, 1).as_deref(), Some("camera: 0 %"));
         assert_eq!(line(Stage::Camera, 1, 1).as_deref(), Some("camera: 100 %"));
         assert_eq!(line(Stage::Photons, 0, 0).as_deref(), Some("photons"));
-        assert_eq!(next_line(&mut Vec::new(), Stage::Camera, 0, 2).as_deref(), Some("camera: 0 % of 2 tiles"));
+        assert_eq!(next_line(&mut Vec::new(), Stage::Camera, 0, 2).as_deref(), Some("camera: 0 % of 2 samples"));
     }
 
     #[test]

@@ -105,8 +105,8 @@ pub(crate) struct CameraPass<'a> {
     pub(super) obstacles: Obstacles<'a>,
     /// Sums of the tile's pixels when the last component of the light was finished.
     pub(super) finished: RefCell<Vec<[f32; 4]>>,
-    /// Light of the maps that are gathered at visible points, of each pixel of the tile, mean of its
-    /// samples and of the channels; empty where no one has asked for it.
+    /// Light of the maps that are gathered at visible points, of each pixel of the tile, mean of
+    /// its samples and of the channels; empty where no one has asked for it.
     pub(super) by_maps: RefCell<Vec<f32>>,
     /// Layers that the film has besides.
     pub(super) layers: Vec<ExtraLayers>,
@@ -114,25 +114,27 @@ pub(crate) struct CameraPass<'a> {
     pub(super) hashes: [Vec<u32>; 2],
 }
 
-/// Tiles of a stage that are done, with further ones for some of their pixels.
-pub(crate) struct TileCount<'p> {
+/// Camera samples of a stage that are done, with further ones in some pixels of a tile.
+pub(crate) struct SampleCount<'p> {
     progress: &'p dyn Progress,
     stage: Option<Stage>,
     /// All of them but further ones.
-    tiles: usize,
-    done: usize,
+    even: u64,
+    done: u64,
+    /// Those of the tile that is rendered.
+    of_tile: u64,
     /// Further ones that are done.
-    further: usize,
+    further: u64,
 }
 
-impl TileCount<'_> {
-    /// Reports what is done, if there is a stage; `left` further tiles of this one are not. Tiles
-    /// to come are expected to have as many of them as those before.
-    fn report(&self, left: usize) {
+impl SampleCount<'_> {
+    /// Reports what is done, if there is a stage; `left` further samples of this tile are not.
+    /// Tiles to come are expected to have as many of them as those before.
+    fn report(&self, left: u64) {
         let Some(stage) = self.stage else { return };
-        let begun = (self.done + 1).min(self.tiles).max(1);
-        let total = self.tiles + (self.further + left) * self.tiles / begun;
-        self.progress.report(stage, (self.done + self.further) as u64, total as u64);
+        let begun = (self.done + self.of_tile).min(self.even).max(1);
+        let expected = (self.further + left) as f64 * self.even as f64 / begun as f64;
+        self.progress.report(stage, self.done + self.further, self.even + expected.round() as u64);
     }
 }
 
@@ -233,12 +235,15 @@ impl<'a> CameraPass<'a> {
             }
             let further = self.further_samples(tile, &sums);
             let extra_tiles = self.tracer.extra_tiles(tile, &further);
-            for (i, extra) in extra_tiles.iter().enumerate() {
+            let mut left = extra_tiles.iter().map(|extra| self.samples_of(extra)).sum();
+            for extra in &extra_tiles {
                 progress.check()?;
-                count.report(extra_tiles.len() - i);
+                count.report(left);
                 self.trace(extra, stats)?;
                 self.light(extra, gatherer, &mut films, stats, progress)?;
-                count.further += 1;
+                let done = self.samples_of(extra);
+                count.further += done;
+                left -= done;
             }
             for (pixel, at) in (0..tile.pixels).filter_map(|pixel| Some((pixel, self.tracer.pixel(tile, pixel)?))) {
                 films.iter_mut().for_each(|film| film.weigh(at, further[pixel as usize].doublings));
@@ -254,25 +259,38 @@ impl<'a> CameraPass<'a> {
     }
 
     /// Calls `work` for each tile of the data window, with its camera paths traced to their visible
-    /// points. Tiles are reported as units of the stage, if there is one.
+    /// points. Samples are reported as units of the stage, if there is one.
     pub fn for_each_tile(
         &self,
         stage: Option<Stage>,
         stats: &mut Stats,
         progress: &dyn Progress,
-        work: &mut dyn FnMut(&Tile, &mut Stats, &mut TileCount) -> Result<()>,
+        work: &mut dyn FnMut(&Tile, &mut Stats, &mut SampleCount) -> Result<()>,
     ) -> Result<()> {
         let tiles = self.tracer.tiles();
-        let mut count = TileCount { progress, stage, tiles: tiles.len(), done: 0, further: 0 };
+        let even = tiles.iter().map(|tile| self.samples_of(tile)).sum();
+        let mut count = SampleCount { progress, stage, even, done: 0, of_tile: 0, further: 0 };
         for tile in &tiles {
             progress.check()?;
+            count.of_tile = self.samples_of(tile);
             count.report(0);
             self.trace(tile, stats)?;
             work(tile, stats, &mut count)?;
-            count.done += 1;
+            count.done += count.of_tile;
         }
         count.report(0);
         Ok(())
+    }
+
+    /// Camera samples of a tile within the picture.
+    fn samples_of(&self, tile: &Tile) -> u64 {
+        let within = |first: u32, side: u32, whole: u32| u64::from((first + side).min(whole).saturating_sub(first));
+        let square = || {
+            let (columns, rows) = tile.sides();
+            within(tile.first_column, columns, self.size.0) * within(tile.first_row, rows, self.size.1)
+        };
+        let pixels = tile.listed.as_ref().map_or_else(square, |listed| listed.pixels.len() as u64);
+        pixels * u64::from(tile.samples)
     }
 
     /// Traces a tile's camera paths to their visible points.

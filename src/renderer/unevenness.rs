@@ -60,10 +60,10 @@ impl Square<'_> {
     }
 
     /// One of how many samples of a pixel with that error needs the light of maps, a power of two:
-    /// where it stands for n of them, the variance of a sample grows by n - 1 squares of that light,
-    /// which is a sixteenth of it at most. `of_maps` is the mean of that light of each pixel: the
-    /// brightest of those around decides. The pixel's own samples may have a say in this, for it
-    /// does not change the mean.
+    /// where it stands for n of them, the variance of a sample grows by n - 1 squares of that
+    /// light, which is a sixteenth of it at most. `of_maps` is the mean of that light of each
+    /// pixel: the brightest of those around decides. The pixel's own samples may have a say in
+    /// this, for it does not change the mean.
     pub fn one_in(&self, (column, row): (u32, u32), error: f32, of_maps: &dyn Fn(u32, u32) -> Option<f32>) -> u32 {
         let light = (self.sums)(column, row).map_or(0.0, |sums| Spread::of(sums, self.samples).light());
         let around = |at: u32, end: u32| at.saturating_sub(2)..(at + 3).min(end);
