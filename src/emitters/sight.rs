@@ -11,8 +11,7 @@ use super::{
 };
 use crate::{
     bvh::Bvh,
-    layout::METAL,
-    scene::{Camera, Material, Projection, Scene, Surface},
+    scene::{Camera, Material, Projection, Scene, Surface, Texture},
 };
 
 /// Maximum number of cameras, taken at equal steps, that have rays.
@@ -21,13 +20,14 @@ const MAX_CAMERAS: usize = 16;
 /// that they see.
 const RAYS: u32 = 64;
 const BOUNCES: u32 = 2;
-/// Side of the blocks of rays; and points next to each other whose rays are counted together.
+/// Side of the blocks of rays.
 const BLOCK: usize = 8;
-const POINTS_TOGETHER: usize = 64;
-/// Fraction of those groups of points that are less enclosed than the one that decides.
-const ENCLOSED: f64 = 0.9;
+/// Fraction of what is seen that is less enclosed, or less diffuse, than the block that decides.
+const MOST: f64 = 0.9;
 /// Maximum number of mirrors and panes that a ray passes.
 const MAX_CHAIN: u32 = 12;
+/// Number of texels that tell the mean of an image.
+const TEXELS: usize = 1 << 12;
 /// Minimum number of points that spheres are made of.
 const MIN_POINTS: usize = 64;
 /// Maximum number of points whose density counts.
@@ -53,9 +53,6 @@ pub struct Sight {
     /// Spheres around that and what lies around it, from the smallest to the largest; none if that
     /// is most of the scene.
     pub targets: Vec<Target>,
-    /// Fraction of the light that leaves a surface, 0 to 1, which meets another one: exceeded by
-    /// that of a tenth of what the cameras see. 1 if they see nothing diffuse.
-    pub enclosure: f64,
     /// Density of that and of what lies around it; none without spheres.
     pub importance: Option<Importance>,
     /// Fraction of the paths to mirrors and glass that is aimed at each of their spheres whatever
@@ -67,13 +64,46 @@ impl Sight {
     /// `specular`: spheres around mirrors and glass.
     #[must_use]
     pub fn new(scene: &Scene, seen: &[SeenPoint], specular: &[Target]) -> Self {
-        let enclosure = enclosure(seen);
         let points: Vec<Vec3> = seen.iter().flat_map(SeenPoint::points).map(|(position, _)| position).collect();
         let targets = spheres_around(&points, &scene_target(scene));
         let importance =
             (!targets.is_empty()).then(|| Importance::new(&thinned(points.clone(), MAX_POINTS), scene.bounds()));
-        Self { targets, enclosure, importance, shares: shares_whatever_size(&points, specular) }
+        Self { targets, importance, shares: shares_whatever_size(&points, specular) }
     }
+}
+
+/// What the scene's cameras see.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    pub points: Vec<SeenPoint>,
+    /// Fraction of the light that leaves a surface, 0 to 1, which meets a diffuse one: exceeded by
+    /// that of a tenth of what the cameras see. 1 if they see nothing.
+    pub enclosure: f64,
+    /// Fraction of a surface that is diffuse, 0 to 1: exceeded by that of a tenth of what the
+    /// cameras see. 1 if they see nothing.
+    pub diffuse: f64,
+}
+
+impl Seen {
+    #[must_use]
+    pub fn new(scene: &Scene, bvh: &Bvh) -> Self {
+        let step = scene.cameras.len().div_ceil(MAX_CAMERAS).max(1);
+        let ways: Vec<Way> = scene.materials.iter().map(|material| Way::new(scene, material)).collect();
+        let cameras = scene.cameras.iter().step_by(step);
+        let blocks: Vec<Block> = cameras.flat_map(|camera| blocks_seen((bvh, &ways), camera)).collect();
+        // Metal that shows the sky alone is a surface from which nothing meets another.
+        let met = |block: &Block| block.points.iter().map(|point| point.around.len()).sum::<usize>();
+        let enclosure = exceeded_by_few(&blocks, |block| met(block) as f64 / f64::from(BOUNCES));
+        let diffuse = exceeded_by_few(&blocks, |block| block.points.len() as f64);
+        Self { points: blocks.into_iter().flat_map(|block| block.points).collect(), enclosure, diffuse }
+    }
+}
+
+/// What a block of a camera's rays meets.
+struct Block {
+    points: Vec<SeenPoint>,
+    /// Rays that meet a surface.
+    rays: usize,
 }
 
 /// A point on a diffuse surface that a camera sees, and those that are seen from there, each with
@@ -86,13 +116,6 @@ pub struct SeenPoint {
 }
 
 impl SeenPoint {
-    /// The points that the scene's cameras see.
-    #[must_use]
-    pub fn all(scene: &Scene, bvh: &Bvh) -> Vec<Self> {
-        let step = scene.cameras.len().div_ceil(MAX_CAMERAS).max(1);
-        scene.cameras.iter().step_by(step).flat_map(|camera| points_seen(scene, bvh, camera)).collect()
-    }
-
     /// Position and normal of all.
     pub fn points(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
         std::iter::once((self.position, self.normal)).chain(self.around.iter().copied())
@@ -107,25 +130,29 @@ pub(super) fn thinned<T>(list: Vec<T>, most: usize) -> Vec<T> {
     list.into_iter().enumerate().filter(|(i, _)| is_kept(*i)).map(|(_, one)| one).collect()
 }
 
-/// Points that lie near each other follow each other in the list: their rays together give one
-/// fraction.
-fn enclosure(seen: &[SeenPoint]) -> f64 {
-    let fraction = |points: &[SeenPoint]| {
-        let met: usize = points.iter().map(|point| point.around.len()).sum();
-        met as f64 / (points.len() * BOUNCES as usize) as f64
+/// Fraction of the rays of a block which `count`, exceeded by that of a tenth of all rays; 1 without
+/// rays.
+fn exceeded_by_few(blocks: &[Block], count: impl Fn(&Block) -> f64) -> f64 {
+    let blocks = blocks.iter().filter(|block| block.rays > 0);
+    let mut fractions: Vec<(f64, usize)> = blocks.map(|b| (count(b) / b.rays as f64, b.rays)).collect();
+    fractions.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all: usize = fractions.iter().map(|(_, rays)| rays).sum();
+    let mut before = 0;
+    let exceeds = |(_, rays): &&(f64, usize)| {
+        before += rays;
+        before as f64 > MOST * all as f64
     };
-    let mut fractions: Vec<f64> = seen.chunks(POINTS_TOGETHER).map(fraction).collect();
-    fractions.sort_by(f64::total_cmp);
-    fractions.get((ENCLOSED * fractions.len() as f64) as usize).copied().unwrap_or(1.0)
+    fractions.iter().find(exceeds).map_or(1.0, |(fraction, _)| *fraction)
 }
 
 /// Points that the camera sees, block by block of the picture.
-fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<SeenPoint> {
+fn blocks_seen(tree: (&Bvh, &[Way]), camera: &Camera) -> Vec<Block> {
     let aspect = camera.aspect.filter(|aspect| *aspect > 0.0).unwrap_or(1.0);
     let side = |fraction: f32| ((RAYS as f32 * fraction) as u32).max(1);
     let size = (side(aspect.min(1.0)), side((1.0 / aspect).min(1.0)));
     let half_height = camera.half_height_at(1.0, size);
     let half = (half_height * size.0 as f32 / size.1 as f32, half_height);
+    // Whether a surface is met, and the point.
     let pixel = |(column, row): (u32, u32)| {
         let at = |i: u32, n: u32| (2 * i + 1) as f32 / n as f32 - 1.0;
         let aside = half.0 * at(column, size.0) * camera.right - half.1 * at(row, size.1) * camera.up;
@@ -134,11 +161,14 @@ fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<SeenPoint> {
             Projection::Perspective { .. } => (camera.position, (camera.forward + aside).normalize()),
         };
         let origin = origin + camera.near.min(0.0) * camera.forward;
-        let (position, normal) = diffuse_hit(scene, bvh, origin, direction)?;
-        let directions = (0..BOUNCES)
-            .map(|bounce| cosine_direction(normal, even_numbers(BOUNCES * (row * size.0 + column) + bounce)));
-        let around = directions.filter_map(|d| diffuse_hit(scene, bvh, position, d)).collect();
-        Some(SeenPoint { position, normal, around })
+        let index = row * size.0 + column;
+        let (hit, is_met) = diffuse_hit(tree, origin, direction, index);
+        let around = |position, normal| {
+            let indices = (0..BOUNCES).map(|bounce| BOUNCES * index + bounce);
+            let hits = indices.map(|i| diffuse_hit(tree, position, cosine_direction(normal, even_numbers(i)), i).0);
+            hits.flatten().collect()
+        };
+        (is_met, hit.map(|(position, normal)| SeenPoint { position, normal, around: around(position, normal) }))
     };
     let blocks = (0..size.1).step_by(BLOCK).flat_map(|row| (0..size.0).step_by(BLOCK).map(move |column| (column, row)));
     let side = BLOCK as u32;
@@ -147,36 +177,70 @@ fn points_seen(scene: &Scene, bvh: &Bvh, camera: &Camera) -> Vec<SeenPoint> {
         rows.flat_map(move |y| (column..(column + side).min(size.0)).map(move |x| (x, y)))
     };
     let blocks: Vec<(u32, u32)> = blocks.collect();
-    blocks.into_par_iter().flat_map_iter(|block| pixels(block).filter_map(pixel)).collect()
+    let block = |block| {
+        let (met, points): (Vec<bool>, Vec<Option<SeenPoint>>) = pixels(block).map(pixel).unzip();
+        Block { points: points.into_iter().flatten().collect(), rays: met.into_iter().filter(|met| *met).count() }
+    };
+    blocks.into_par_iter().map(block).collect()
 }
 
-/// The first surface with a diffuse lobe along a ray, by way of mirrors and straight through glass.
-fn diffuse_hit(scene: &Scene, bvh: &Bvh, mut origin: Vec3, mut direction: Vec3) -> Option<(Vec3, Vec3)> {
-    for _ in 0..MAX_CHAIN {
-        let hit = bvh.nearest_hit(origin, direction)?;
-        match goes_on(&scene.materials[hit.material as usize]) {
-            None => return Some((hit.position, hit.normal)),
-            Some(Way::Reflected) => direction = (direction - 2.0 * direction.dot(hit.normal) * hit.normal).normalize(),
-            Some(Way::Through) => {}
+/// The first surface with a diffuse lobe along a ray, by way of mirrors and straight through glass;
+/// and whether it met any surface. `ways`: of rays at each material. `index`: of the ray.
+fn diffuse_hit(
+    (bvh, ways): (&Bvh, &[Way]),
+    mut origin: Vec3,
+    mut direction: Vec3,
+    index: u32,
+) -> (Option<(Vec3, Vec3)>, bool) {
+    for step in 0..MAX_CHAIN {
+        let Some(hit) = bvh.nearest_hit(origin, direction) else { return (None, step > 0) };
+        let number = (0.5 + GOLDEN_STEP * (f64::from(index) * f64::from(MAX_CHAIN) + f64::from(step))).fract() as f32;
+        let way = ways[hit.material as usize];
+        if number < way.ends {
+            return (Some((hit.position, hit.normal)), true);
+        }
+        if number < way.ends + way.reflected {
+            direction = (direction - 2.0 * direction.dot(hit.normal) * hit.normal).normalize();
         }
         origin = hit.position;
     }
-    None
+    (None, true)
 }
 
-enum Way {
-    Reflected,
-    Through,
+/// What becomes of rays at a material; those that neither end nor are reflected go straight on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Way {
+    /// Fraction that ends: the surface is diffuse there.
+    ends: f32,
+    reflected: f32,
 }
 
-/// Way of a ray at a surface without a diffuse lobe.
-fn goes_on(material: &Material) -> Option<Way> {
-    match material.surface {
-        Surface::Mirror { .. } => Some(Way::Reflected),
-        Surface::Glass { .. } | Surface::Pane { .. } => Some(Way::Through),
-        Surface::Layered { metallic, .. } => (metallic >= METAL).then_some(Way::Reflected),
-        Surface::Diffuse { .. } => None,
+impl Way {
+    /// By the mean of textures: most files have a factor of 1 where a texture says what is metal.
+    fn new(scene: &Scene, material: &Material) -> Self {
+        let metal = |factor: f32| factor * mean_of(scene, material.textures.metallic_roughness, 2);
+        match material.surface {
+            Surface::Diffuse { .. } => Self { ends: 1.0, reflected: 0.0 },
+            Surface::Mirror { .. } => Self { ends: 0.0, reflected: 1.0 },
+            Surface::Layered { metallic, .. } => {
+                let reflected = metal(metallic);
+                Self { ends: 1.0 - reflected, reflected }
+            }
+            Surface::Glass { .. } | Surface::Pane { .. } => {
+                let reflected = metal(material.metallic);
+                let through = material.transmission * mean_of(scene, material.textures.transmission, 0);
+                Self { ends: (1.0 - reflected) * (1.0 - through), reflected }
+            }
+        }
     }
+}
+
+/// Mean of a channel of a texture, 0 to 1, by a part of its texels; 1 without one.
+fn mean_of(scene: &Scene, texture: Option<Texture>, channel: usize) -> f32 {
+    let Some(image) = texture.and_then(|texture| scene.images.get(texture.image as usize)) else { return 1.0 };
+    let at = |i: usize| ((0.5 + GOLDEN_STEP * i as f64).fract() * image.texels.len() as f64) as usize;
+    let values = (0..TEXELS).filter_map(|i| image.texels.get(at(i))).map(|texel| f32::from(texel[channel]));
+    values.sum::<f32>() / (255.0 * TEXELS as f32)
 }
 
 /// The `i`-th point of a low-discrepancy sequence in the unit square.
@@ -216,7 +280,7 @@ mod tests {
     use crate::scene::{Sphere, Triangle};
 
     /// A ball of radius 1 on a floor of half side `reach`, seen from 6 m.
-    fn seen(reach: f32) -> Sight {
+    fn seen(reach: f32) -> (Sight, f64) {
         let corner = |x: f32, z: f32| vec3(x * reach, 0.0, z * reach);
         let triangle = |corners| Triangle::new(corners, [Vec3::Y; 3], 0);
         let floor = [
@@ -239,12 +303,13 @@ mod tests {
             projection: Projection::Perspective { yfov: 0.7 },
             ..Camera::framing(scene.bounds())
         }];
-        Sight::new(&scene, &SeenPoint::all(&scene, &Bvh::build(&scene)), &[])
+        let seen = Seen::new(&scene, &Bvh::build(&scene));
+        (Sight::new(&scene, &seen.points, &[]), seen.enclosure)
     }
 
     #[test]
     fn what_is_seen_of_a_wide_floor_has_spheres() {
-        let spheres = seen(1000.0).targets;
+        let spheres = seen(1000.0).0.targets;
         assert!(!spheres.is_empty());
         let smallest = spheres.first().expect("a sphere");
         assert!(smallest.radius < 8.0 && smallest.center.length() < 4.0, "{spheres:?}");
@@ -254,13 +319,13 @@ mod tests {
 
     #[test]
     fn a_scene_that_is_seen_whole_has_none() {
-        assert_eq!(seen(3.0).targets, Vec::new());
+        assert_eq!(seen(3.0).0.targets, Vec::new());
     }
 
     #[test]
     fn a_ball_on_a_floor_is_little_enclosed_and_a_box_is_wholly() {
         // The ball's lower half sees the floor: at most a half of what leaves it.
-        let open = seen(1000.0).enclosure;
+        let open = seen(1000.0).1;
         assert!(open > 0.05 && open < 0.7, "{open}");
         let corner = |i: u32| vec3((i & 1) as f32, ((i >> 1) & 1) as f32, (i >> 2) as f32);
         let sides = [
@@ -283,8 +348,8 @@ mod tests {
             ..Scene::default()
         };
         scene.cameras = vec![Camera { position: Vec3::splat(0.5), ..Camera::framing(scene.bounds()) }];
-        let closed = Sight::new(&scene, &SeenPoint::all(&scene, &Bvh::build(&scene)), &[]).enclosure;
+        let closed = Seen::new(&scene, &Bvh::build(&scene)).enclosure;
         assert!(closed > 0.95, "{closed}");
-        assert_eq!(enclosure(&[]), 1.0);
+        assert_eq!(exceeded_by_few(&[], |_| 0.0), 1.0);
     }
 }

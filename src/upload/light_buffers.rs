@@ -13,7 +13,7 @@ use crate::{
         light_table::{Choices, LightTable},
         openings::Openings,
         set_media,
-        sight::{SeenPoint, Sight},
+        sight::{Seen, Sight},
         targets::{Target, scene_target, specular_targets},
     },
     error::Result,
@@ -59,8 +59,10 @@ pub struct LightBuffers {
     pub specular_targets: u32,
     /// Whether photons of mirrors and glass have quite different powers.
     pub mixes_powers: bool,
-    /// See [`Sight::enclosure`].
+    /// See [`Seen::enclosure`].
     pub enclosure: f64,
+    /// See [`Seen::diffuse`].
+    pub diffuse: f64,
     /// See [`Sight::importance`].
     pub importance: Option<Importance>,
     /// Settings of the tables.
@@ -91,8 +93,8 @@ impl LightBuffers {
     pub fn new(gpu: &Gpu, (scene, bvh): (&Scene, &Bvh), probe: &MediaProbe, settings: &LightSettings) -> Result<Self> {
         let around = scene_target(scene);
         let targets = specular_targets(scene);
-        let seen_points = SeenPoint::all(scene, bvh);
-        let Sight { targets: seen, enclosure, importance, shares } = Sight::new(scene, &seen_points, &targets);
+        let Seen { points: seen_points, enclosure, diffuse } = Seen::new(scene, bvh);
+        let Sight { targets: seen, importance, shares } = Sight::new(scene, &seen_points, &targets);
         let most = gpu.max_binding().min(16 * gpu.max_table_texels());
         let map = scene.environment.as_ref().map(|environment| EnvironmentMap::new(environment, most));
         let openings = Openings::new(scene, bvh, &seen_points, map.as_ref());
@@ -146,6 +148,7 @@ impl LightBuffers {
             specular_targets: targets.len() as u32,
             mixes_powers,
             enclosure,
+            diffuse,
             importance_words: Table::new(
                 gpu,
                 "importance",

@@ -106,17 +106,14 @@ pub(super) fn plans<'a>(
     let lights = &scene.lights;
     let aimed = settings.emission == Emission::Aimed;
     let plain = EmissionPlan { paths: paths.global, ..unsteered(scene, settings) };
-    let general = match (steered, &lights.towards_seen) {
-        (Some(Steered { choices, kept_scale, least_kept }), _) => EmissionPlan {
+    let general = match steered {
+        Some(Steered { choices, kept_scale, least_kept }) => EmissionPlan {
             choices: choices.as_ref().unwrap_or(&lights.photons),
             kept_scale: *kept_scale,
             least_kept: *least_kept,
             ..plain
         },
-        (None, Some(choices)) if aimed => {
-            EmissionPlan { choices, first_target: 0, target_count: lights.seen_targets + 1, aim: lights.seen, ..plain }
-        }
-        (None, _) => plain,
+        None => towards_seen(scene, plain),
     };
     let caustic = EmissionPlan {
         choices: &lights.aimed,
@@ -131,6 +128,26 @@ pub(super) fn plans<'a>(
     };
     let wanted = [Some(general), (aimed && caustics).then_some(caustic)];
     wanted.into_iter().flatten().filter(|plan| plan.choices.strata > 0).collect()
+}
+
+/// The paths, aimed at what the cameras see where that is a small part of the scene.
+fn towards_seen<'a>(scene: &'a SceneBuffers, plan: EmissionPlan<'a>) -> EmissionPlan<'a> {
+    let lights = &scene.lights;
+    match &lights.towards_seen {
+        Some(choices) if plan.rules & layout::AIM != 0 => {
+            EmissionPlan { choices, first_target: 0, target_count: lights.seen_targets + 1, aim: lights.seen, ..plan }
+        }
+        _ => plan,
+    }
+}
+
+/// Paths of all light but that of caustics, whatever the mode, for a pilot; and their batch.
+pub(super) fn other_light<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings) -> (EmissionPlan<'a>, PhotonBatch) {
+    let plan = towards_seen(scene, unsteered(scene, settings));
+    let batch = plan.batch(scene, settings, &ByKind { global: false, caustic: false });
+    let all = layout::CAUSTICS_APART | layout::STORE_GLOBAL | layout::STORE_DIRECT | layout::FOLLOW_DIFFUSE;
+    let batch = PhotonBatch { rules: batch.rules | all, stream: layout::STREAM_PILOT, ..batch };
+    (plan, batch)
 }
 
 /// General paths, spread over the lights by power and over the scene.

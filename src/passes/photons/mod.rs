@@ -1,5 +1,6 @@
 //! First pass: photon paths from the lights, and the photons that they store.
 
+mod caustic_share;
 mod emission_plans;
 mod photon_batch;
 pub mod photon_tracer;

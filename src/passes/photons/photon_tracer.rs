@@ -9,7 +9,8 @@
 //! paths, whose indices follow those of the passes before them ([`PathRanges`]).
 
 use super::{
-    emission_plans::{EmissionPlan, LOST_UNIT, PathRanges, plans, steered},
+    caustic_share::{self, Part, share_of_caustics},
+    emission_plans::{self, EmissionPlan, LOST_UNIT, PathRanges, plans, steered},
     photon_batch::{BatchBuffers, PhotonKernels},
     raw_map::RawMap,
 };
@@ -39,6 +40,9 @@ const MIN_PATHS_PER_PHOTON: f64 = 4.0;
 /// The same of photons for caustics where panes that rays to lights pass are among what they are
 /// aimed at: most go through these, and few of the others meet anything.
 const PATHS_PER_PHOTON_AT_PANES: u64 = 8;
+
+/// Least number of the same of photons for caustics, however faint these are.
+const MIN_CAUSTIC_PATHS_PER_PHOTON: f64 = 8.0;
 
 /// Result of the photon pass.
 #[derive(Debug)]
@@ -124,8 +128,8 @@ impl PhotonTracer {
         let buffers = BatchBuffers::new(gpu, scene, batch_limit, named)?;
         let steered = steered(gpu, scene, (&self.kernels, settings), (&buffers, batch_limit, max_paths))?;
         for plan in plans(scene, settings, caustics, paths, steered.as_ref()) {
-            let enough =
-                paths_that_matter(scene.lights.enclosure, largest).filter(|_| plan.is_for_little_light(settings));
+            let enough = paths_that_matter(scene.lights.enclosure, largest, MIN_PATHS_PER_PHOTON)
+                .filter(|_| plan.is_for_little_light(settings));
             let at_panes = (plan.is_for_caustics(settings) && scene.has_clear_surfaces())
                 .then(|| max_paths.min(PATHS_PER_PHOTON_AT_PANES * u64::from(settings.caustic)));
             let max_paths = plan.paths.count.or(enough).or(at_panes).unwrap_or(max_paths);
@@ -143,7 +147,7 @@ impl PhotonTracer {
         scene: &SceneBuffers,
         plan: &EmissionPlan,
         settings: &PhotonSettings,
-        (buffers, mut batch_limit, max_paths): (&BatchBuffers, u64, u64),
+        (buffers, mut batch_limit, mut max_paths): (&BatchBuffers, u64, u64),
         traced: &mut TracedPhotons,
         progress: &dyn Progress,
     ) -> Result<()> {
@@ -186,6 +190,12 @@ impl PhotonTracer {
                     let is_expected = kind == MapKind::Caustic && scene.only_clear_surfaces_cast;
                     traced.warnings.extend(warning.filter(|_| !is_expected));
                 }
+                if first_path == growth_paths && plan.is_for_caustics(settings) && max_paths > first_path {
+                    let share =
+                        self.caustic_share(gpu, scene, settings, (buffers, batch_limit), &traced.maps.caustic)?;
+                    let enough = paths_that_matter(share, traced.maps.caustic.capacity, MIN_CAUSTIC_PATHS_PER_PHOTON);
+                    max_paths = max_paths.min(enough.unwrap_or(max_paths)).max(first_path);
+                }
             }
             let ByKind { global, caustic } = &traced.maps;
             progress.report(Stage::Photons, global.stored + caustic.stored, global.expected() + caustic.expected());
@@ -196,6 +206,26 @@ impl PhotonTracer {
         }
         Ok(())
     }
+
+    /// Fraction of the light that the caustics in a map are where they lie, times that of what is
+    /// seen which is diffuse and shows them.
+    fn caustic_share(
+        &self,
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        settings: &PhotonSettings,
+        (buffers, batch_limit): (&BatchBuffers, u64),
+        map: &RawMap,
+    ) -> Result<f64> {
+        let (plan, batch) = emission_plans::other_light(scene, settings);
+        if plan.choices.strata == 0 {
+            return Ok(1.0);
+        }
+        let others = caustic_share::other_light(gpu, scene, &self.kernels, (buffers, batch_limit), (&plan, &batch))?;
+        let caustics = Part { photons: map.read(gpu)?, paths: map.emitted };
+        let share = others.map_or(1.0, |others| share_of_caustics(&caustics, &others));
+        Ok(share * scene.lights.diffuse)
+    }
 }
 
 /// Maps that take photons.
@@ -203,11 +233,11 @@ fn open(traced: &TracedPhotons) -> ByKind<bool> {
     ByKind { global: traced.maps.global.open, caustic: traced.maps.caustic.open }
 }
 
-/// Number of paths of a map of light that other surfaces send, in a scene where a fraction
-/// `enclosure` of it meets anything. Its noise counts by that fraction of the light of the picture:
-/// its variance by the square.
-fn paths_that_matter(enclosure: f64, capacity: u64) -> Option<u64> {
-    let each = (PATHS_PER_PHOTON as f64 * enclosure * enclosure).max(MIN_PATHS_PER_PHOTON);
+/// Number of paths of a map whose light is that fraction of the picture's where it matters, with a
+/// minimum for each photon; `None` if as many as of any map. Its noise counts by that fraction: its
+/// variance by the square.
+fn paths_that_matter(fraction: f64, capacity: u64, least: f64) -> Option<u64> {
+    let each = (PATHS_PER_PHOTON as f64 * fraction * fraction).max(least);
     (each < PATHS_PER_PHOTON as f64).then_some((each * capacity as f64) as u64)
 }
 
@@ -217,8 +247,8 @@ mod tests {
 
     #[test]
     fn open_scenes_take_fewer_paths() {
-        assert_eq!(paths_that_matter(1.0, 1000), None, "as many as any map");
-        assert_eq!(paths_that_matter(0.5, 1000), Some(25_000));
-        assert_eq!(paths_that_matter(0.0, 1000), Some(4000));
+        assert_eq!(paths_that_matter(1.0, 1000, 4.0), None, "as many as any map");
+        assert_eq!(paths_that_matter(0.5, 1000, 4.0), Some(25_000));
+        assert_eq!(paths_that_matter(0.0, 1000, 4.0), Some(4000));
     }
 }
