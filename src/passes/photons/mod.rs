@@ -1,7 +1,7 @@
 //! First pass: photon paths from the lights, and the photons that they store.
 
-mod caustic_share;
 mod emission_plans;
+mod faint_caustics;
 mod photon_batch;
 pub mod photon_tracer;
 mod pilot;

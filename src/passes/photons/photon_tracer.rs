@@ -9,8 +9,8 @@
 //! paths, whose indices follow those of the passes before them ([`PathRanges`]).
 
 use super::{
-    caustic_share::{self, Part, share_of_caustics},
     emission_plans::{self, EmissionPlan, LOST_UNIT, PathRanges, plans, steered},
+    faint_caustics::{self, Light, part_of_caustics},
     photon_batch::{BatchBuffers, PhotonKernels},
     raw_map::RawMap,
 };
@@ -190,10 +190,11 @@ impl PhotonTracer {
                     let is_expected = kind == MapKind::Caustic && scene.only_clear_surfaces_cast;
                     traced.warnings.extend(warning.filter(|_| !is_expected));
                 }
-                if first_path == growth_paths && plan.is_for_caustics(settings) && max_paths > first_path {
-                    let share =
-                        self.caustic_share(gpu, scene, settings, (buffers, batch_limit), &traced.maps.caustic)?;
-                    let enough = paths_that_matter(share, traced.maps.caustic.capacity, MIN_CAUSTIC_PATHS_PER_PHOTON);
+                let is_asked = plan.is_for_caustics(settings) && traced.maps.caustic.open;
+                if is_asked && first_path == growth_paths && max_paths > first_path {
+                    let part =
+                        self.part_of_caustics(gpu, scene, settings, (buffers, batch_limit), &traced.maps.caustic)?;
+                    let enough = paths_that_matter(part, traced.maps.caustic.capacity, MIN_CAUSTIC_PATHS_PER_PHOTON);
                     max_paths = max_paths.min(enough.unwrap_or(max_paths)).max(first_path);
                 }
             }
@@ -209,7 +210,7 @@ impl PhotonTracer {
 
     /// Fraction of the light that the caustics in a map are where they lie, times that of what is
     /// seen which is diffuse and shows them.
-    fn caustic_share(
+    fn part_of_caustics(
         &self,
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -221,10 +222,10 @@ impl PhotonTracer {
         if plan.choices.strata == 0 {
             return Ok(1.0);
         }
-        let others = caustic_share::other_light(gpu, scene, &self.kernels, (buffers, batch_limit), (&plan, &batch))?;
-        let caustics = Part { photons: map.read(gpu)?, paths: map.emitted };
-        let share = others.map_or(1.0, |others| share_of_caustics(&caustics, &others));
-        Ok(share * scene.lights.diffuse)
+        let others = faint_caustics::other_light(gpu, scene, &self.kernels, (buffers, batch_limit), (&plan, &batch))?;
+        let caustics = Light { photons: map.read(gpu)?, paths: map.emitted };
+        let part = others.map_or(1.0, |others| part_of_caustics(&caustics, &others));
+        Ok(part * scene.lights.diffuse)
     }
 }
 

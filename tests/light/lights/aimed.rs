@@ -7,6 +7,7 @@
 //! | ground | a wall on a wide ground has the indirect light of one on a small ground | unaimed emission; a darker ground |
 //! | paths | aimed, a caustic photon takes far fewer paths | the unaimed count |
 //! | small ball | its caustic beside a wide mirror is the one that it throws alone | another index |
+//! | faint caustics | take few paths, for the same flux | a lamp that lights the ball alone; a number of paths that is asked for |
 //! | open figure | a figure under the sky takes few paths, for the same picture | a number of paths that is asked for; the figure in a room |
 
 use caustica::{
@@ -285,4 +286,32 @@ fn a_figure_under_the_sky_takes_few_paths() {
     assert!(within(open, right, 0.005), "{open} instead of {right}");
     let (_, room) = of(true, None);
     assert!(room.stored == capacity, "control: a room fills its map: {room:?}");
+}
+
+#[test]
+fn faint_caustics_take_few_paths_and_bright_ones_as_many_as_they_need() {
+    // A mirror ball high above a floor: few of its photons meet that.
+    let mut sky = scene(&[diffuse(0.5), Surface::Mirror { tint: Vec3::ONE }]);
+    add_quad(&mut sky, vec3(-1.0, 0.0, 1.0), 2.0 * Vec3::X, -2.0 * Vec3::Z, 0);
+    sky.spheres.push(sphere(vec3(0.0, 3.0, 0.0), 0.4, 1));
+    sky.cameras.push(camera(vec3(0.0, 2.0, 2.0), Vec3::ZERO, 60.0));
+    // The sky lights the floor as well, a spot the ball alone.
+    let mut lamp = sky.clone();
+    sky.environment = Some(Environment::uniform(Vec3::ONE));
+    lamp.lights.push(spot(vec3(1.5, 1.0, 0.0), vec3(-1.5, 2.0, 0.0), 100.0, 0.1, 0.2));
+    let photons = |scene: &Scene, max_paths: Option<u64>| {
+        let map =
+            traced(scene, &settings(Mode::Hybrid, 18_000, 16).with(|s| s.photons.max_paths = max_paths)).maps.caustic;
+        (flux(&map.read(gpu()).expect("photons read back"), map.emitted), map.emitted, map.stored)
+    };
+    let [(few_flux, few, stored), (right, many, _)] = [None, Some(1_000_000)].map(|most| photons(&sky, most));
+    println!("sky: {few_flux} by {few} paths with {stored} photons, {right} by {many}");
+    assert_eq!(few, 8 * 18_000);
+    assert!(many > 2 * few && stored > 1000, "{many} paths, {stored} photons");
+    let error = 4.0 / (stored as f64).sqrt();
+    assert!(within(few_flux, right, error), "{few_flux} instead of {right}");
+    let [(_, bright, _), (_, all, _)] = [None, Some(1_000_000)].map(|most| photons(&lamp, most));
+    println!("lamp: {bright} paths, {all} if they are asked for");
+    assert_eq!(bright, all, "control: caustics that nothing else lights");
+    assert!(bright > 2 * few, "control: {bright} paths");
 }
