@@ -20,8 +20,9 @@ const MAX_CAMERAS: usize = 16;
 /// that they see.
 const RAYS: u32 = 64;
 const BOUNCES: u32 = 2;
-/// Side of the blocks of rays.
+/// Side of the blocks of rays; and points next to each other whose rays are counted together.
 const BLOCK: usize = 8;
+const POINTS_TOGETHER: usize = 64;
 /// Fraction of what is seen that is less enclosed, or less diffuse, than the block that decides.
 const MOST: f64 = 0.9;
 /// Maximum number of mirrors and panes that a ray passes.
@@ -76,8 +77,8 @@ impl Sight {
 #[derive(Clone, Debug)]
 pub struct Seen {
     pub points: Vec<SeenPoint>,
-    /// Fraction of the light that leaves a surface, 0 to 1, which meets a diffuse one: exceeded by
-    /// that of a tenth of what the cameras see. 1 if they see nothing.
+    /// Fraction of the light that leaves a diffuse surface, 0 to 1, which meets another one:
+    /// exceeded by that of a tenth of what the cameras see. 1 if they see nothing diffuse.
     pub enclosure: f64,
     /// Fraction of a surface that is diffuse, 0 to 1: exceeded by that of a tenth of what the
     /// cameras see. 1 if they see nothing.
@@ -91,11 +92,12 @@ impl Seen {
         let ways: Vec<Way> = scene.materials.iter().map(|material| Way::new(scene, material)).collect();
         let cameras = scene.cameras.iter().step_by(step);
         let blocks: Vec<Block> = cameras.flat_map(|camera| blocks_seen((bvh, &ways), camera)).collect();
-        // Metal that shows the sky alone is a surface from which nothing meets another.
-        let met = |block: &Block| block.points.iter().map(|point| point.around.len()).sum::<usize>();
-        let enclosure = exceeded_by_few(&blocks, |block| met(block) as f64 / f64::from(BOUNCES));
-        let diffuse = exceeded_by_few(&blocks, |block| block.points.len() as f64);
-        Self { points: blocks.into_iter().flat_map(|block| block.points).collect(), enclosure, diffuse }
+        let diffuse = exceeded_by_few(blocks.iter().map(|block| (block.points.len(), block.rays)));
+        let points: Vec<SeenPoint> = blocks.into_iter().flat_map(|block| block.points).collect();
+        let met = |points: &[SeenPoint]| points.iter().map(|point| point.around.len()).sum();
+        let together = points.chunks(POINTS_TOGETHER);
+        let enclosure = exceeded_by_few(together.map(|points| (met(points), points.len() * BOUNCES as usize)));
+        Self { points, enclosure, diffuse }
     }
 }
 
@@ -130,11 +132,11 @@ pub(super) fn thinned<T>(list: Vec<T>, most: usize) -> Vec<T> {
     list.into_iter().enumerate().filter(|(i, _)| is_kept(*i)).map(|(_, one)| one).collect()
 }
 
-/// Fraction of the rays of a block which `count`, exceeded by that of a tenth of all rays; 1 without
-/// rays.
-fn exceeded_by_few(blocks: &[Block], count: impl Fn(&Block) -> f64) -> f64 {
-    let blocks = blocks.iter().filter(|block| block.rays > 0);
-    let mut fractions: Vec<(f64, usize)> = blocks.map(|b| (count(b) / b.rays as f64, b.rays)).collect();
+/// Fractions of groups of rays, each given by how many count and how many there are: that which is
+/// exceeded by those of a tenth of all rays; 1 without rays.
+fn exceeded_by_few(groups: impl Iterator<Item = (usize, usize)>) -> f64 {
+    let groups = groups.filter(|(_, rays)| *rays > 0);
+    let mut fractions: Vec<(f64, usize)> = groups.map(|(count, rays)| (count as f64 / rays as f64, rays)).collect();
     fractions.sort_by(|a, b| a.0.total_cmp(&b.0));
     let all: usize = fractions.iter().map(|(_, rays)| rays).sum();
     let mut before = 0;
@@ -350,6 +352,9 @@ mod tests {
         scene.cameras = vec![Camera { position: Vec3::splat(0.5), ..Camera::framing(scene.bounds()) }];
         let closed = Seen::new(&scene, &Bvh::build(&scene)).enclosure;
         assert!(closed > 0.95, "{closed}");
-        assert_eq!(exceeded_by_few(&[], |_| 0.0), 1.0);
+        assert_eq!(exceeded_by_few(std::iter::empty()), 1.0);
+        // A tenth of the rays decides, not a tenth of the groups.
+        assert_eq!(exceeded_by_few([(0, 60), (15, 30), (10, 10)].into_iter()), 1.0);
+        assert_eq!(exceeded_by_few([(0, 60), (15, 31), (9, 9)].into_iter()), 15.0 / 31.0);
     }
 }

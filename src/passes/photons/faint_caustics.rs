@@ -23,7 +23,7 @@ const PATHS: u64 = 1 << 14;
 const PLACES: usize = 256;
 const NEAREST: usize = 16;
 /// Fraction of the caustics' photons about which caustics are fainter than the part that decides.
-const FAINTER: f64 = 0.9;
+const FAINTER: f64 = 0.98;
 /// Cosine between normals from which on photons are of one surface.
 const ALIKE: f32 = 0.5;
 

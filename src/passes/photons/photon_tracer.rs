@@ -128,8 +128,9 @@ impl PhotonTracer {
         let buffers = BatchBuffers::new(gpu, scene, batch_limit, named)?;
         let steered = steered(gpu, scene, (&self.kernels, settings), (&buffers, batch_limit, max_paths))?;
         for plan in plans(scene, settings, caustics, paths, steered.as_ref()) {
-            let enough = paths_that_matter(scene.lights.enclosure, largest, MIN_PATHS_PER_PHOTON)
-                .filter(|_| plan.is_for_little_light(settings));
+            let enough =
+                paths_that_matter(scene.lights.enclosure * scene.lights.diffuse, largest, MIN_PATHS_PER_PHOTON)
+                    .filter(|_| plan.is_for_little_light(settings));
             let at_panes = (plan.is_for_caustics(settings) && scene.has_clear_surfaces())
                 .then(|| max_paths.min(PATHS_PER_PHOTON_AT_PANES * u64::from(settings.caustic)));
             let max_paths = plan.paths.count.or(enough).or(at_panes).unwrap_or(max_paths);
