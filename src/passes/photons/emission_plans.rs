@@ -141,13 +141,15 @@ fn towards_seen<'a>(scene: &'a SceneBuffers, plan: EmissionPlan<'a>) -> Emission
     }
 }
 
-/// Paths of all light but that of caustics, whatever the mode, for a pilot; and their batch.
-pub(super) fn other_light<'a>(scene: &'a SceneBuffers, settings: &PhotonSettings) -> (EmissionPlan<'a>, PhotonBatch) {
+/// Lights and batch of a pilot's paths of all light but that of caustics, whatever the mode.
+pub(super) fn pilot_of_other_light<'a>(
+    scene: &'a SceneBuffers,
+    settings: &PhotonSettings,
+) -> (&'a ChoiceBuffer, PhotonBatch) {
     let plan = towards_seen(scene, unsteered(scene, settings));
     let batch = plan.batch(scene, settings, &ByKind { global: false, caustic: false });
     let all = layout::CAUSTICS_APART | layout::STORE_GLOBAL | layout::STORE_DIRECT | layout::FOLLOW_DIFFUSE;
-    let batch = PhotonBatch { rules: batch.rules | all, stream: layout::STREAM_PILOT, ..batch };
-    (plan, batch)
+    (plan.choices, PhotonBatch { rules: batch.rules | all, stream: layout::STREAM_PILOT, ..batch })
 }
 
 /// General paths, spread over the lights by power and over the scene.

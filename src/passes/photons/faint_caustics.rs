@@ -5,15 +5,12 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{
-    emission_plans::EmissionPlan,
-    photon_batch::{BatchBuffers, PhotonKernels},
-};
+use super::photon_batch::{BatchBuffers, PhotonKernels};
 use crate::{
     error::Result,
     gpu::Gpu,
     layout::{Photon, PhotonBatch, from_octahedral},
-    upload::SceneBuffers,
+    upload::{SceneBuffers, light_buffers::ChoiceBuffer},
 };
 
 /// Paths that tell the other light.
@@ -33,18 +30,18 @@ pub(super) struct Light {
     pub paths: u64,
 }
 
-/// All light but that of caustics, by a few paths of the plan. `None` if they have too many photons
+/// All light but that of caustics, by a few paths. `None` if they have too many photons
 /// for the buffers.
 pub(super) fn other_light(
     gpu: &Gpu,
     scene: &SceneBuffers,
     kernels: &PhotonKernels,
     (buffers, most_paths): (&BatchBuffers, u64),
-    (plan, batch): (&EmissionPlan<'_>, &PhotonBatch),
+    (choices, batch): (&ChoiceBuffer, &PhotonBatch),
 ) -> Result<Option<Light>> {
     let paths = PATHS.min(most_paths);
     let batch = PhotonBatch { paths: paths as u32, staging_capacity: buffers.staging_capacity as u32, ..*batch };
-    let result = kernels.run(gpu, scene, &plan.choices.buffer, buffers, &batch)?;
+    let result = kernels.run(gpu, scene, &choices.buffer, buffers, &batch)?;
     if u64::from(result.counters.staged) > buffers.staging_capacity {
         return Ok(None);
     }

@@ -9,8 +9,8 @@
 //! paths, whose indices follow those of the passes before them ([`PathRanges`]).
 
 use super::{
-    emission_plans::{self, EmissionPlan, LOST_UNIT, PathRanges, plans, steered},
-    faint_caustics::{self, Light, part_of_caustics},
+    emission_plans::{EmissionPlan, LOST_UNIT, PathRanges, pilot_of_other_light, plans, steered},
+    faint_caustics::{Light, other_light, part_of_caustics},
     photon_batch::{BatchBuffers, PhotonKernels},
     raw_map::RawMap,
 };
@@ -194,7 +194,7 @@ impl PhotonTracer {
                 let is_asked = plan.is_for_caustics(settings) && traced.maps.caustic.open;
                 if is_asked && first_path == growth_paths && max_paths > first_path {
                     let part =
-                        self.part_of_caustics(gpu, scene, settings, (buffers, batch_limit), &traced.maps.caustic)?;
+                        self.measure_caustics(gpu, scene, settings, (buffers, batch_limit), &traced.maps.caustic)?;
                     let enough = paths_that_matter(part, traced.maps.caustic.capacity, MIN_CAUSTIC_PATHS_PER_PHOTON);
                     max_paths = max_paths.min(enough.unwrap_or(max_paths)).max(first_path);
                 }
@@ -211,7 +211,7 @@ impl PhotonTracer {
 
     /// Fraction of the light that the caustics in a map are where they lie, times that of what is
     /// seen which is diffuse and shows them.
-    fn part_of_caustics(
+    fn measure_caustics(
         &self,
         gpu: &Gpu,
         scene: &SceneBuffers,
@@ -219,11 +219,11 @@ impl PhotonTracer {
         (buffers, batch_limit): (&BatchBuffers, u64),
         map: &RawMap,
     ) -> Result<f64> {
-        let (plan, batch) = emission_plans::other_light(scene, settings);
-        if plan.choices.strata == 0 {
+        let (choices, batch) = pilot_of_other_light(scene, settings);
+        if choices.strata == 0 {
             return Ok(1.0);
         }
-        let others = faint_caustics::other_light(gpu, scene, &self.kernels, (buffers, batch_limit), (&plan, &batch))?;
+        let others = other_light(gpu, scene, &self.kernels, (buffers, batch_limit), (choices, &batch))?;
         let caustics = Light { photons: map.read(gpu)?, paths: map.emitted };
         let part = others.map_or(1.0, |others| part_of_caustics(&caustics, &others));
         Ok(part * scene.lights.diffuse)
