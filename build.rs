@@ -63,10 +63,11 @@ fn shader_entry(stem: &str, wgsl: &str) -> String {
         }
         let kind = match var.space {
             naga::AddressSpace::Uniform => "Uniform",
-            naga::AddressSpace::Handle => match module.types[var.ty].inner {
-                naga::TypeInner::Image { arrayed: true, .. } => "LayeredTable",
-                _ => "Table",
-            },
+            naga::AddressSpace::Handle => {
+                let layered = matches!(module.types[var.ty].inner, naga::TypeInner::Image { arrayed: true, .. });
+                let words = if reads_one_word(&module, handle) { 1 } else { 4 };
+                &format!("Table {{ layered: {layered}, words: {words} }}")
+            }
             naga::AddressSpace::Storage { access } if access.contains(naga::StorageAccess::STORE) => "ReadWrite",
             _ => "ReadOnly",
         };
@@ -84,6 +85,22 @@ fn shader_entry(stem: &str, wgsl: &str) -> String {
         "    Shader {{ stem: {stem:?}, wgsl: {wgsl:?}, overrides: &{overrides:?}, bindings: &[\n{bindings}    ], \
          workgroup_size: {workgroup_size} }},\n"
     )
+}
+
+/// Whether all that a kernel reads of the texels of a table is the first word.
+fn reads_one_word(module: &naga::Module, table: naga::Handle<naga::GlobalVariable>) -> bool {
+    use naga::Expression as E;
+    let functions = module.functions.iter().map(|(_, f)| f).chain(module.entry_points.iter().map(|e| &e.function));
+    functions.map(|f| &f.expressions).all(|all| {
+        let is_table = |image| matches!(all[image], E::GlobalVariable(of) if of == table);
+        let mut loads = all.iter().filter(|(_, e)| matches!(e, E::ImageLoad { image, .. } if is_table(*image)));
+        loads.all(|(load, _)| {
+            let words =
+                |e: &E| matches!(e, E::AccessIndex { base: of, .. } | E::Swizzle { vector: of, .. } if *of == load);
+            let mut used = all.iter().map(|(_, e)| e).filter(|e| words(e)).peekable();
+            used.peek().is_some() && used.all(|e| matches!(e, E::AccessIndex { index: 0, .. }))
+        })
+    })
 }
 
 /// Stops the build with the message of naga and the source file and line of its location.

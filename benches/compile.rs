@@ -40,7 +40,7 @@ fn main() {
         let buffers: Vec<(&str, Buffer)> = shader
             .bindings
             .iter()
-            .filter(|b| !matches!(b.kind, BindingKind::Table | BindingKind::LayeredTable))
+            .filter(|b| !matches!(b.kind, BindingKind::Table { .. }))
             .map(|b| match b.kind {
                 BindingKind::Uniform => (b.name, gpu.uniform("zeros", &[0_u32; 1024])),
                 _ => (b.name, gpu.storage::<u8>("zeros", BYTES).expect("a small buffer fits")),
@@ -49,7 +49,14 @@ fn main() {
         let named: Vec<_> = buffers.iter().map(|(name, buffer)| (*name, buffer)).collect();
         let zeros = Table::new(&gpu, "zeros", &[[0_u32; 4]; 64]).expect("a small table fits");
         let layered = Table::layered(&gpu, "zeros", &[[0_u32; 4]; 64]).expect("a small table fits");
-        let table = |kind| if kind == BindingKind::LayeredTable { &layered } else { &zeros };
+        let words = Table::new(&gpu, "zeros", &[0_u32; 64]).expect("a small table fits");
+        let layered_words = Table::layered(&gpu, "zeros", &[0_u32; 64]).expect("a small table fits");
+        let table = |kind| match kind {
+            BindingKind::Table { layered: true, words: 1 } => &layered_words,
+            BindingKind::Table { words: 1, .. } => &words,
+            BindingKind::Table { layered: true, .. } => &layered,
+            _ => &zeros,
+        };
         let tables: Vec<_> = shader.bindings.iter().map(|b| (b.name, table(b.kind))).collect();
         gpu.wait().expect("the device works");
         let start = Instant::now();

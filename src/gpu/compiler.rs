@@ -10,7 +10,10 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use super::{program::Program, shaders::Shader};
+use super::{
+    program::{Program, Rewrites},
+    shaders::Shader,
+};
 
 /// Maximum number of threads: there are some thirty kernels, few of them long.
 const MAX_THREADS: usize = 8;
@@ -27,12 +30,11 @@ pub(super) struct Compiler {
     requests: Option<Sender<Arc<Program>>>,
     queue: Arc<Mutex<Receiver<Arc<Program>>>>,
     threads: Vec<JoinHandle<()>>,
-    /// Whether uniforms are hidden from the driver, see [`super::hide_uniforms`].
-    hides_uniforms: bool,
+    rewrites: Rewrites,
 }
 
 impl Compiler {
-    pub fn new(hides_uniforms: bool) -> Self {
+    pub fn new(rewrites: Rewrites) -> Self {
         let (requests, queue) = mpsc::channel();
         let queue = Arc::new(Mutex::new(queue));
         let count = thread::available_parallelism().map_or(1, usize::from).min(MAX_THREADS);
@@ -42,7 +44,7 @@ impl Compiler {
             thread::Builder::new().name("compiler".into()).spawn(move || compile_all(&queue)).ok()
         };
         let threads = (0..count).filter_map(spawn).collect();
-        Self { programs: Mutex::default(), requests: Some(requests), queue, threads, hides_uniforms }
+        Self { programs: Mutex::default(), requests: Some(requests), queue, threads, rewrites }
     }
 
     /// The kernel with these constants, compiled or soon to be.
@@ -56,7 +58,7 @@ impl Compiler {
         let key = (shader.stem, constants.iter().map(|(name, value)| (*name, value.to_bits())).collect());
         let mut programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
         let program = programs.entry(key).or_insert_with(|| {
-            let program = Arc::new(Program::new(device, chunk_layout, shader, constants, self.hides_uniforms));
+            let program = Arc::new(Program::new(device, chunk_layout, shader, constants, self.rewrites));
             if let Some(requests) = &self.requests {
                 // The receiver is a field beside this one, so sending cannot fail.
                 let _ = requests.send(Arc::clone(&program));

@@ -13,6 +13,8 @@ use super::{
     fault::Faults,
     lanes::Lanes,
     pace::Pacing,
+    program::Rewrites,
+    shaders::needs,
 };
 use crate::{
     error::{Error, Result},
@@ -44,6 +46,9 @@ pub struct Gpu {
     pub(crate) lanes: Lanes,
     /// Whether the device is software.
     pub(crate) is_software: bool,
+    /// Whether tables are images that are read faster than storage buffers: then they hold what is
+    /// not written.
+    pub(crate) reads_images: bool,
     /// Maximum number of nodes and primitives that a ray visits, at least [`SHORT_LOOPS`].
     pub(crate) trace_budget: u32,
     /// Memory for what is read back, kept for the next time: to get some takes a GPU's driver
@@ -112,7 +117,9 @@ impl Gpu {
         if let Some(bytes) = available().filter(|_| chosen.kind == "software") {
             memory.set_limit(bytes);
         }
-        let compiler = Compiler::new(chosen.kind == "software");
+        let tables = limits.max_storage_textures_per_shader_stage;
+        let reads_images = is_software && tables >= needs().max_sampled_textures_per_shader_stage;
+        let compiler = Compiler::new(Rewrites { hides_uniforms: is_software, reads_images });
         Ok(Self {
             device,
             queue,
@@ -125,6 +132,7 @@ impl Gpu {
             compiler,
             lanes,
             is_software,
+            reads_images,
             trace_budget,
             spare_reader: Mutex::default(),
             faults,

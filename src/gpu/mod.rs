@@ -12,6 +12,7 @@ mod kernel;
 mod lanes;
 mod pace;
 mod program;
+mod read_images;
 #[doc(hidden)]
 pub mod shaders;
 mod specialize;

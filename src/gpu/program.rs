@@ -5,8 +5,10 @@ use std::{borrow::Cow, sync::OnceLock};
 use super::{
     chunks::CHUNK_GROUP,
     hide_uniforms::hide_uniforms,
+    read_images::read_images,
     shaders::{BindingKind, Shader},
     specialize::specialized,
+    table::format_of,
 };
 
 /// A kernel with its constants, compiled by the first thread that comes: one of the compiler's, or
@@ -15,10 +17,19 @@ use super::{
 pub(super) struct Program {
     pub shader: &'static Shader,
     pub constants: Vec<(&'static str, f64)>,
-    hides_uniforms: bool,
+    rewrites: Rewrites,
     device: wgpu::Device,
     chunk_layout: wgpu::BindGroupLayout,
     compiled: OnceLock<Compiled>,
+}
+
+/// How kernels are rewritten to suit a driver.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rewrites {
+    /// Uniforms are hidden, see [`super::hide_uniforms`].
+    pub hides_uniforms: bool,
+    /// Tables are images, see [`super::read_images`].
+    pub reads_images: bool,
 }
 
 #[derive(Debug)]
@@ -34,10 +45,10 @@ impl Program {
         chunk_layout: &wgpu::BindGroupLayout,
         shader: &'static Shader,
         constants: Vec<(&'static str, f64)>,
-        hides_uniforms: bool,
+        rewrites: Rewrites,
     ) -> Self {
         let (device, chunk_layout) = (device.clone(), chunk_layout.clone());
-        Self { shader, constants, hides_uniforms, device, chunk_layout, compiled: OnceLock::new() }
+        Self { shader, constants, rewrites, device, chunk_layout, compiled: OnceLock::new() }
     }
 
     /// Compiles the kernel, or waits for the thread that does.
@@ -45,14 +56,17 @@ impl Program {
         self.compiled.get_or_init(|| {
             let (device, shader) = (&self.device, self.shader);
             let mut specialized = specialized(shader.wgsl, &self.constants).expect("a text that build.rs composed");
-            if self.hides_uniforms {
+            if self.rewrites.hides_uniforms {
                 hide_uniforms(&mut specialized);
+            }
+            if self.rewrites.reads_images {
+                read_images(&mut specialized, shader);
             }
             let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(shader.stem),
                 source: wgpu::ShaderSource::Naga(Cow::Owned(specialized)),
             });
-            let layouts: Vec<_> = (0..CHUNK_GROUP).map(|g| group_layout(device, shader, g)).collect();
+            let layouts: Vec<_> = (0..CHUNK_GROUP).map(|g| self.group_layout(g)).collect();
             let chunk = self.can_be_cut().then_some(&self.chunk_layout);
             let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(shader.stem),
@@ -74,6 +88,15 @@ impl Program {
         })
     }
 
+    /// Layout of one group of the kernel; `None` if it does not use the group.
+    fn group_layout(&self, group: u32) -> Option<wgpu::BindGroupLayout> {
+        let used = self.shader.bindings.iter().filter(|b| b.group == group);
+        let entries: Vec<_> = used.map(|b| layout_entry(b.index, b.kind, self.rewrites.reads_images)).collect();
+        let label = Some(self.shader.stem);
+        let describe = |entries| wgpu::BindGroupLayoutDescriptor { label, entries };
+        (!entries.is_empty()).then(|| self.device.create_bind_group_layout(&describe(&entries)))
+    }
+
     /// Whether the kernel finds its index with `invocation_index`, so that its dispatches can be
     /// cut into chunks.
     pub fn can_be_cut(&self) -> bool {
@@ -81,29 +104,22 @@ impl Program {
     }
 }
 
-/// Layout of one group of a kernel; `None` if the kernel does not use the group.
-fn group_layout(device: &wgpu::Device, shader: &Shader, group: u32) -> Option<wgpu::BindGroupLayout> {
-    let entries: Vec<_> =
-        shader.bindings.iter().filter(|b| b.group == group).map(|b| layout_entry(b.index, b.kind)).collect();
-    let describe = |entries| {
-        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(shader.stem), entries })
-    };
-    (!entries.is_empty()).then(|| describe(&entries))
-}
-
-fn layout_entry(binding: u32, kind: BindingKind) -> wgpu::BindGroupLayoutEntry {
+fn layout_entry(binding: u32, kind: BindingKind, reads_images: bool) -> wgpu::BindGroupLayoutEntry {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-    let texture = |view_dimension| wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Uint,
-        view_dimension,
-        multisampled: false,
-    };
     let ty = match kind {
         BindingKind::Uniform => buffer(wgpu::BufferBindingType::Uniform),
         BindingKind::ReadOnly => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
         BindingKind::ReadWrite => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-        BindingKind::Table => texture(wgpu::TextureViewDimension::D2),
-        BindingKind::LayeredTable => texture(wgpu::TextureViewDimension::D2Array),
+        BindingKind::Table { layered, words } => {
+            let view_dimension =
+                if layered { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
+            let access = wgpu::StorageTextureAccess::ReadOnly;
+            let sample_type = wgpu::TextureSampleType::Uint;
+            match reads_images {
+                true => wgpu::BindingType::StorageTexture { access, format: format_of(words), view_dimension },
+                false => wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false },
+            }
+        }
     };
     wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
 }

@@ -9,10 +9,8 @@ pub enum BindingKind {
     ReadOnly,
     /// A storage buffer that the kernel writes.
     ReadWrite,
-    /// A texture that is read texel by texel.
-    Table,
-    /// The same with layers.
-    LayeredTable,
+    /// A texture that is read texel by texel, of one word each or of four.
+    Table { layered: bool, words: u32 },
 }
 
 /// One buffer or table that a kernel uses.
@@ -47,10 +45,26 @@ pub struct Shader {
 pub const SHADERS: &[Shader] = &include!(concat!(env!("OUT_DIR"), "/shader_table.rs"));
 
 impl Shader {
-    /// Bindings of a kind.
+    /// Number of storage buffers that the kernel binds.
     #[must_use]
-    pub fn bound(&self, kinds: &[BindingKind]) -> u32 {
-        self.bindings.iter().filter(|b| kinds.contains(&b.kind)).count() as u32
+    pub fn storage_buffers(&self) -> u32 {
+        self.bound(|kind| matches!(kind, BindingKind::ReadOnly | BindingKind::ReadWrite))
+    }
+
+    /// Number of uniform buffers that the kernel binds.
+    #[must_use]
+    pub fn uniform_buffers(&self) -> u32 {
+        self.bound(|kind| kind == BindingKind::Uniform)
+    }
+
+    /// Number of tables that the kernel binds.
+    #[must_use]
+    pub fn tables(&self) -> u32 {
+        self.bound(|kind| matches!(kind, BindingKind::Table { .. }))
+    }
+
+    fn bound(&self, is: impl Fn(BindingKind) -> bool) -> u32 {
+        self.bindings.iter().filter(|b| is(b.kind)).count() as u32
     }
 }
 
@@ -62,9 +76,9 @@ pub fn needs() -> wgpu::Limits {
     let groups = |s: &Shader| s.bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
     wgpu::Limits {
         max_bind_groups: most(&groups),
-        max_storage_buffers_per_shader_stage: most(&|s| s.bound(&[BindingKind::ReadOnly, BindingKind::ReadWrite])),
-        max_uniform_buffers_per_shader_stage: most(&|s| s.bound(&[BindingKind::Uniform])),
-        max_sampled_textures_per_shader_stage: most(&|s| s.bound(&[BindingKind::Table, BindingKind::LayeredTable])),
+        max_storage_buffers_per_shader_stage: most(&Shader::storage_buffers),
+        max_uniform_buffers_per_shader_stage: most(&Shader::uniform_buffers),
+        max_sampled_textures_per_shader_stage: most(&Shader::tables),
         max_compute_invocations_per_workgroup: most(&|s| s.workgroup_size),
         ..wgpu::Limits::default()
     }
@@ -87,9 +101,9 @@ mod tests {
     fn not_portable(shaders: &[Shader]) -> Vec<String> {
         let line = |s: &Shader| {
             let counts = [
-                ("storage buffers", s.bound(&[BindingKind::ReadOnly, BindingKind::ReadWrite]), 10),
-                ("uniform buffers", s.bound(&[BindingKind::Uniform]), 4),
-                ("textures", s.bound(&[BindingKind::Table, BindingKind::LayeredTable]), 16),
+                ("storage buffers", s.storage_buffers(), 10),
+                ("uniform buffers", s.uniform_buffers(), 4),
+                ("textures", s.tables(), 16),
                 ("invocations", s.workgroup_size, 256),
             ];
             let over = counts.into_iter().filter(|(_, has, most)| has > most);
@@ -110,7 +124,7 @@ mod tests {
         };
         assert_eq!(more(BindingKind::ReadOnly, 1), ["trace_camera: 11 storage buffers, at most 10"]);
         assert_eq!(more(BindingKind::Uniform, 2), ["trace_camera: 5 uniform buffers, at most 4"]);
-        assert_eq!(more(BindingKind::Table, 6), ["trace_camera: 17 textures, at most 16"]);
+        assert_eq!(more(BindingKind::Table { layered: false, words: 4 }, 6), ["trace_camera: 17 textures, at most 16"]);
         let large = Shader { workgroup_size: 512, ..most };
         assert_eq!(not_portable(&[large]), ["trace_camera: 512 invocations, at most 256"]);
     }

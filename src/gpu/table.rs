@@ -88,11 +88,16 @@ impl Table {
 /// Format of the texels of a table, and their size in bytes.
 fn texel_of<T>(label: &str) -> (wgpu::TextureFormat, usize) {
     let (format, texel) = match size_of::<T>() {
-        4 => (wgpu::TextureFormat::R32Uint, 4),
-        _ => (wgpu::TextureFormat::Rgba32Uint, 16),
+        4 => (format_of(1), 4),
+        _ => (format_of(4), 16),
     };
     assert_eq!(size_of::<T>() % texel, 0, "{label}: elements of a table fill texels");
     (format, texel)
+}
+
+/// Format of texels of so many words.
+pub(super) fn format_of(words: u32) -> wgpu::TextureFormat {
+    if words == 1 { wgpu::TextureFormat::R32Uint } else { wgpu::TextureFormat::Rgba32Uint }
 }
 
 fn check(gpu: &Gpu, label: &str, texels: u64, max_texels: u64, limit: &'static str) -> Result<()> {
@@ -111,6 +116,8 @@ fn check(gpu: &Gpu, label: &str, texels: u64, max_texels: u64, limit: &'static s
 }
 
 fn create(gpu: &Gpu, label: &str, size: wgpu::Extent3d, format: wgpu::TextureFormat) -> wgpu::Texture {
+    use wgpu::TextureUsages as U;
+    let read = if gpu.reads_images { U::STORAGE_BINDING } else { U::TEXTURE_BINDING };
     gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
         size,
@@ -118,7 +125,7 @@ fn create(gpu: &Gpu, label: &str, size: wgpu::Extent3d, format: wgpu::TextureFor
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        usage: read | U::COPY_DST,
         view_formats: &[],
     })
 }

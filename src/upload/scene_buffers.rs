@@ -75,14 +75,17 @@ pub fn sampler_constant(sampler: Sampler) -> (&'static str, f64) {
     ("SAMPLER", f64::from(number))
 }
 
-/// An array in a storage buffer, and what exceeds one binding in a table.
+/// An array in a storage buffer, and what exceeds one binding in a table; or all of it in that.
 #[derive(Debug)]
 struct Split {
     low: Buffer,
     high: Table,
-    /// Elements in `low` if `high` is used, else 0.
+    /// First element in `high`, or [`NOT_SPLIT`].
     at: u64,
 }
+
+/// No array is so long.
+const NOT_SPLIT: u64 = u32::MAX as u64;
 
 impl SceneBuffers {
     /// Uploads the scene.
@@ -226,9 +229,8 @@ impl SceneBuffers {
             ("WEIGHED_LIGHTS", f64::from(self.lights.table.weighed())),
             ("HAS_ENVIRONMENT", f64::from(u8::from(self.lights.has_environment))),
             ("HAS_OPENINGS", f64::from(u8::from(self.lights.has_openings))),
-            ("SPLIT", f64::from(u8::from(self.primitives.at + self.nodes.at > 0))),
-            ("NODE_SPLIT", self.nodes.constant()),
-            ("PRIMITIVE_SPLIT", self.primitives.constant()),
+            ("NODE_SPLIT", self.nodes.at as f64),
+            ("PRIMITIVE_SPLIT", self.primitives.at as f64),
         ];
         overrides.extend_from_slice(others);
         // After those of the caller, which has the say. Few values, so that few kernels are
@@ -267,14 +269,9 @@ fn rounded_stack(gpu: &Gpu, depth: usize) -> usize {
 impl Split {
     fn new<T: Pod>(gpu: &Gpu, label: &str, data: &[T]) -> Result<Self> {
         let fits = usize::try_from(gpu.max_binding() / size_of::<T>() as u64).unwrap_or(usize::MAX);
-        let (low, high) = data.split_at(data.len().min(fits));
-        let at = if high.is_empty() { 0 } else { low.len() as u64 };
+        let (low, high) = data.split_at(if gpu.reads_images { 0 } else { data.len().min(fits) });
+        let at = if high.is_empty() { NOT_SPLIT } else { low.len() as u64 };
         Ok(Self { low: gpu.storage_with(label, low)?, high: Table::layered(gpu, label, high)?, at })
-    }
-
-    /// The value of the kernels' constant.
-    fn constant(&self) -> f64 {
-        if self.at == 0 { f64::from(u32::MAX) } else { self.at as f64 }
     }
 }
 
