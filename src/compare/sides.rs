@@ -74,13 +74,7 @@ impl<'a> GridGather<'a> {
 
     /// Memory of the photons and the grids over them, bytes.
     pub fn bytes(&self) -> u64 {
-        let of_map = |map: &PhotonMap| {
-            let mut buffers = map.bindings().map(|(_, buffer)| buffer).to_vec();
-            // A map with a single segment binds the same buffer twice.
-            buffers.dedup_by(|a, b| std::ptr::eq(*a, *b));
-            buffers.iter().map(|buffer| buffer.size()).sum::<u64>()
-        };
-        self.maps.iter().map(of_map).sum()
+        self.maps.iter().map(PhotonMap::bytes).sum()
     }
 }
 

@@ -47,6 +47,7 @@ impl Kernel {
             ("HAS_SEVERAL_GROUPS", flag(gpu.lanes.several_groups)),
             ("PACKET_LANES", f64::from(gpu.lanes.of_packet)),
             ("HAS_PILOTS", flag(gpu.lanes.of_packet == 1)),
+            ("MAP_IN_TABLES", flag(gpu.reads_images)),
         ];
         let value = |name: &str| overrides.iter().chain(&of_device).find(|(n, _)| *n == name).map(|(_, value)| *value);
         let constants = shader.overrides.iter().filter_map(|name| Some((*name, value(name)?))).collect();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Gpu, buffer::MemoryCount};
+use super::{Buffer, Gpu, buffer::MemoryCount};
 use crate::{
     error::{Error, Result},
     layout::TABLE_COLUMNS,
@@ -80,9 +80,93 @@ impl Table {
         Ok(Self(Arc::new(Texture { view, bytes: allotted, memory: Arc::clone(&gpu.memory) })))
     }
 
+    /// A table of what lies in buffers, one after the other, in texels of 16 bytes.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn copied(gpu: &Gpu, label: &str, parts: &[Buffer]) -> Result<Self> {
+        let texels = |part: &Buffer| part.size() / COPIED_TEXEL;
+        let all = parts.iter().map(texels).sum();
+        check(gpu, label, all, gpu.max_table_texels(), "maxImageDimension2D")?;
+        let height = (all as u32).div_ceil(TABLE_COLUMNS).max(1);
+        let size = wgpu::Extent3d { width: TABLE_COLUMNS, height, depth_or_array_layers: 1 };
+        let allotted = u64::from(TABLE_COLUMNS) * u64::from(height) * COPIED_TEXEL;
+        let texture = gpu.allot(label, allotted, || create(gpu, label, size, format_of(4)))?;
+        let mut encoder = gpu.encoder();
+        let mut at = 0;
+        for part in parts {
+            let end = at + texels(part) as u32;
+            let mut from = at;
+            while from < end {
+                let (origin, run) = run_of_texels(from, end);
+                let offset = u64::from(from - at) * COPIED_TEXEL;
+                let source = wgpu::TexelCopyBufferInfo { buffer: &part.inner, layout: layout_at(offset) };
+                let target = wgpu::TexelCopyTextureInfo { origin, ..texture.as_image_copy() };
+                encoder.copy_buffer_to_texture(source, target, run);
+                from += run.width * run.height;
+            }
+            at = end;
+        }
+        gpu.submit(encoder);
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Ok(Self(Arc::new(Texture { view, bytes: allotted, memory: Arc::clone(&gpu.memory) })))
+    }
+
+    /// Reads the first `count` elements of a [`Self::copied`] table, of a multiple of 16 bytes each.
+    ///
+    /// # Errors
+    /// As [`Gpu::read`].
+    pub fn read<T: bytemuck::Pod>(&self, gpu: &Gpu, count: u64) -> Result<Vec<T>> {
+        let end = (count * size_of::<T>() as u64 / COPIED_TEXEL) as u32;
+        let piece = gpu.storage::<[u32; 4]>("texels to read back", u64::from(end.min(READ_TEXELS)))?;
+        let mut data: Vec<T> = Vec::with_capacity(count as usize);
+        for first in (0..end).step_by(READ_TEXELS as usize) {
+            let last = end.min(first + READ_TEXELS);
+            let mut encoder = gpu.encoder();
+            let mut from = first;
+            while from < last {
+                let (origin, run) = run_of_texels(from, last);
+                let offset = u64::from(from - first) * COPIED_TEXEL;
+                let source = wgpu::TexelCopyTextureInfo { origin, ..self.0.view.texture().as_image_copy() };
+                let target = wgpu::TexelCopyBufferInfo { buffer: &piece.inner, layout: layout_at(offset) };
+                encoder.copy_texture_to_buffer(source, target, run);
+                from += run.width * run.height;
+            }
+            gpu.submit(encoder);
+            let bytes = u64::from(last - first) * COPIED_TEXEL;
+            data.extend(gpu.read::<T>(&piece, 0, bytes / size_of::<T>() as u64)?);
+        }
+        Ok(data)
+    }
+
+    /// Bytes of device memory that it takes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.0.bytes
+    }
+
     pub(super) fn view(&self) -> &wgpu::TextureView {
         &self.0.view
     }
+}
+
+/// Bytes of a texel of a [`Table::copied`] table.
+const COPIED_TEXEL: u64 = 16;
+/// Texels that are read back at once: whole rows.
+const READ_TEXELS: u32 = 512 * TABLE_COLUMNS;
+
+/// Where texel `from` lies, and the texels up to `end` that follow it as a rectangle: whole rows, or
+/// a part of one.
+fn run_of_texels(from: u32, end: u32) -> (wgpu::Origin3d, wgpu::Extent3d) {
+    let (x, y) = (from % TABLE_COLUMNS, from / TABLE_COLUMNS);
+    let rows = if x == 0 { (end - from) / TABLE_COLUMNS } else { 0 };
+    let (width, height) = if rows > 0 { (TABLE_COLUMNS, rows) } else { ((end - from).min(TABLE_COLUMNS - x), 1) };
+    (wgpu::Origin3d { x, y, z: 0 }, wgpu::Extent3d { width, height, depth_or_array_layers: 1 })
+}
+
+fn layout_at(offset: u64) -> wgpu::TexelCopyBufferLayout {
+    let bytes_per_row = Some(TABLE_COLUMNS * COPIED_TEXEL as u32);
+    wgpu::TexelCopyBufferLayout { offset, bytes_per_row, rows_per_image: None }
 }
 
 /// Format of the texels of a table, and their size in bytes.
@@ -125,7 +209,7 @@ fn create(gpu: &Gpu, label: &str, size: wgpu::Extent3d, format: wgpu::TextureFor
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format,
-        usage: read | U::COPY_DST,
+        usage: read | U::COPY_DST | U::COPY_SRC,
         view_formats: &[],
     })
 }

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     density::Density,
     error::Result,
-    gpu::{Buffer, Gpu},
+    gpu::{Buffer, Gpu, Kernel},
     layout::{self, GATHER_STATE_BYTES, GatherInfo, Gathered, SEARCH_STATE_BYTES},
     passes::maps::photon_map::PhotonMap,
     progress::Progress,
@@ -218,6 +218,8 @@ impl<'s> Gather<'s> {
             ("radiance", radiance),
             ("gathered", gathered),
         ]);
+        let of_map = |kernel: &Kernel| kernel.clone().with_tables(&map.tables());
+        let (search, sum, finish) = (&of_map(search), &of_map(sum), &of_map(finish));
         let with_info = |info| [buffers.as_slice(), &[("gather_info", info)]].concat();
         let lanes = u64::from(gpu.lanes.of_packet);
         let strides = if lanes == 1 { &STRIDES[..] } else { &[1] };

@@ -55,7 +55,8 @@ impl QueryOrder {
         let mut encoder = gpu.encoder();
         self.mark.dispatch(&mut encoder, &self.mark.bind(gpu, &buffers), u64::from(info.count) + 1);
         self.radix.prefix_sums(gpu, &mut encoder, &marks);
-        self.key.dispatch(&mut encoder, &self.key.bind(gpu, &buffers), info.count.into());
+        let key = self.key.clone().with_tables(&map.tables());
+        key.dispatch(&mut encoder, &key.bind(gpu, &buffers), info.count.into());
         gpu.submit(encoder);
         let waiting = gpu.read::<u32>(&marks[0], info.count.into(), 1)?[0];
         let bits =

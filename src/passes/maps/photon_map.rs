@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    gpu::{Buffer, Gpu},
+    gpu::{Buffer, Gpu, Table},
     layout::{MapInfo, PhotonFlux, PhotonPosition},
 };
 
@@ -60,9 +60,34 @@ pub struct PhotonMap {
     count: u32,
     emitted: u64,
     info: Buffer,
+    stored: Stored,
+}
+
+/// Where the arrays of a map lie: in buffers, or in tables where kernels read these faster.
+#[derive(Debug)]
+struct Stored {
     cells: Buffer,
+    /// Segments of the photons.
     positions: Vec<Buffer>,
     fluxes: Vec<Buffer>,
+    /// Cells, positions and fluxes.
+    tables: [Table; 3],
+}
+
+impl Stored {
+    fn new(gpu: &Gpu, cells: Buffer, positions: Vec<Buffer>, fluxes: Vec<Buffer>) -> Result<Self> {
+        if !gpu.reads_images {
+            let none = Table::new::<[u32; 4]>(gpu, "no table", &[])?;
+            return Ok(Self { cells, positions, fluxes, tables: [none.clone(), none.clone(), none] });
+        }
+        let tables = [
+            Table::copied(gpu, "cells", &[cells])?,
+            Table::copied(gpu, "photon places", &positions)?,
+            Table::copied(gpu, "photon fluxes", &fluxes)?,
+        ];
+        let none = || gpu.storage::<[u32; 4]>("no buffer", 1);
+        Ok(Self { cells: none()?, positions: vec![none()?], fluxes: vec![none()?], tables })
+    }
 }
 
 impl PhotonMap {
@@ -89,8 +114,9 @@ impl PhotonMap {
         drop(photons);
         let (cells, levels) = kernels.grid.build(gpu, &positions, segment, count)?;
         let info = gpu.uniform("map info", &MapInfo { count, levels, split: segment, pad: 0 });
+        let stored = Stored::new(gpu, cells, positions, fluxes)?;
         gpu.wait()?;
-        Ok(Self { count, emitted, info, cells, positions, fluxes })
+        Ok(Self { count, emitted, info, stored })
     }
 
     /// Photons in the map.
@@ -108,21 +134,37 @@ impl PhotonMap {
     /// Segments that the photons lie in, 1 or 2: the kernels' override `SEGMENTS`.
     #[must_use]
     pub fn segments(&self) -> u32 {
-        self.positions.len() as u32
+        self.stored.positions.len() as u32
     }
 
     /// The buffers of bind group 1 by name.
     #[must_use]
     pub fn bindings(&self) -> [(&'static str, &Buffer); 6] {
-        let high = self.positions.len() - 1;
+        let Stored { cells, positions, fluxes, .. } = &self.stored;
+        let high = positions.len() - 1;
         [
             ("map_info", &self.info),
-            ("cells", &self.cells),
-            ("positions_low", &self.positions[0]),
-            ("positions_high", &self.positions[high]),
-            ("fluxes_low", &self.fluxes[0]),
-            ("fluxes_high", &self.fluxes[high]),
+            ("cells", cells),
+            ("positions_low", &positions[0]),
+            ("positions_high", &positions[high]),
+            ("fluxes_low", &fluxes[0]),
+            ("fluxes_high", &fluxes[high]),
         ]
+    }
+
+    /// The tables of bind group 1 by name.
+    #[must_use]
+    pub fn tables(&self) -> [(&'static str, &Table); 3] {
+        let [cells, positions, fluxes] = &self.stored.tables;
+        [("cell_table", cells), ("position_table", positions), ("flux_table", fluxes)]
+    }
+
+    /// Device memory that it takes, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let Stored { cells, positions, fluxes, tables } = &self.stored;
+        let buffers = positions.iter().chain(fluxes).chain([cells, &self.info]);
+        buffers.map(|buffer| buffer.size()).sum::<u64>() + tables.iter().map(Table::bytes).sum::<u64>()
     }
 
     /// Reads the sorted photons back.
@@ -130,8 +172,12 @@ impl PhotonMap {
     /// # Errors
     /// [`crate::Error::Gpu`] if the driver fails.
     pub fn read(&self, gpu: &Gpu) -> Result<(Vec<PhotonPosition>, Vec<PhotonFlux>)> {
+        let [_, positions, fluxes] = &self.stored.tables;
+        if gpu.reads_images {
+            return Ok((positions.read(gpu, self.count.into())?, fluxes.read(gpu, self.count.into())?));
+        }
         let (mut positions, mut fluxes) = (Vec::new(), Vec::new());
-        for (position, flux) in self.positions.iter().zip(&self.fluxes) {
+        for (position, flux) in self.stored.positions.iter().zip(&self.stored.fluxes) {
             let left = u64::from(self.count) - positions.len() as u64;
             let size = left.min(position.size() / size_of::<PhotonPosition>() as u64);
             positions.extend(gpu.read::<PhotonPosition>(position, 0, size)?);
