@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::record_walls::wall_distances;
 use crate::{
     error::Result,
-    gpu::{Buffer, Gpu, Kernel},
+    gpu::{Buffer, Gpu, Kernel, Table},
     layout::{ArrivingLight, CameraTile, IrradianceRecord, LightDirections, RecordGrid, VisiblePoint, octahedral},
 };
 
@@ -28,7 +28,7 @@ const MAX_REACH: f32 = 8.0;
 /// A slot without a point.
 const NO_RECORD: IrradianceRecord = IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], reach: 0.0 };
 
-/// Slots of records of a picture at most: 128 MiB, which all adapters bind.
+/// Slots of records of a picture at most: 128 MiB in a table.
 const MAX_RECORDS: u64 = 1 << 22;
 
 /// Pixels between the points of final gathering: more than asked for where the whole picture would
@@ -155,12 +155,10 @@ fn snorm8(x: f32) -> u32 {
     u32::from((x * 127.0).round() as i8 as u8)
 }
 
-/// The kernel and the records that it reads.
+/// The kernel, with the records that it reads.
 #[derive(Debug)]
 pub struct IrradianceRecords {
     kernel: Kernel,
-    records: Buffer,
-    directions: Buffer,
     grid: RecordGrid,
 }
 
@@ -174,9 +172,11 @@ impl IrradianceRecords {
         (records, directions): &(Vec<IrradianceRecord>, Vec<LightDirections>),
         grid: RecordGrid,
     ) -> Result<Self> {
-        let records = gpu.storage_with("irradiance records", records)?;
-        let directions = gpu.storage_with("directions of irradiance records", directions)?;
-        Ok(Self { kernel: Kernel::new(gpu, "filter_irradiance", &[]), records, directions, grid })
+        let records = Table::new(gpu, "irradiance records", records)?;
+        let directions = Table::new(gpu, "directions of irradiance records", directions)?;
+        let kernel = Kernel::new(gpu, "filter_irradiance", &[]);
+        let kernel = kernel.with_tables(&[("records", &records), ("light_directions", &directions)]);
+        Ok(Self { kernel, grid })
     }
 
     /// Has the kernel compiled ahead of its use.
@@ -193,8 +193,6 @@ impl IrradianceRecords {
         let buffers = [
             ("tile", &tile),
             ("record_grid", &grid),
-            ("records", &self.records),
-            ("light_directions", &self.directions),
             ("points", points),
             ("radiance", radiance),
             ("lists", lists),
