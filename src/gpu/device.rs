@@ -153,6 +153,21 @@ impl Gpu {
         Self { lanes: self.lanes.spread(), ..self }
     }
 
+    /// Whether what kernels read lies in tables rather than in storage buffers: for tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn keeps_tables(&self) -> bool {
+        self.reads_images
+    }
+
+    /// Keeps what kernels read in storage buffers as far as these hold it, as on a GPU: for tests.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_storage_buffers(self) -> Self {
+        let compiler = Compiler::new(Rewrites { hides_uniforms: self.is_software, reads_images: false });
+        Self { compiler, reads_images: false, ..self }
+    }
+
     /// Whether several lanes answer a packet of queries together: for tests.
     #[doc(hidden)]
     #[must_use]

@@ -5,10 +5,9 @@ use std::{borrow::Cow, sync::OnceLock};
 use super::{
     chunks::CHUNK_GROUP,
     hide_uniforms::hide_uniforms,
-    read_images::read_images,
+    read_images::{format_of, read_images},
     shaders::{BindingKind, Shader},
     specialize::specialized,
-    table::format_of,
 };
 
 /// A kernel with its constants, compiled by the first thread that comes: one of the compiler's, or

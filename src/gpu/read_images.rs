@@ -1,17 +1,25 @@
 //! Tables as storage images, for software.
 //!
-//! Lavapipe reads storage buffers word by word and lane by lane, in a loop that stores each word into a vector
-//! and waits for it. Of a texture it reads the texels of all lanes in one go, once it has found the level of detail
-//! of each, and that takes twice as long as the rest; storage images have no levels.
+//! Lavapipe reads storage buffers in a loop over words and lanes, in which each word waits until the
+//! last one is stored in its vector. Of a texture it reads the texels of all lanes in one go. It
+//! first finds the level of detail of each lane, which takes longer than the rest; storage images
+//! have no levels.
 
-use wgpu::naga::{AddressSpace, Expression, ImageClass, Module, Span, StorageAccess, StorageFormat, TypeInner};
+use wgpu::naga::{
+    AddressSpace, Expression, ImageClass, Module, ResourceBinding, Span, StorageAccess, StorageFormat, Type, TypeInner,
+};
 
-use super::shaders::{BindingKind, Shader};
+use super::shaders::{Binding, BindingKind, Shader};
+
+/// Format of texels of so many words.
+pub(super) fn format_of(words: u32) -> wgpu::TextureFormat {
+    if words == 1 { wgpu::TextureFormat::R32Uint } else { wgpu::TextureFormat::Rgba32Uint }
+}
 
 /// Has a kernel read its tables as images.
 pub(super) fn read_images(module: &mut Module, shader: &Shader) {
-    let words = |binding: &wgpu::naga::ResourceBinding| {
-        let is_it = |b: &&super::shaders::Binding| (b.group, b.index) == (binding.group, binding.binding);
+    let words = |binding: &ResourceBinding| {
+        let is_it = |b: &&Binding| (b.group, b.index) == (binding.group, binding.binding);
         match shader.bindings.iter().find(is_it).map(|b| b.kind) {
             Some(BindingKind::Table { words, .. }) => Some(words),
             _ => None,
@@ -23,7 +31,7 @@ pub(super) fn read_images(module: &mut Module, shader: &Shader) {
         let format = if words == 1 { StorageFormat::R32Uint } else { StorageFormat::Rgba32Uint };
         let class = ImageClass::Storage { format, access: StorageAccess::LOAD };
         let inner = TypeInner::Image { dim, arrayed, class };
-        variable.ty = module.types.insert(wgpu::naga::Type { name: None, inner }, Span::UNDEFINED);
+        variable.ty = module.types.insert(Type { name: None, inner }, Span::UNDEFINED);
     }
     let functions = module.functions.iter_mut().map(|(_, function)| function);
     for function in functions.chain(module.entry_points.iter_mut().map(|entry| &mut entry.function)) {
@@ -44,7 +52,6 @@ mod tests {
 
     #[test]
     fn kernels_that_read_images_are_valid() {
-        let capabilities = Capabilities::all();
         for shader in SHADERS.iter().filter(|shader| shader.tables() > 0) {
             let mut module = specialized(shader.wgsl, &[]).expect("a text that build.rs composed");
             let images = |module: &Module| {
@@ -55,7 +62,7 @@ mod tests {
             assert_eq!(images(&module), 0, "{}: control", shader.stem);
             read_images(&mut module, shader);
             assert!(images(&module) > 0, "{}", shader.stem);
-            Validator::new(ValidationFlags::all(), capabilities)
+            Validator::new(ValidationFlags::all(), Capabilities::all())
                 .validate(&module)
                 .unwrap_or_else(|error| panic!("{}: {error:?}", shader.stem));
         }

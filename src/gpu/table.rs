@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Buffer, Gpu, buffer::MemoryCount};
+use super::{Buffer, Gpu, buffer::MemoryCount, read_images::format_of};
 use crate::{
     error::{Error, Result},
     layout::TABLE_COLUMNS,
@@ -177,11 +177,6 @@ fn texel_of<T>(label: &str) -> (wgpu::TextureFormat, usize) {
     };
     assert_eq!(size_of::<T>() % texel, 0, "{label}: elements of a table fill texels");
     (format, texel)
-}
-
-/// Format of texels of so many words.
-pub(super) fn format_of(words: u32) -> wgpu::TextureFormat {
-    if words == 1 { wgpu::TextureFormat::R32Uint } else { wgpu::TextureFormat::Rgba32Uint }
 }
 
 fn check(gpu: &Gpu, label: &str, texels: u64, max_texels: u64, limit: &'static str) -> Result<()> {

@@ -3,6 +3,7 @@
 //! | test | claim | negative control |
 //! |---|---|---|
 //! | twice | two renders in one process are equal | another seed |
+//! | tables | so are those from tables and from storage buffers | another seed |
 //! | threads | so are renders by the program with one and with two driver threads, under other names | another seed |
 //! | path 2^32 | random numbers go on there, whatever the batch begins with, and repeat none | numbers of 32 bits begin anew |
 //! | emission | the closed form and rejection in a cube draw the same directions (chi-square) | those of a spot |
@@ -11,8 +12,11 @@ use std::{fs, path::Path, process::Command};
 
 use caustica::{
     bvh::Bvh,
+    gpu::Gpu,
     layout::{self, Counters, PhotonBatch},
-    scene::{Light, LightKind},
+    progress::Silent,
+    renderer::render,
+    scene::{Alpha, Light, LightKind},
     settings::{LightSettings, Mode, Sampler},
     upload::{SceneBuffers, sampler_constant},
 };
@@ -36,6 +40,29 @@ fn two_renders_are_equal() {
     };
     assert_eq!(picture(7), picture(7));
     assert_ne!(picture(7), picture(8), "control: the seed changes nothing");
+}
+
+#[test]
+fn tables_and_storage_buffers_give_the_same_bits() {
+    let mut scene = scene(&[diffuse(0.6), glass(), diffuse(0.3)]);
+    scene.materials[2].alpha = Alpha::Blend;
+    scene.materials[2].opacity = 0.4;
+    add_box(&mut scene, Vec3::splat(-1.0), Vec3::splat(1.0), 0);
+    add_box(&mut scene, vec3(-0.9, -0.5, -0.9), vec3(0.9, -0.4, -0.2), 2);
+    scene.spheres.push(sphere(vec3(0.3, -0.3, 0.0), 0.5, 1));
+    scene.lights.push(point_light(vec3(0.0, 0.9, 0.1), 1.0));
+    scene.cameras.push(camera(vec3(0.0, 0.0, 0.99), Vec3::ZERO, 80.0));
+    let picture = |gpu: &Gpu, seed| {
+        let settings = settings(Mode::Hybrid, 20_000, 40).with(|s| {
+            s.photons.seed = seed;
+            s.photons.final_gather = 16;
+        });
+        render(gpu, &scene, &settings, &Silent).expect("the scene renders").frame
+    };
+    let in_buffers = Gpu::open(None).expect("tests need an adapter").with_storage_buffers();
+    assert!(!in_buffers.keeps_tables());
+    assert_eq!(picture(gpu(), 7), picture(&in_buffers, 7));
+    assert_ne!(picture(gpu(), 7), picture(&in_buffers, 8), "control: the seed changes nothing");
 }
 
 #[test]

@@ -264,7 +264,7 @@ fn disagreements(wgsl: &str) -> Vec<String> {
 }
 
 /// Structs that kernels decode from the texels of tables.
-const IN_TABLES: [&str; 4] = ["Instance", "LightNode", "Medium", "Normals"];
+const IN_TABLES: [&str; 6] = ["Instance", "IrradianceRecord", "LightDirections", "LightNode", "Medium", "Normals"];
 
 /// Records of tables of which kernels read single texels, so that no struct of theirs is one.
 const READ_BY_ROWS: [&str; 3] = ["MaterialRecord", "TextureRecord", "Attributes"];

@@ -190,13 +190,8 @@ impl IrradianceRecords {
         let invocations = u64::from(tile.pixels) * u64::from(tile.branches);
         let grid = gpu.uniform("record grid", &self.grid);
         let tile = gpu.uniform("camera tile", tile);
-        let buffers = [
-            ("tile", &tile),
-            ("record_grid", &grid),
-            ("points", points),
-            ("radiance", radiance),
-            ("lists", lists),
-        ];
+        let buffers =
+            [("tile", &tile), ("record_grid", &grid), ("points", points), ("radiance", radiance), ("lists", lists)];
         let mut encoder = gpu.encoder();
         self.kernel.dispatch(&mut encoder, &self.kernel.bind(gpu, &buffers), invocations);
         gpu.submit(encoder);
