@@ -1,9 +1,9 @@
 //! Tables as storage images, for software.
 //!
-//! Lavapipe reads storage buffers in a loop over words and lanes, in which each word waits until the
-//! last one is stored in its vector. Of a texture it reads the texels of all lanes in one go. It
-//! first finds the level of detail of each lane, which takes longer than the rest; storage images
-//! have no levels.
+//! Lavapipe reads storage buffers in a loop over words and lanes, in which each word waits until
+//! the last one is stored in its vector. Of a texture it reads the texels of all lanes in one go.
+//! It first finds the level of detail of each lane, which takes longer than the rest; storage
+//! images have no levels.
 
 use wgpu::naga::{
     AddressSpace, Expression, ImageClass, Module, ResourceBinding, Span, StorageAccess, StorageFormat, Type, TypeInner,
@@ -53,7 +53,8 @@ mod tests {
     #[test]
     fn kernels_that_read_images_are_valid() {
         for shader in SHADERS.iter().filter(|shader| shader.tables() > 0) {
-            let mut module = specialized(shader.wgsl, &[("MAP_IN_TABLES", 1.0)]).expect("a text that build.rs composed");
+            let mut module =
+                specialized(shader.wgsl, &[("MAP_IN_TABLES", 1.0)]).expect("a text that build.rs composed");
             let images = |module: &Module| {
                 let is_storage =
                     |inner: &TypeInner| matches!(inner, TypeInner::Image { class: ImageClass::Storage { .. }, .. });

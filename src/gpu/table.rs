@@ -112,7 +112,8 @@ impl Table {
         Ok(Self(Arc::new(Texture { view, bytes: allotted, memory: Arc::clone(&gpu.memory) })))
     }
 
-    /// Reads the first `count` elements of a [`Self::copied`] table, of a multiple of 16 bytes each.
+    /// Reads the first `count` elements of a [`Self::copied`] table, of a multiple of 16 bytes
+    /// each.
     ///
     /// # Errors
     /// As [`Gpu::read`].
@@ -155,8 +156,8 @@ const COPIED_TEXEL: u64 = 16;
 /// Texels that are read back at once: whole rows.
 const READ_TEXELS: u32 = 512 * TABLE_COLUMNS;
 
-/// Where texel `from` lies, and the texels up to `end` that follow it as a rectangle: whole rows, or
-/// a part of one.
+/// Where texel `from` lies, and the texels up to `end` that follow it as a rectangle: whole rows,
+/// or a part of one.
 fn run_of_texels(from: u32, end: u32) -> (wgpu::Origin3d, wgpu::Extent3d) {
     let (x, y) = (from % TABLE_COLUMNS, from / TABLE_COLUMNS);
     let rows = if x == 0 { (end - from) / TABLE_COLUMNS } else { 0 };
