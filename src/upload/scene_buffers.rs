@@ -189,7 +189,14 @@ impl SceneBuffers {
     /// Whether a ray may visit more than an invocation can.
     #[must_use]
     pub fn has_late_rays(&self, gpu: &Gpu) -> bool {
-        self.visits > gpu.trace_budget / 2
+        self.visits > gpu.trace_budget / 4
+    }
+
+    /// Whether rays may meet surfaces at which they wait for one another: `settle` in
+    /// `lib/transport/intersect.wesl`.
+    fn has_waiting_rays(&self) -> bool {
+        let has_contacts = self.contacts.ranks.iter().any(Option::is_some);
+        self.materials.has_alpha || has_contacts || self.has_clear_surfaces()
     }
 
     /// Compiles a kernel that uses the scene.
@@ -237,7 +244,9 @@ impl SceneBuffers {
         // compiled.
         let budget = self.visits.next_power_of_two().max(SHORT_LOOPS).min(gpu.trace_budget);
         let rays = if TWO_RAYS.contains(&shader.stem) { 2 } else { 1 };
-        overrides.push(("TRACE_BUDGET", f64::from(budget / rays)));
+        // Rays that wait for one another take more loops together than each alone.
+        let waits = if self.has_waiting_rays() { 2 } else { 1 };
+        overrides.push(("TRACE_BUDGET", f64::from(budget / (rays * waits))));
         let lights = self.lights.tables();
         let own = [("normals", &self.normals), ("media_table", &self.media), ("instances", &self.instances)];
         let high = [("nodes_high", &self.nodes.high), ("primitives_high", &self.primitives.high)];
