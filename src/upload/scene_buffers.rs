@@ -195,8 +195,12 @@ impl SceneBuffers {
     /// Whether rays may meet surfaces at which they wait for one another: `settle` in
     /// `lib/transport/intersect.wesl`.
     fn has_waiting_rays(&self) -> bool {
-        let has_contacts = self.contacts.ranks.iter().any(Option::is_some);
-        self.materials.has_alpha || has_contacts || self.has_clear_surfaces()
+        self.materials.has_alpha || self.has_contacts() || self.has_clear_surfaces()
+    }
+
+    /// Whether some surfaces lie in each other.
+    fn has_contacts(&self) -> bool {
+        self.contacts.ranks.iter().any(Option::is_some)
     }
 
     /// Compiles a kernel that uses the scene.
@@ -217,7 +221,7 @@ impl SceneBuffers {
     pub fn kernel_of(&self, gpu: &Gpu, shader: &'static Shader, others: &[(&str, f64)]) -> Kernel {
         let mut overrides = vec![
             ("HAS_SPHERES", f64::from(u8::from(self.has_spheres))),
-            ("HAS_CONTACTS", f64::from(u8::from(self.contacts.ranks.iter().any(Option::is_some)))),
+            ("HAS_CONTACTS", f64::from(u8::from(self.has_contacts()))),
             ("HAS_INSTANCES", f64::from(u8::from(self.has_instances))),
             ("STACK_WORDS", (self.stack + 1) as f64 * f64::from(layout::WORKGROUP_SIZE)),
             ("HAS_LAYERS", f64::from(u8::from(self.materials.has_layers))),
