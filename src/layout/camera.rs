@@ -94,7 +94,8 @@ pub struct CameraTile {
     /// gathering, the first of each point, and how many of each follow each other.
     pub first_sample: u32,
     pub samples: u32,
-    /// 1: the paths are rays of final gathering; 0: they start at the camera.
+    /// 0: paths start at the camera. 1: they are rays of final gathering; 2: such rays that see
+    /// gleams as well, lights by way of mirrors, metal and glass.
     pub gathers: u32,
     /// Path slots per sample, a power of 2: where a path may go on in two ways, both are followed
     /// while it has slots for them.
@@ -140,9 +141,10 @@ pub struct CameraTile {
     pub other_light: f32,
     /// 1: paths that show them blurred see a base and what lies above it as one diffuse lobe.
     pub merges_layers: u32,
-    /// Bright patches that rays of rough lobes are aimed at: the same, and lamps in glass.
+    /// Bright patches that rays of rough lobes are aimed at: the same, gleams, and lamps in glass.
     pub lobe_patches: u32,
-    pub pad0: u32,
+    /// 1: glass beyond wide lobes is as narrow as it is, for these aim at lamps in it.
+    pub sharp_glass: u32,
     pub pad1: u32,
     pub pad2: u32,
 }
@@ -200,8 +202,11 @@ pub struct FinalStep {
     pub pad2: u32,
 }
 
-/// Bright patches of a picture at most, lamps in glass among them.
-pub const MAX_PATCHES: usize = 128;
+/// [`CameraTile::gathers`] of rays of final gathering that see gleams.
+pub const SEES_GLEAMS: u32 = 2;
+
+/// Bright patches of a picture at most, gleams and lamps in glass among them.
+pub const MAX_PATCHES: usize = 160;
 
 /// A small part of a surface from which much light comes: an ellipse, or a disc that faces all
 /// points.

@@ -26,6 +26,8 @@ pub fn bare(point: &VisiblePoint) -> VisiblePoint {
 pub struct Ends {
     pub marks: Vec<VisiblePoint>,
     legs: Vec<Leg>,
+    /// First legs of the rays that found light on their way, and that light in all colours.
+    gleams: Vec<(Leg, f64)>,
     /// Number of all rays.
     pub rays: u64,
 }
@@ -42,11 +44,15 @@ pub fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progres
                 let marks: Vec<VisiblePoint> = pass.gpu.read(&gather.ends, 0, rays.all().into())?;
                 let legs = gather.legs(pass.gpu, rays)?;
                 ends.rays += u64::from(rays.all());
-                for ((ray, mark), (direction, length)) in (0..).zip(marks).zip(legs) {
+                for ((ray, mark), (direction, length, found)) in (0..).zip(marks).zip(legs) {
+                    let start = points[chosen[(ray / rays.count) as usize] as usize].position.into();
+                    let leg = Leg { start, direction, length };
                     if mark.next_map != 0 {
-                        let start = points[chosen[(ray / rays.count) as usize] as usize].position.into();
                         ends.marks.push(mark);
-                        ends.legs.push(Leg { start, direction, length });
+                        ends.legs.push(leg);
+                    }
+                    if found.max_element() > 0.0 {
+                        ends.gleams.push((leg, found.element_sum().into()));
                     }
                 }
                 Ok(StepCount::default())
@@ -60,7 +66,7 @@ pub fn ends_of_rays(pass: &CameraPass, stats: &mut Stats, progress: &dyn Progres
     Ok(ends)
 }
 
-/// Finds bright places by the light of some of the ends.
+/// Finds bright places by the light of some of the ends, and by all gleams.
 pub fn bright_places(
     preview: &CameraPass,
     ends: &Ends,
@@ -91,5 +97,7 @@ pub fn bright_places(
         radiance: scale * light[..3].iter().map(|x| f64::from(*x)).sum::<f64>(),
     };
     let lit: Vec<_> = some.iter().zip(ends.legs.iter().step_by(step)).zip(&light).map(end).collect();
-    Ok(BrightPlaces::find(&lit, fraction * ends.rays as f64, cache.width()))
+    let gleams: Vec<_> = ends.gleams.iter().map(|(leg, light)| RayEnd::of_gleam(*leg, scale * light)).collect();
+    let rays = [fraction * ends.rays as f64, ends.rays as f64];
+    Ok(BrightPlaces::find((&lit, &gleams), rays, cache.width()))
 }

@@ -313,7 +313,7 @@ impl<'a> Session<'a> {
                 preview.of_pass(&small, index)
             };
             for most in PREVIEW_RAYS {
-                if !gatherer.prepare(&preview(most)?, &mut stats, progress)? {
+                if !gatherer.prepare(&preview(most)?.seeing_gleams(), &mut stats, progress)? {
                     break;
                 }
             }

@@ -210,6 +210,11 @@ impl<'a> CameraPass<'a> {
         Self { final_gather: self.final_gather.map(FinalGather::joint), ..self }
     }
 
+    /// Has rays of final gathering see gleams, lights by way of mirrors, metal and glass.
+    pub fn seeing_gleams(self) -> Self {
+        Self { final_gather: self.final_gather.map(FinalGather::seeing_gleams), ..self }
+    }
+
     /// Aims a part of the rays at bright places.
     pub fn aiming_at(self, bright: &BrightPlaces) -> Self {
         Self { tracer: self.tracer.aiming_at(self.gpu, bright), ..self }

@@ -11,8 +11,9 @@ use crate::{
     layout::{BrightPatch, MAX_PATCHES},
 };
 
-/// Patches at most.
-const PATCHES: usize = MAX_PATCHES - MAX_LAMP_PATCHES;
+/// Patches of places and of gleams at most.
+const PATCHES: usize = MAX_PATCHES - MAX_LAMP_PATCHES - GLEAMS;
+const GLEAMS: usize = 32;
 /// Fraction of the rays' mean square that a patch must cause: every ray reads them all.
 const LEAST_OF_PATCH: f64 = 0.005;
 /// Radiance of a bright end, in units of the mean over all rays.
@@ -58,6 +59,9 @@ pub struct RayEnd {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BrightPlaces {
     pub patches: Vec<BrightPatch>,
+    /// Mirrors, metal and glass that show lights, for rays of rough lobes alone: of diffuse
+    /// surfaces, this light is a caustic.
+    pub gleams: Vec<BrightPatch>,
     pub other_light: f32,
     /// Few of the rays bring most of the light: more of them tell more.
     pub is_uneven: bool,
@@ -81,23 +85,58 @@ struct Cell {
     left: usize,
 }
 
+/// Patches of some ends, and what these are of all light.
+#[derive(Debug, Default)]
+struct Patches {
+    patches: Vec<BrightPatch>,
+    /// Sum of the radiance of their ends.
+    light: f64,
+    /// Sum of the squares of the radiance of their ends, and of all ends.
+    squares: f64,
+    all: f64,
+}
+
+/// Light besides that of the ends among which patches are looked for.
+#[derive(Clone, Copy, Debug, Default)]
+struct OtherLight {
+    /// Mean radiance.
+    mean: f64,
+    /// Mean of its square.
+    squares: f64,
+}
+
 impl BrightPlaces {
-    /// Finds places in cells of at least that width by the ends of `rays` rays from all over the
-    /// picture; those that met nothing are left out.
+    /// Finds places and gleams in cells of at least that width by the ends of `rays` rays from all
+    /// over the picture each; those that met nothing are left out.
     #[must_use]
-    pub fn find(ends: &[RayEnd], rays: f64, width: f32) -> Self {
-        let in_cells = |factor: &f32| Self::in_cells(ends, rays, width * factor);
-        let found: Vec<(f64, Self)> = WIDTHS.iter().map(in_cells).collect();
-        let most = found.iter().map(|(part, _)| *part).fold(0.0, f64::max);
-        let least = LEAST_PART.max(NEAR_MOST * most);
-        let enough = found.into_iter().find(|(part, _)| *part > least).map(|(_, places)| places);
-        let none = || Self { other_light: irradiance(mean_radiance(ends, rays)), ..Self::default() };
-        Self { is_uneven: is_uneven(ends, rays), ..enough.unwrap_or_else(none) }
+    pub fn find((ends, gleams): (&[RayEnd], &[RayEnd]), rays: [f64; 2], width: f32) -> Self {
+        let mean = mean_radiance(ends, rays[0]);
+        let places = Patches::find(ends, (rays[0], OtherLight::default()), (width, PATCHES));
+        let squares = (places.all - places.squares) / rays[0].max(1.0);
+        let gleams = Patches::find(gleams, (rays[1], OtherLight { mean, squares }), (width, GLEAMS));
+        Self {
+            other_light: irradiance(mean - places.light / rays[0].max(1.0)),
+            is_uneven: is_uneven(ends, rays[0]),
+            patches: places.patches,
+            gleams: gleams.patches,
+        }
+    }
+}
+
+impl Patches {
+    /// So many patches at most, in the narrowest cells that serve.
+    fn find(ends: &[RayEnd], (rays, other): (f64, OtherLight), (width, most): (f32, usize)) -> Self {
+        let in_cells = |factor: &f32| Self::in_cells(ends, (rays, other), (width * factor, most));
+        let found: Vec<Self> = WIDTHS.iter().map(in_cells).collect();
+        let part = |found: &Self| found.squares / (found.all + rays * other.squares).max(f64::MIN_POSITIVE);
+        let least = LEAST_PART.max(NEAR_MOST * found.iter().map(part).fold(0.0, f64::max));
+        let all = found[0].all;
+        found.into_iter().find(|found| part(found) > least).unwrap_or(Self { all, ..Self::default() })
     }
 
-    /// The same by cells of one width, and the fraction of the variance that the places cause.
-    fn in_cells(ends: &[RayEnd], rays: f64, width: f32) -> (f64, Self) {
-        let mean = mean_radiance(ends, rays);
+    /// The same by cells of one width.
+    fn in_cells(ends: &[RayEnd], (rays, other): (f64, OtherLight), (width, most): (f32, usize)) -> Self {
+        let mean = mean_radiance(ends, rays) + other.mean;
         let mut cells: Vec<Cell> = Vec::new();
         let mut of_keys: BTreeMap<[i32; 5], usize> = BTreeMap::new();
         let mut of_ends: Vec<[Option<usize>; 2]> = vec![[None; 2]; ends.len()];
@@ -119,11 +158,11 @@ impl BrightPlaces {
         let (mut patches, mut light, mut squares) = (Vec::new(), 0.0, 0.0);
         let mut is_left = vec![true; ends.len()];
         let all = ends.iter().map(|end| end.radiance.powi(2)).sum::<f64>();
-        while patches.len() < PATCHES {
+        while patches.len() < most {
             let brightest = (0..cells.len())
                 .filter(|i| cells[*i].left >= MIN_ENDS)
                 .max_by(|a, b| cells[*a].squares.total_cmp(&cells[*b].squares).then(b.cmp(a)));
-            let Some(brightest) = brightest.filter(|i| cells[*i].squares > LEAST_OF_PATCH * all) else { break };
+            let Some(brightest) = brightest.filter(|i| cells[*i].squares > LEAST_OF_PATCH * (all + rays * other.squares)) else { break };
             let taken: Vec<(usize, Aim)> =
                 std::mem::take(&mut cells[brightest].ends).into_iter().filter(|(i, _)| is_left[*i]).collect();
             for (i, _) in &taken {
@@ -137,9 +176,7 @@ impl BrightPlaces {
             }
             patches.extend(patch(&taken.iter().map(|(i, aim)| (*aim, ends[*i].radiance)).collect::<Vec<_>>()));
         }
-        let other_light = irradiance(mean - light / rays);
-        let places = Self { patches, other_light, is_uneven: false };
-        (if all > 0.0 { squares / all } else { 0.0 }, places)
+        Self { patches, light, squares, all }
     }
 }
 
@@ -160,6 +197,13 @@ fn is_uneven(ends: &[RayEnd], rays: f64) -> bool {
 }
 
 impl RayEnd {
+    /// Of light that a ray found by way of what its first leg ends at. It is aimed at that, which
+    /// faces those who see it.
+    #[must_use]
+    pub fn of_gleam(leg: Leg, radiance: f64) -> Self {
+        Self { leg, position: leg.start + leg.length * leg.direction, normal: -leg.direction, radiance }
+    }
+
     /// Where other rays are aimed to meet what is there. By way of a plane mirror or of a pane,
     /// that is its image, as far behind the mirror as the way goes on; a ball shows it in itself.
     fn aims(&self) -> [Option<Aim>; 2] {
@@ -240,15 +284,20 @@ mod tests {
         (0..10_000).map(|i| end(at(i))).collect()
     }
 
+    /// Places by ends of 10,000 rays without gleams.
+    fn find(ends: &[RayEnd], width: f32) -> BrightPlaces {
+        BrightPlaces::find((ends, &[]), [10_000.0; 2], width)
+    }
+
     #[test]
     fn a_bright_place_is_found_where_it_is() {
-        let bright = BrightPlaces::find(&ends(500.0), 10_000.0, 1.0);
+        let bright = find(&ends(500.0), 1.0);
         let [patch] = bright.patches[..] else { panic!("one patch: {bright:?}") };
         assert!((Vec3::from(patch.position) - Vec3::new(0.31, 0.0, 0.29)).length() < 0.01, "{patch:?}");
         assert!(patch.radius > 0.1 && patch.radius < 0.16 && patch.normal == [0.0, 1.0, 0.0], "{patch:?}");
         assert!((patch.power / (500.0 * 0.01 * std::f32::consts::PI) - 1.0).abs() < 0.1, "{patch:?}");
         assert!((bright.other_light / std::f32::consts::PI - 1.0).abs() < 0.02, "{bright:?}");
-        let narrow = BrightPlaces::find(&ends(500.0), 10_000.0, 0.1).patches;
+        let narrow = find(&ends(500.0), 0.1).patches;
         assert!(narrow.len() > 3 && narrow.len() <= PATCHES, "{narrow:?}");
     }
 
@@ -259,13 +308,13 @@ mod tests {
         let on_strip = |end: &RayEnd| end.position.dot(vec3(along.x, 0.0, -along.z)).abs() < 0.01;
         let shine = |end: RayEnd| RayEnd { radiance: if on_strip(&end) { 500.0 } else { 1.0 }, ..end };
         let strip: Vec<RayEnd> = ends(1.0).into_iter().map(shine).collect();
-        let long = BrightPlaces::find(&strip, 10_000.0, 0.5).patches;
+        let long = find(&strip, 0.5).patches;
         assert!(long.len() > 2 && long.len() < 10, "{long:?}");
         for patch in &long {
             assert!(Vec3::from(patch.tangent).dot(along).abs() > 0.99, "{patch:?}");
             assert!(patch.narrow < 0.4 * patch.radius, "{patch:?}");
         }
-        let round = BrightPlaces::find(&ends(500.0), 10_000.0, 1.0).patches;
+        let round = find(&ends(500.0), 1.0).patches;
         assert!(round[0].narrow > 0.8 * round[0].radius, "control: {round:?}");
     }
 
@@ -278,7 +327,7 @@ mod tests {
         };
         let normal = |change: &dyn Fn(RayEnd) -> RayEnd| {
             let ends: Vec<RayEnd> = ends(500.0).into_iter().map(change).collect();
-            BrightPlaces::find(&ends, 10_000.0, 1.0).patches[0].normal
+            find(&ends, 1.0).patches[0].normal
         };
         assert_eq!(normal(&lit_from_below), [0.0, 1.0, 0.0]);
         assert_eq!(normal(&seen_from_below), [0.0, -1.0, 0.0]);
@@ -303,7 +352,7 @@ mod tests {
                 end(start(i), start(i).lerp(image, part), lamp(i))
             })
             .collect();
-        let bright = BrightPlaces::find(&in_mirror, 10_000.0, 0.5);
+        let bright = find(&in_mirror, 0.5);
         let [patch] = bright.patches[..] else { panic!("one image: {bright:?}") };
         assert!((Vec3::from(patch.position) - Vec3::new(-3.1, 0.02, 0.02)).length() < 0.01, "{patch:?}");
         assert!((Vec3::from(patch.normal) - Vec3::X).length() < 1e-3, "{patch:?}");
@@ -311,7 +360,7 @@ mod tests {
         let in_ball: Vec<RayEnd> = (0..25)
             .map(|i| end(start(i), Vec3::new(0.01 * (i % 4) as f32, 2.0, 0.01 * (i % 7) as f32), lamp(i)))
             .collect();
-        let bright = BrightPlaces::find(&in_ball, 10_000.0, 0.5);
+        let bright = find(&in_ball, 0.5);
         let [patch] = bright.patches[..] else { panic!("the ball: {bright:?}") };
         assert!((Vec3::from(patch.position) - Vec3::new(0.015, 2.0, 0.03)).length() < 0.01, "{patch:?}");
         assert_eq!(patch.normal, [0.0; 3], "it faces all sides");
@@ -326,8 +375,8 @@ mod tests {
 
     #[test]
     fn even_light_has_none() {
-        let even = BrightPlaces::find(&ends(7.0), 10_000.0, 1.0);
+        let even = find(&ends(7.0), 1.0);
         assert!(even.patches.is_empty() && even.other_light > std::f32::consts::PI, "{even:?}");
-        assert_eq!(BrightPlaces::find(&[], 0.0, 1.0), BrightPlaces::default());
+        assert_eq!(BrightPlaces::find((&[], &[]), [0.0; 2], 1.0), BrightPlaces::default());
     }
 }

@@ -135,16 +135,17 @@ impl CameraTracer {
     }
 
     /// Aims a part of the rays of final gathering, and of those that rough lobes send on, at bright
-    /// places; the latter at lamps in glass as well.
+    /// places; the latter at gleams and at lamps in glass as well.
     #[must_use]
     pub fn aiming_at(self, gpu: &Gpu, bright: &BrightPlaces) -> Self {
-        let all = [&bright.patches[..], &self.lamps.patches].concat();
+        let all = [&bright.patches[..], &bright.gleams, &self.lamps.patches].concat();
         let mut patches = [BrightPatch::default(); MAX_PATCHES];
         patches[..all.len()].copy_from_slice(&all);
         // Where no rays have looked, it is told by the lamps.
         let other_light = if bright.other_light > 0.0 { bright.other_light } else { self.lamps.mean_light };
         let [patches_of_rays, lobe_patches] = [bright.patches.len(), all.len()].map(|count| count as u32);
-        let view = CameraTile { patches: patches_of_rays, lobe_patches, other_light, ..self.view };
+        let sharp_glass = u32::from(!self.lamps.patches.is_empty());
+        let view = CameraTile { patches: patches_of_rays, lobe_patches, other_light, sharp_glass, ..self.view };
         Self { patches: gpu.uniform("bright patches", &patches), view, ..self }
     }
 

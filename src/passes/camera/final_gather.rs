@@ -14,7 +14,7 @@ use super::{
 use crate::{
     error::Result,
     gpu::{Buffer, Gpu, Kernel},
-    layout::{ArrivingLight, CameraTile, FinalStep, VisiblePoint, from_octahedral},
+    layout::{ArrivingLight, CameraTile, FinalStep, SEES_GLEAMS, VisiblePoint, from_octahedral},
     passes::wavefront::Step,
     reference::mix,
     settings::Sampler,
@@ -53,6 +53,8 @@ pub struct FinalGather {
     rays: u32,
     /// The sets of numbers that points share.
     sets: RaySets,
+    /// [`CameraTile::gathers`] of the rays.
+    gathers: u32,
     /// Indices of the points that rays start from.
     chosen: Buffer,
     /// Ends of rays: a [`VisiblePoint`] per ray, in the order of the chosen points. Its weight
@@ -97,6 +99,7 @@ impl FinalGather {
             kernels: FinalKernels::new(gpu, scene, sampler),
             rays,
             sets: RaySets::default(),
+            gathers: 1,
             chosen: gpu.storage::<u32>("points of final gathering", tracer.room())?,
             ends: gpu.storage::<VisiblePoint>("ends of final-gather rays", tracer.room())?,
             found: gpu.storage::<[f32; 4]>("light of final-gather rays", tracer.room())?,
@@ -116,6 +119,12 @@ impl FinalGather {
     #[must_use]
     pub fn joint(self) -> Self {
         Self { sets: RaySets::OfPicture, ..self }
+    }
+
+    /// Has rays see gleams, lights by way of mirrors, metal and glass.
+    #[must_use]
+    pub fn seeing_gleams(self) -> Self {
+        Self { gathers: SEES_GLEAMS, ..self }
     }
 
     /// Rays of each visible point.
@@ -144,7 +153,7 @@ impl FinalGather {
     ) -> Result<StepCount> {
         let view = tracer.tile_view(tile);
         let step = self.step(gpu, view.seed, rays);
-        let own = gpu.uniform("final gather tile", &rays_as_samples(tracer, &view, rays));
+        let own = gpu.uniform("final gather tile", &self.rays_as_samples(tracer, &view, rays));
         let started = [
             ("tile", &own),
             ("final_step", &step),
@@ -164,14 +173,17 @@ impl FinalGather {
         )
     }
 
-    /// Of each ray of a step its direction and the distance to its first surface, metres.
+    /// Of each ray of a step its direction, the distance to its first surface, metres, and what it
+    /// has found on its way.
     ///
     /// # Errors
     /// Faults of the driver.
-    pub fn legs(&self, gpu: &Gpu, rays: FinalRays) -> Result<Vec<(Vec3, f32)>> {
+    pub fn legs(&self, gpu: &Gpu, rays: FinalRays) -> Result<Vec<(Vec3, f32, Vec3)>> {
         let directions: Vec<[u32; 2]> = gpu.read(&self.directions, 0, rays.all().into())?;
         let found: Vec<[f32; 4]> = gpu.read(&self.found, 0, rays.all().into())?;
-        let leg = |([direction, _], [.., first]): ([u32; 2], [f32; 4])| (from_octahedral(direction), first);
+        let leg = |([direction, _], [r, g, b, first]): ([u32; 2], [f32; 4])| {
+            (from_octahedral(direction), first, Vec3::new(r, g, b))
+        };
         Ok(directions.into_iter().zip(found).map(leg).collect())
     }
 
@@ -216,7 +228,7 @@ impl FinalGather {
         (tile, rays): (&Tile, FinalRays),
         (ends, found): (&Buffer, &Buffer),
     ) -> Result<StepCount> {
-        let view = rays_as_samples(tracer, &tracer.tile_view(tile), rays);
+        let view = self.rays_as_samples(tracer, &tracer.tile_view(tile), rays);
         tracer.light_points(gpu, scene, &self.kernels.direct, &view, (ends, found, rays.all()))
     }
 
@@ -248,20 +260,20 @@ impl FinalGather {
         };
         gpu.uniform("final step", &step)
     }
-}
 
-/// The rays of a step as samples of the points that they start from. At glass, a ray chooses
-/// reflection or refraction at random: its numbers are none of those of camera paths.
-fn rays_as_samples(tracer: &CameraTracer, view: &CameraTile, rays: FinalRays) -> CameraTile {
-    CameraTile {
-        seed: mix(view.seed ^ mix(1)),
-        branches: 1,
-        first_sample: rays.first,
-        samples: rays.count,
-        gathers: 1,
-        listed: 0,
-        listed_at: tracer.wavefront.lists.keys_at(),
-        square_bits: 0,
-        ..*view
+    /// The rays of a step as samples of the points that they start from. At glass, a ray chooses
+    /// reflection or refraction at random: its numbers are none of those of camera paths.
+    fn rays_as_samples(&self, tracer: &CameraTracer, view: &CameraTile, rays: FinalRays) -> CameraTile {
+        CameraTile {
+            seed: mix(view.seed ^ mix(1)),
+            branches: 1,
+            first_sample: rays.first,
+            samples: rays.count,
+            gathers: self.gathers,
+            listed: 0,
+            listed_at: tracer.wavefront.lists.keys_at(),
+            square_bits: 0,
+            ..*view
+        }
     }
 }
