@@ -210,9 +210,11 @@ impl<'a> CameraPass<'a> {
         Self { final_gather: self.final_gather.map(FinalGather::joint), ..self }
     }
 
-    /// Has rays of final gathering see gleams, lights by way of mirrors, metal and glass.
+    /// Has rays of final gathering see gleams, lights by way of mirrors, metal and glass, where
+    /// there are rough lobes to show them.
     pub fn seeing_gleams(self) -> Self {
-        Self { final_gather: self.final_gather.map(FinalGather::seeing_gleams), ..self }
+        let sees = |gather: FinalGather| if self.scene.materials.has_rough { gather.seeing_gleams() } else { gather };
+        Self { final_gather: self.final_gather.map(sees), ..self }
     }
 
     /// Aims a part of the rays at bright places.

@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | emission | photon paths follow the balance heuristic over overlapping targets | a smaller target |
 //! | emitters | directions follow the density that `arriving_at` returns | lamps chosen for another normal |
+//! | strips | light from strips nearby has little noise, on diffuse surfaces and in narrow lobes | even points of the strip, by area or by solid angle |
 //! | weights | of a direction to a lamp and one by the cosine sum to one | densities for another normal |
 
 use std::f64::consts::PI;
@@ -124,9 +125,21 @@ const OTHER: Vec3 = vec3(-0.6, 0.64, -0.48);
 /// (negative where hidden), and as evaluated for a ray that hits the lamp, for the normal
 /// `met_for`.
 fn drawn_and_met(lamps: &Lamps, samples: &[Row], drawn_for: Vec3, met_for: Vec3) -> Vec<([f32; 4], f32)> {
+    drawn_and_met_with(&[], lamps, samples, drawn_for, met_for)
+}
+
+/// The same with values of constants of the probes.
+fn drawn_and_met_with(
+    constants: &[(&str, f64)],
+    lamps: &Lamps,
+    samples: &[Row],
+    drawn_for: Vec3,
+    met_for: Vec3,
+) -> Vec<([f32; 4], f32)> {
     let buffers = upload(&lamps.scene, LightSampling::Power);
     assert_eq!(buffers.lights.table.lights.len(), lamps.count);
-    let run = |stem: &str, rows: &[Row]| Probe::of_scene(stem, &buffers, &buffers.lights.photons).run(rows);
+    let scene = (&buffers, &buffers.lights.photons);
+    let run = |stem: &str, rows: &[Row]| Probe::with_constants(stem, constants, scene).run(rows);
     let of = |a: [f32; 4], first: f32, normal: Vec3| [a, [first, normal.x, normal.y, normal.z]];
     let samples: Vec<Row> = samples.iter().map(|row| of(row[0], row[1][0], drawn_for)).collect();
     let drawn = run("probe_emitter", &samples);
@@ -194,6 +207,52 @@ fn strips_nearby_light_a_surface_with_little_noise() {
     let (right, control) = of(&(0..100_000).map(by_area).collect::<Vec<_>>());
     assert!(within(found, right, 0.005), "{found} instead of {right}");
     assert!(noise < 0.1 && control > 2.5, "{noise}, and {control} of even points of the strip");
+}
+
+#[test]
+fn strips_in_narrow_lobes_have_little_noise() {
+    // 3 m long and 1 cm wide, 1 m above; the viewer of `probe_emitter`, and the floor's lobe.
+    let (height, half, from, width, alpha) = (1.0, 1.5, -0.8, 0.01, 0.08);
+    let view = DVec3::new(-0.6, 0.64, 0.48);
+    // Microfacets of GGX (Walter et al. 2007, equation 33) that send light from there to the viewer.
+    let shown = |d: DVec3| {
+        let cosine = (view + d.normalize()).normalize().y;
+        f64::from(alpha).powi(2) / (1.0 - cosine.powi(2) + (f64::from(alpha) * cosine).powi(2)).powi(2)
+    };
+    let strip = |turned: bool| {
+        let mut scene = scene(&[]);
+        scene.materials.push(emissive("strip", 0.0, 1.0, false));
+        let corner = vec3(-half, height, from);
+        let (along, across) = (2.0 * half * Vec3::X, width * Vec3::Z);
+        // Cut by its other diagonal, and with the corners of its triangles in another order.
+        match turned {
+            false => add_quad(&mut scene, corner, along, across, 0),
+            true => add_quad(&mut scene, corner + along, across, -along, 0),
+        }
+        Lamps { scene, count: 2 }
+    };
+    let light = |slices: f64, turned: bool| {
+        let constants = [("PROBED_ALPHA", f64::from(alpha)), ("LIGHT_SLICES", slices)];
+        let drawn = drawn_and_met_with(&constants, &strip(turned), &lamp_samples(), Vec3::Y, Vec3::Y);
+        let differ = drawn.iter().filter(|(d, met)| !within((*met).into(), d[3].into(), 0.01)).count();
+        assert!(differ < SAMPLES / 500, "{differ} directions have another density where a ray meets the strip");
+        let of = |(d, _): &([f32; 4], f32)| shown(Vec3::from_slice(d).as_dvec3()) / f64::from(d[3]);
+        let all: Vec<f64> = drawn.iter().map(of).collect();
+        let mean = |power: i32| all.iter().map(|x| x.powi(power)).sum::<f64>() / all.len() as f64;
+        (mean(1), mean(2) / mean(1).powi(2) - 1.0)
+    };
+    let by_area = |i: u32| {
+        let x = f64::from(2.0 * half) * ((f64::from(i) + 0.5) / 1e5 - 0.5);
+        let to = DVec3::new(x, height.into(), f64::from(from + 0.5 * width));
+        shown(to) * f64::from(2.0 * half * width * height) / to.length().powi(3)
+    };
+    let right = (0..100_000).map(by_area).sum::<f64>() / 1e5;
+    let (_, control) = light(0.0, false);
+    for turned in [false, true] {
+        let (found, noise) = light(16.0, turned);
+        assert!(within(found, right, 0.01), "{found} instead of {right}");
+        assert!(noise < 0.2 * control, "{noise}, and {control} of points of even solid angle");
+    }
 }
 
 /// Weights of directions drawn with the first density, where another technique draws them with the

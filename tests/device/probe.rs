@@ -28,7 +28,12 @@ impl<'s> Probe<'s> {
     }
 
     pub fn of_scene(stem: &str, buffers: &'s SceneBuffers, choices: &'s ChoiceBuffer) -> Self {
-        Self { kernel: buffers.kernel_of(gpu(), find(stem), &[]), scene: Some((buffers, choices)) }
+        Self::with_constants(stem, &[], (buffers, choices))
+    }
+
+    /// With values of constants of the shader.
+    pub fn with_constants(stem: &str, constants: &[(&str, f64)], scene: (&'s SceneBuffers, &'s ChoiceBuffer)) -> Self {
+        Self { kernel: scene.0.kernel_of(gpu(), find(stem), constants), scene: Some(scene) }
     }
 
     pub fn run(&self, rows: &[Row]) -> Vec<[f32; 4]> {

@@ -109,14 +109,14 @@ impl BrightPlaces {
     /// Finds places and gleams in cells of at least that width by the ends of `rays` rays from all
     /// over the picture each; those that met nothing are left out.
     #[must_use]
-    pub fn find((ends, gleams): (&[RayEnd], &[RayEnd]), rays: [f64; 2], width: f32) -> Self {
+    pub fn find((ends, of_gleams): (&[RayEnd], &[RayEnd]), rays: [f64; 2], width: f32) -> Self {
         let mean = mean_radiance(ends, rays[0]);
         let places = Patches::find(ends, (rays[0], OtherLight::default()), (width, PATCHES));
         let squares = (places.all - places.squares) / rays[0].max(1.0);
-        let gleams = Patches::find(gleams, (rays[1], OtherLight { mean, squares }), (width, GLEAMS));
+        let gleams = Patches::find(of_gleams, (rays[1], OtherLight { mean, squares }), (width, GLEAMS));
         Self {
             other_light: irradiance(mean - places.light / rays[0].max(1.0)),
-            is_uneven: is_uneven(ends, rays[0]),
+            is_uneven: is_uneven([(ends, rays[0]), (of_gleams, rays[1])]),
             patches: places.patches,
             gleams: gleams.patches,
         }
@@ -162,7 +162,11 @@ impl Patches {
             let brightest = (0..cells.len())
                 .filter(|i| cells[*i].left >= MIN_ENDS)
                 .max_by(|a, b| cells[*a].squares.total_cmp(&cells[*b].squares).then(b.cmp(a)));
-            let Some(brightest) = brightest.filter(|i| cells[*i].squares > LEAST_OF_PATCH * (all + rays * other.squares)) else { break };
+            let Some(brightest) =
+                brightest.filter(|i| cells[*i].squares > LEAST_OF_PATCH * (all + rays * other.squares))
+            else {
+                break;
+            };
             let taken: Vec<(usize, Aim)> =
                 std::mem::take(&mut cells[brightest].ends).into_iter().filter(|(i, _)| is_left[*i]).collect();
             for (i, _) in &taken {
@@ -190,10 +194,12 @@ fn irradiance(radiance: f64) -> f32 {
     (std::f64::consts::PI * radiance.max(0.0)) as f32
 }
 
-/// Whether few of so many rays bring most of the light.
-fn is_uneven(ends: &[RayEnd], rays: f64) -> bool {
-    let mean_square = ends.iter().map(|end| end.radiance * end.radiance).sum::<f64>() / rays.max(1.0);
-    mean_square > UNEVEN * mean_radiance(ends, rays).powi(2)
+/// Whether few rays bring most of the light of ends of so many rays each.
+fn is_uneven(light: [(&[RayEnd], f64); 2]) -> bool {
+    let squares = |ends: &[RayEnd]| ends.iter().map(|end| end.radiance * end.radiance).sum::<f64>();
+    let mean_square: f64 = light.iter().map(|(ends, rays)| squares(ends) / rays.max(1.0)).sum();
+    let mean: f64 = light.iter().map(|(ends, rays)| mean_radiance(ends, *rays)).sum();
+    mean_square > UNEVEN * mean.powi(2)
 }
 
 impl RayEnd {
@@ -369,8 +375,12 @@ mod tests {
     #[test]
     fn light_of_few_rays_is_uneven() {
         // A place of a fourhundredth of the floor.
-        assert!(is_uneven(&ends(500.0), 10_000.0));
-        assert!(!is_uneven(&ends(10.0), 10_000.0) && !is_uneven(&[], 0.0));
+        let uneven = |ends: &[RayEnd], gleams: &[RayEnd]| is_uneven([(ends, 10_000.0), (gleams, 10_000.0)]);
+        assert!(uneven(&ends(500.0), &[]));
+        assert!(!uneven(&ends(10.0), &[]) && !uneven(&[], &[]));
+        // And a lamp that one of a thousand rays sees in a metal shade.
+        let gleam = |radiance| [RayEnd { radiance, ..ends(1.0)[0] }; 10];
+        assert!(uneven(&ends(1.0), &gleam(300.0)) && !uneven(&ends(1.0), &gleam(100.0)));
     }
 
     #[test]

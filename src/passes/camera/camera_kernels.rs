@@ -3,7 +3,7 @@
 use super::direct_light::DirectLighting;
 use crate::{
     gpu::{Gpu, Kernel},
-    settings::PhotonSettings,
+    settings::{PhotonSettings, Sampler},
     upload::{SceneBuffers, sampler_constant},
 };
 
@@ -24,7 +24,7 @@ impl CameraKernels {
         let sampler = sampler_constant(photons.sampler);
         let shows = photons.mode.sees_lights();
         let sees_lights = ("SEES_LIGHTS", f64::from(u8::from(shows)));
-        let lobes = (scene.materials.has_rough && shows).then(|| scene.kernel_with(gpu, "light_lobes", &[sampler]));
+        let lobes = shows.then(|| lobe_lighting(gpu, scene, photons.sampler)).flatten();
         Self {
             start: scene.kernel_with(gpu, "start_camera", &[sampler]),
             trace: scene.kernel_with(gpu, "trace_camera", &[sampler, sees_lights]),
@@ -38,4 +38,14 @@ impl CameraKernels {
     pub fn prefetch(gpu: &Gpu, scene: &SceneBuffers, photons: &PhotonSettings, light_samples: u32) {
         let _ = Self::new(gpu, scene, photons, light_samples);
     }
+}
+
+/// Slices of a triangle that narrow lobes see a small part of.
+const LIGHT_SLICES: u32 = 16;
+
+/// The kernel of direct light at rough lobes, if there are any.
+pub(super) fn lobe_lighting(gpu: &Gpu, scene: &SceneBuffers, sampler: Sampler) -> Option<Kernel> {
+    let slices = if scene.lights.table.has_surfaces() { LIGHT_SLICES } else { 0 };
+    let constants = [sampler_constant(sampler), ("LIGHT_SLICES", slices.into())];
+    scene.materials.has_rough.then(|| scene.kernel_with(gpu, "light_lobes", &constants))
 }

@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::{
+    camera_kernels::lobe_lighting,
     camera_tracer::CameraTracer,
     direct_light::DirectLighting,
     ray_keys::RaySets,
@@ -39,7 +40,7 @@ impl FinalKernels {
             start: scene.kernel_with(gpu, "start_final_gather", &[constant]),
             trace: scene.kernel_with(gpu, "trace_camera", &[constant, ("SEES_LIGHTS", 1.0)]),
             sum: Kernel::new(gpu, "sum_final_gather", &[]),
-            lobes: (scene.materials.has_rough).then(|| scene.kernel_with(gpu, "light_lobes", &[constant])),
+            lobes: lobe_lighting(gpu, scene, sampler),
             direct: DirectLighting::new(gpu, scene, sampler, 1),
         }
     }
