@@ -212,12 +212,13 @@ fn strips_nearby_light_a_surface_with_little_noise() {
 #[test]
 fn strips_in_narrow_lobes_have_little_noise() {
     // 3 m long and 1 cm wide, 1 m above; the viewer of `probe_emitter`, and the floor's lobe.
-    let (height, half, from, width, alpha) = (1.0, 1.5, -0.8, 0.01, 0.08);
+    let (height, half, from, width, alpha) = (1.0, 1.5, -0.8, 0.01, 0.08_f64);
     let view = DVec3::new(-0.6, 0.64, 0.48);
-    // Microfacets of GGX (Walter et al. 2007, equation 33) that send light from there to the viewer.
+    // Microfacets of GGX (Walter et al. 2007, equation 33) that send light from there to the
+    // viewer.
     let shown = |d: DVec3| {
         let cosine = (view + d.normalize()).normalize().y;
-        f64::from(alpha).powi(2) / (1.0 - cosine.powi(2) + (f64::from(alpha) * cosine).powi(2)).powi(2)
+        alpha.powi(2) / (1.0 - cosine.powi(2) + (alpha * cosine).powi(2)).powi(2)
     };
     let strip = |turned: bool| {
         let mut scene = scene(&[]);
@@ -232,7 +233,7 @@ fn strips_in_narrow_lobes_have_little_noise() {
         Lamps { scene, count: 2 }
     };
     let light = |slices: f64, turned: bool| {
-        let constants = [("PROBED_ALPHA", f64::from(alpha)), ("LIGHT_SLICES", slices)];
+        let constants = [("PROBED_ALPHA", alpha), ("LIGHT_SLICES", slices)];
         let drawn = drawn_and_met_with(&constants, &strip(turned), &lamp_samples(), Vec3::Y, Vec3::Y);
         let differ = drawn.iter().filter(|(d, met)| !within((*met).into(), d[3].into(), 0.01)).count();
         assert!(differ < SAMPLES / 500, "{differ} directions have another density where a ray meets the strip");
