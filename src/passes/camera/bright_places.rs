@@ -1,6 +1,7 @@
 //! Small bright places from which much of a picture's indirect light comes: the wall behind a lamp,
 //! a caustic. Rays of final gathering are aimed at them, for few of those by the cosine find one,
-//! and each brings much.
+//! and each brings much. Rays of rough lobes are too, and at gleams: mirrors, metal and glass that
+//! show a light.
 
 use std::collections::BTreeMap;
 
