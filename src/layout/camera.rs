@@ -145,7 +145,9 @@ pub struct CameraTile {
     pub lobe_patches: u32,
     /// 1: glass beyond wide lobes is as narrow as it is, for these aim at lamps in it.
     pub sharp_glass: u32,
-    pub pad1: u32,
+    /// Of wide coats, rays of final gathering of their point bring the light. 0: no; 1: but for
+    /// lights by way of mirrors and glass, see `GATHERED_COAT`; 2: there are no such.
+    pub gathers_coats: u32,
     pub pad2: u32,
 }
 
@@ -197,13 +199,17 @@ pub struct FinalStep {
     pub chosen: u32,
     /// Of the directions in which they start.
     pub seed: u32,
-    pub pad0: u32,
+    /// 1: they bring irradiance by the geometric normal, and what the point's coat reflects of it.
+    pub for_records: u32,
     pub pad1: u32,
     pub pad2: u32,
 }
 
 /// [`CameraTile::gathers`] of rays of final gathering that see gleams.
 pub const SEES_GLEAMS: u32 = 2;
+
+/// [`CameraTile::gathers_coats`] where no light comes by way of mirrors and glass.
+pub const NO_LIGHTS_LEFT: u32 = 2;
 
 /// Bright patches of a picture at most, gleams and lamps in glass among them.
 pub const MAX_PATCHES: usize = 160;
@@ -240,6 +246,9 @@ pub struct ArrivingLight {
     pub fluence: [f32; 3],
     /// Inverse distances to what was hit, 1/m.
     pub nearness: f32,
+    /// Of a coat, over its albedo: radiance that it reflects to the viewer, W/(m² sr), and inverse
+    /// distances to what was hit, as it sees them, 1/m. The latter is 0 where there is no such coat.
+    pub coat: [f32; 4],
 }
 
 /// Sums over a tile's samples of one pixel, by rows. The first row is the radiance, and the number

@@ -31,6 +31,11 @@ pub struct IrradianceRecord {
     pub irradiance: [f32; 3],
     /// Fraction of the filter's radius up to which the record is taken.
     pub reach: f32,
+    /// Radiance that the coat reflects to the viewer, over its albedo, W/(m² sr). Negative: it has
+    /// none of which rays of final gathering bring the light.
+    pub coat: [f32; 3],
+    /// As `reach`, of the coat: narrow lobes show details of what is near.
+    pub coat_reach: f32,
 }
 
 /// The directions from which the light of an [`IrradianceRecord`] comes, of each colour four

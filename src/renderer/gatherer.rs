@@ -3,7 +3,7 @@
 
 use super::{
     maps::PhotonMaps,
-    preview::{bare, bright_places, ends_of_rays},
+    preview::{bright_places, ends_of_rays},
     searches::Searches,
     tally,
     tiles::{CameraPass, Gatherer},
@@ -206,11 +206,8 @@ impl Gatherer for MapGatherer<'_> {
         coarse.for_each_tile(None, stats, progress, &mut |tile, stats, _| {
             let (points, light, arriving, count) = timed(&mut stats.seconds.gather, || {
                 self.light_blurred(coarse, tile);
-                // Irradiance itself, by the geometric normal.
-                let mut points = coarse.points(tile)?;
-                points.iter_mut().for_each(|point| *point = VisiblePoint { ns: point.ng, ..bare(point) });
+                let points = coarse.points(tile)?;
                 coarse.clear_arriving();
-                coarse.set_points(&points);
                 coarse.set_radiance(&vec![[0.0; 4]; points.len()]);
                 let mut report = |rays: u32| {
                     rays_done += u64::from(rays);

@@ -322,15 +322,18 @@ impl<'a> Session<'a> {
                 gatherer.prepare_aimed(&preview(PREVIEW_RAYS[0])?.aiming_at(&bright), &mut stats, progress)?;
             }
         }
-        if estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty() {
+        let keeps_records = estimate.gather_spacing > 0 && pass.final_rays() > 0 && !maps.maps().is_empty();
+        if keeps_records {
             let coarse = coarser(picture, &pass, estimate);
             let single = EstimateSettings { share_reach: 0.0, ..estimate.clone() };
             let records = CameraPass::new(self.gpu, scene, camera, maps.settings(), &single, &coarse)?;
             let index = maps.first_sample.map(|first| first / picture.spp).filter(|index| *index > 0);
-            let records = records.of_pass(&coarse, index)?.with_joint_rays().seeing_by_cells(gatherer.blur());
+            let records = records.of_pass(&coarse, index)?.with_joint_rays().gathering_coats();
+            let records = records.seeing_by_cells(gatherer.blur());
             let records = records.aiming_at(&gatherer.bright_places());
             gatherer.keep_records(&records, pass.size, &mut stats, progress)?;
         }
+        let pass = if keeps_records { pass.gathering_coats() } else { pass };
         let pass = pass.seeing_by_cells(gatherer.blur()).aiming_at(&gatherer.bright_places());
         let films = pass.render(gatherer, stage, &mut stats, progress)?;
         Ok((films, stats))

@@ -198,11 +198,26 @@ impl<'a> CameraPass<'a> {
     /// Leaves points that are seen as blurred as that, metres, to the gatherer's cells; 0: none.
     /// Layers of components and of estimates are about each point.
     pub fn seeing_by_cells(mut self, blur: f32) -> Self {
-        let is_apart = [ExtraLayers::Components, ExtraLayers::Estimates].iter().any(|l| self.layers.contains(l));
-        if !is_apart {
+        if !self.is_apart() {
             self.tracer.see_by_cells(blur);
         }
         self
+    }
+
+    /// Has rays of final gathering bring the light of wide coats too, where the picture shows all
+    /// light: see [`CameraTile::gathers_coats`](crate::layout::CameraTile::gathers_coats). Layers of
+    /// components and of estimates are about each way of light.
+    pub fn gathering_coats(mut self) -> Self {
+        if self.direct && self.final_rays() > 0 && self.scene.materials.has_rough && !self.is_apart() {
+            let others = self.obstacles.scene.has_light_beside_gathers() || self.scene.has_veils();
+            self.tracer.gather_coats(others);
+        }
+        self
+    }
+
+    /// Whether layers ask for each point and each way of light by itself.
+    fn is_apart(&self) -> bool {
+        [ExtraLayers::Components, ExtraLayers::Estimates].iter().any(|layer| self.layers.contains(layer))
     }
 
     /// Makes the rays of final gathering of all points one set of numbers.

@@ -102,6 +102,13 @@ impl Scene {
         self.uses_material(|i, _| casts[i])
     }
 
+    /// Whether some light reaches coats in ways that rays of final gathering leave to others: by
+    /// mirrors, metal and glass that cast caustics, and from unlit surfaces.
+    #[must_use]
+    pub fn has_light_beside_gathers(&self) -> bool {
+        self.has_specular() || self.uses_material(|_, material| material.unlit)
+    }
+
     /// For each material, whether what it reflects or transmits is sharp enough for caustics
     /// somewhere: mirrors, metals, glass and panes up to [`LoadOptions::caustic_roughness`], and
     /// [small glass](Self::small_glass). For one point `shaders/lib/transport/material.wesl`

@@ -60,12 +60,12 @@ fn twins() -> Vec<Twin> {
         Counters { current, next, staged, lost, rays, rays_high, media_overflows, unfinished, non_finite, lost_high, shadow_rays, reads, further_rays }
         PhotonBatch { seed, first_round, first_round_high, paths, light_count, strata, first_stratum, max_bounces, rules, staging_capacity, lost_scale, stream, first_target, target_count, max_surfaces, least_kept, aim, kept_scale, entry_count, pad0, pad1 }
         Store { staged, first_photon, photons, kind }
-        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, gathers, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, cells_from, listed, listed_at, left_out, shift, square_bits, patches, other_light, merges_layers, lobe_patches, sharp_glass, pad1, pad2 }
-        FinalStep { first_ray, rays_now, rays, chosen, seed, pad0, pad1, pad2 }
+        CameraTile { position, seed, right, width, up, height, forward, spp, first_column, first_row, first_sample, samples, gathers, branches, pixels, parallel, lens_radius, focus, filter_steps, margin, media, near_depth, far_depth, start_depth, cells_from, listed, listed_at, left_out, shift, square_bits, patches, other_light, merges_layers, lobe_patches, sharp_glass, gathers_coats, pad2 }
+        FinalStep { first_ray, rays_now, rays, chosen, seed, for_records, pad1, pad2 }
         BrightPatch { position, radius, normal, power, tangent, narrow }
         CellGrid { per_metre, levels, mask, points, next_map, pad0, pad1, pad2 }
-        ArrivingLight { red, green, blue, fluence, nearness }
-        IrradianceRecord { position, ng, irradiance, reach }
+        ArrivingLight { red, green, blue, fluence, nearness, coat }
+        IrradianceRecord { position, ng, irradiance, reach, coat, coat_reach }
         LightDirections { red, green, blue, open_reach }
         RecordGrid { first_column, first_row, columns, rows, columns_per_pixel, rows_per_pixel, reach, footprint }
         IrradianceCell { coordinates, level, position, split, normal, narrow, irradiance, pad }
@@ -195,6 +195,7 @@ fn constants() -> Vec<(&'static str, f64)> {
         CAUSTICS_APART,
         MAX_PATCHES,
         SEES_GLEAMS,
+        NO_LIGHTS_LEFT,
         MAX_TARGETS,
         WHOLE_CELL,
         SPLIT_CELL,

@@ -9,6 +9,7 @@ mod crops;
 mod extremes;
 mod few_photons;
 mod flat_surfaces;
+mod gathered_coats;
 mod instances;
 mod lights;
 mod material_references;

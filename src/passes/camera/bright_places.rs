@@ -181,8 +181,21 @@ impl Patches {
             }
             patches.extend(patch(&taken.iter().map(|(i, aim)| (*aim, ends[*i].radiance)).collect::<Vec<_>>()));
         }
-        Self { patches, light, squares, all }
+        Self { patches: in_a_row(patches), light, squares, all }
     }
+}
+
+/// Each patch behind the one that it is nearest to: they are drawn in this order, and numbers near
+/// each other stay so.
+fn in_a_row(mut patches: Vec<BrightPatch>) -> Vec<BrightPatch> {
+    let position = |patch: &BrightPatch| Vec3::from(patch.position);
+    for last in 1..patches.len() {
+        let here = position(&patches[last - 1]);
+        let distance = |i: &usize| here.distance_squared(position(&patches[*i]));
+        let next = (last..patches.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        patches.swap(last, next.unwrap_or(last));
+    }
+    patches
 }
 
 /// Over all rays, of which those that met nothing are left out.

@@ -257,6 +257,7 @@ impl FinalGather {
             rays: rays.each,
             chosen: rays.chosen,
             seed,
+            for_records: u32::from(self.sets == RaySets::OfPicture),
             ..Default::default()
         };
         gpu.uniform("final step", &step)

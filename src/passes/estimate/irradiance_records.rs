@@ -25,10 +25,15 @@ pub fn filter_footprint(radius: f32, spacing: u32) -> u32 {
 /// Largest reach of a record: that of the widest filter, `MAX_RADIUS` in `filter_irradiance.wesl`.
 const MAX_REACH: f32 = 8.0;
 
-/// A slot without a point.
-const NO_RECORD: IrradianceRecord = IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], reach: 0.0 };
+/// Reach of a coat's record as a fraction of that of irradiance, of a lobe of width 1: what it shows
+/// is blurred over twice its width times the distance, and the filter adds little to that.
+const COAT_REACH: f32 = 0.3;
 
-/// Slots of records of a picture at most: 128 MiB in a table.
+/// A slot without a point.
+const NO_RECORD: IrradianceRecord =
+    IrradianceRecord { position: [0.0; 3], ng: 0, irradiance: [-1.0; 3], reach: 0.0, coat: [-1.0; 3], coat_reach: 0.0 };
+
+/// Slots of records of a picture at most: 192 MiB in a table.
 const MAX_RECORDS: u64 = 1 << 22;
 
 /// Pixels between the points of final gathering: more than asked for where the whole picture would
@@ -52,6 +57,8 @@ pub struct Records {
     directions: Vec<LightDirections>,
     /// Harmonic mean distance of each point to what is around it, metres.
     distances: Vec<f32>,
+    /// The same as coats see it, times the width of their lobes.
+    coat_distances: Vec<f32>,
 }
 
 impl Records {
@@ -66,6 +73,7 @@ impl Records {
             records: vec![NO_RECORD; slots],
             directions: vec![LightDirections::default(); slots],
             distances: vec![f32::INFINITY; slots],
+            coat_distances: vec![f32::INFINITY; slots],
         }
     }
 
@@ -94,6 +102,8 @@ impl Records {
             ng: octahedral(point.ng.into()),
             irradiance: [light[0], light[1], light[2]],
             reach: 0.0,
+            coat: coat(light, arriving),
+            coat_reach: 0.0,
         };
         let [red, green, blue] = arriving.fluence;
         self.directions[slot] = LightDirections {
@@ -103,6 +113,8 @@ impl Records {
             open_reach: 0.0,
         };
         self.distances[slot] = rays as f32 / arriving.nearness;
+        let [.., roughness] = point.above.to_le_bytes().map(|byte| f32::from(byte) / 255.0);
+        self.coat_distances[slot] = COAT_REACH * roughness * roughness / arriving.coat[3];
     }
 
     /// All records, with their reach: that fraction of the distance to what is around each, and no
@@ -119,11 +131,12 @@ impl Records {
         let reaches = |(slot, wall): (usize, f32)| {
             let (distance, radius) = (self.distance(slot), radius(self.records[slot].position.into()));
             let reach = |metres: f32| (metres / radius).clamp(1e-3, MAX_REACH);
-            (reach(wall.min(fraction * distance)), reach(fraction * distance))
+            [wall.min(fraction * distance), fraction * distance, fraction * self.coat_distances[slot]].map(reach)
         };
         let reaches: Vec<_> = walls.into_par_iter().enumerate().map(reaches).collect();
-        for (slot, (reach, open_reach)) in reaches.into_iter().enumerate() {
+        for (slot, [reach, open_reach, coat_reach]) in reaches.into_iter().enumerate() {
             self.records[slot].reach = reach;
+            self.records[slot].coat_reach = coat_reach;
             self.directions[slot].open_reach = open_reach;
         }
         // All that lies beyond the grid has the slot behind all others.
@@ -148,6 +161,15 @@ impl Records {
             .map(|(record, distance)| distance + here.distance(record.position.into()))
             .fold(self.distances[slot], f32::min)
     }
+}
+
+/// What a coat reflects, of all the light at a point: that of ends which were lit later was not
+/// there when rays were added up.
+fn coat(all: [f32; 4], arriving: &ArrivingLight) -> [f32; 3] {
+    let [.., nearness] = arriving.coat;
+    let added = [arriving.red, arriving.green, arriving.blue].map(|[.., light]| light);
+    let part = |c: usize| if added[c] > 0.0 { arriving.coat[c] * (all[c] / added[c]) } else { 0.0 };
+    if nearness > 0.0 { [part(0), part(1), part(2)] } else { [-1.0; 3] }
 }
 
 /// A number up to 1 in size, signed and normalised, in eight bits.
