@@ -72,7 +72,7 @@ fn narrow_lobes_keep_their_samples() {
     let right = render_scene(&scene, &sampled(0, 256));
     let (aimed, plain) = (render_scene(&scene, &sampled(16, 4)), render_scene(&scene, &sampled(0, 4)));
     let (found, control) = (error(&aimed, &right), error(&plain, &right));
-    assert!(found < 1.2 * control && found > 0.5 * control, "{found}, and {control} where nothing is aimed");
+    assert!(found < 1.2 * control && found > 0.3 * control, "{found}, and {control} where nothing is aimed");
 }
 
 /// A room of 2 m with a dark wall under a rough coat, and a small lamp in a square reflector of

@@ -125,12 +125,29 @@ fn meshes_that_are_no_clean_solids_are_named_and_never_too_bright() {
             "is thinner than rounding",
         ),
         ("with a rim thinner than rounding", Mesh::lathe(Vec3::ZERO, &rimmed, 12), ""),
+        ("divided", divided(1), "has faces inside that divide it"),
+        ("divided twice", divided(2), "has faces inside that divide it"),
     ] {
         let scene = assert_white(name, &[(mesh, 0)], &glasses);
         let about: Vec<_> = scene.warnings.iter().filter(|line| line.contains("its glass")).collect();
         assert_eq!(about.len(), usize::from(!said.is_empty()), "{name}: {about:?}");
         assert!(about.iter().all(|line| line.contains(said) && line.contains("part 0")), "{name}: {about:?}");
     }
+}
+
+/// A block of 2 x 1 x 1, in it so many faces from edge to edge.
+fn divided(dividers: u32) -> Mesh {
+    let at = |i: u32| -1.0 + 2.0 * i as f32 / (dividers + 1) as f32;
+    let mut whole = Mesh::default();
+    for i in 0..=dividers {
+        let mut cell = Mesh::block(vec3(at(i), -0.5, -0.5), vec3(at(i + 1), 0.5, 0.5));
+        if i > 0 {
+            // The cell before has that face.
+            cell.triangles.drain(..2);
+        }
+        whole = whole.with(&cell);
+    }
+    whole
 }
 
 /// The pixels of a picture over a horizon.
@@ -164,6 +181,13 @@ fn unclean_solids_look_as_the_clean_one() {
     for (name, other) in [("cavity of the mesh", &cavity), ("cavity as a mesh of its own", &apart)] {
         assert!(difference(&bubble, other) < 1e-3, "{name}");
     }
+    let block = of(&[(Mesh::block(vec3(-1.0, -0.5, -0.5), vec3(1.0, 0.5, 0.5)), 0)]);
+    for dividers in [1, 2] {
+        assert!(difference(&block, &of(&[(divided(dividers), 0)])) < 1e-3, "{dividers} dividers");
+    }
+    let mut open = divided(1);
+    open.triangles.drain(4..6);
+    assert!(difference(&block, &of(&[(open, 0)])) > 0.1, "control: a side is missing");
     // The same in an exact sphere.
     let in_sphere = |mesh: Mesh, material: usize| {
         let mut file = file_of(&[(mesh, material)], &glasses);

@@ -22,6 +22,9 @@ const MOST_PATHS: f64 = 20.0;
 /// Paths of scenes with fewer are aimed at spheres, which pays for parallel light most.
 const LEAST_NEEDED: f64 = 1.0 / 2048.0;
 const LEAST_NEEDED_OF_FAR: f64 = 1.0 / 64.0;
+/// Part of the maps that the most paths fill at least if all photons are stored. Where fewer meet
+/// anything, as from lamps that stand around a scene far away, they are aimed at spheres.
+const LEAST_FILLED: f64 = 0.25;
 /// Greatest fraction of the photons that are stored by importance. Of maps that need more, all
 /// photons are stored.
 const MOST_STORED: f64 = 0.5;
@@ -70,6 +73,9 @@ impl Pilot {
         let total: f64 = self.clusters.iter().map(|cluster| cluster.power).sum();
         let by_power: Vec<f64> = self.clusters.iter().map(|cluster| cluster.power / total).collect();
         let reference = self.middle_importance(&by_power)?;
+        if most_paths < LEAST_FILLED {
+            return None;
+        }
         let most_paths = most_paths.clamp(1.0, MOST_PATHS);
         // All photons that are likely to be stored count: of those that are needed most, the pilot
         // may have too few to tell the lights apart.
@@ -242,5 +248,7 @@ mod tests {
         assert!(pilot(&[(true, 100, 1.0), (false, 500, 1.0)]).steering(true, 100.0).is_some());
         assert_eq!(pilot(&[(true, 15, 1.0)]).steering(true, 100.0), None);
         assert_eq!(pilot(&[]).steering(true, 100.0), None);
+        let starved = |most_paths| pilot(&[(false, 500, 1.0)]).steering(true, most_paths);
+        assert!(starved(0.1).is_none() && starved(0.5).is_some(), "most paths meet nothing");
     }
 }

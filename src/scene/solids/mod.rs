@@ -9,6 +9,7 @@
 mod cavities;
 mod closed_lamps;
 mod covers;
+mod dividers;
 mod plates;
 mod rank;
 mod repair;

@@ -8,6 +8,7 @@ use std::{
 use super::{
     cavities::spheres_of_glass,
     covers::cover,
+    dividers::dividers,
     shells::{Shell, Shells},
     solid::{COVER_BIT, NONE, SPHERE_BIT, glass},
     surfaces::Opaque,
@@ -49,6 +50,7 @@ pub(crate) struct Surroundings<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct Faults {
     doubled: usize,
+    dividers: usize,
     open: usize,
     thin: usize,
     covers: usize,
@@ -78,13 +80,18 @@ pub(crate) fn repair(
         mesh_of[mesh.triangles.clone()].fill(m);
     }
     let kept = without_doubles(triangles, &mesh_of, &is_glass, &mut faults);
-    let mut flags = kept.iter();
-    triangles.retain(|_| flags.next() == Some(&true));
-    let mut flags = kept.iter();
-    mesh_of.retain(|_| flags.next() == Some(&true));
-
-    let groups = groups(triangles, &mesh_of, &is_glass);
-    let mut found = Shells::new(triangles, &groups);
+    retain((triangles, &mut mesh_of), &kept);
+    let mut found = Shells::new(triangles, &groups(triangles, &mesh_of, &is_glass));
+    let inner = dividers(triangles, &found);
+    if !inner.is_empty() {
+        let mut kept = vec![true; triangles.len()];
+        for i in inner {
+            kept[i as usize] = false;
+            faults[mesh_of[i as usize]].dividers += 1;
+        }
+        retain((triangles, &mut mesh_of), &kept);
+        found = Shells::new(triangles, &groups(triangles, &mesh_of, &is_glass));
+    }
     // First halves of one glass, then parts of several.
     found.join(triangles, |a, b| a == b);
     found.join(triangles, |_, _| true);
@@ -139,6 +146,14 @@ pub(crate) fn repair(
     }
     let warnings = meshes.iter().zip(&faults).filter_map(|(mesh, faults)| warning(&mesh.name, faults));
     (found.solids(), merged(warnings.collect()))
+}
+
+/// Leaves out triangles, and the meshes that they are of.
+fn retain((triangles, mesh_of): (&mut Vec<Triangle>, &mut Vec<usize>), kept: &[bool]) {
+    let mut flags = kept.iter();
+    triangles.retain(|_| flags.next() == Some(&true));
+    let mut flags = kept.iter();
+    mesh_of.retain(|_| flags.next() == Some(&true));
 }
 
 /// A sheet encloses nothing: light goes through it as through a thin pane.
@@ -228,6 +243,10 @@ fn turn(triangle: &mut Triangle) {
 fn warning(name: &str, faults: &Faults) -> Option<String> {
     let parts = [
         (faults.doubled > 0, "has doubled faces, which count once"),
+        (
+            faults.dividers > 0,
+            "has faces inside that divide it, which are left out (it is the same glass on both sides)",
+        ),
         (faults.open > 0, "is an open sheet, taken for a thin pane (a solid has to be closed)"),
         (faults.thin > 0, "is thinner than rounding, taken for a thin pane"),
         (

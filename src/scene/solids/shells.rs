@@ -148,7 +148,7 @@ pub(super) fn winding(triangles: &[Triangle], shell: &Shell, point: DVec3) -> f6
 }
 
 /// A vertex by its bits.
-type Key = [u32; 3];
+pub(super) type Key = [u32; 3];
 
 /// An edge between two vertices in the order of their keys, relative to the first vertex of its
 /// shell, metres.
@@ -191,7 +191,7 @@ fn connected(triangles: &[Triangle], group: &[u32]) -> Vec<Vec<u32>> {
     parts
 }
 
-fn find(parent: &mut [u32], mut i: u32) -> u32 {
+pub(super) fn find(parent: &mut [u32], mut i: u32) -> u32 {
     while parent[i as usize] != i {
         parent[i as usize] = parent[parent[i as usize] as usize];
         i = parent[i as usize];
@@ -200,7 +200,7 @@ fn find(parent: &mut [u32], mut i: u32) -> u32 {
 }
 
 /// Volume and holes of a connected part of a group.
-fn measure(triangles: &[Triangle], part: Vec<u32>, group: usize) -> Shell {
+pub(super) fn measure(triangles: &[Triangle], part: Vec<u32>, group: usize) -> Shell {
     let origin = triangles[part[0] as usize].positions[0].as_dvec3();
     let (mut volume, mut area) = (0.0, 0.0);
     let bounds = part.iter().map(|i| Bounds::from(&triangles[*i as usize])).fold(Bounds::EMPTY, Bounds::union);

@@ -159,6 +159,32 @@ fn of_coincident_quads_always_one_is_seen() {
 }
 
 #[test]
+fn of_faces_back_to_back_each_is_seen_from_its_side() {
+    // A floor that looks up and one that looks down, of other sizes and materials.
+    let seen = |down_first: bool, from_above: bool, down_is_double: bool| {
+        let mut scene = scene(&[diffuse(0.2), diffuse(0.8)]);
+        scene.materials[1].double_sided = down_is_double;
+        let mut faces = [(1.3, Vec3::Z, Vec3::X, 0), (1.0, Vec3::X, Vec3::Z, 1)];
+        faces.rotate_left(usize::from(down_first));
+        for (size, a, b, material) in faces {
+            add_quad(&mut scene, -0.5 * size * (a + b), size * a, size * b, material);
+        }
+        let side = if from_above { 1.0 } else { -1.0 };
+        scene.lights.push(point_light(vec3(0.0, 2.0 * side, 0.0), 1.0));
+        scene.cameras.push(camera(vec3(0.1, 2.0 * side, 0.3), Vec3::ZERO, 15.0));
+        let frame = render_scene(&scene, &settings(Mode::DirectRays, 1000, 16)).frame;
+        let albedo = frame.albedo()[0][0];
+        assert!(frame.albedo().iter().all(|other| other[0] == albedo), "one is seen everywhere");
+        albedo
+    };
+    for down_first in [false, true] {
+        assert_eq!(seen(down_first, true, false), 0.2, "{down_first}: the one that looks up");
+        assert_eq!(seen(down_first, false, false), 0.8, "{down_first}: the one that looks down");
+        assert_eq!(seen(down_first, true, true), 0.8, "control: the smaller one has two sides");
+    }
+}
+
+#[test]
 fn glass_on_a_floor_does_not_leak() {
     // A block that stands on the floor: its lower face lies in the floor's plane, in other
     // triangles.
