@@ -24,6 +24,7 @@ mod signals;
 mod study;
 mod study_args;
 mod study_progress;
+mod usage;
 mod values;
 
 use std::process::ExitCode;
@@ -37,9 +38,7 @@ use args::{Args, Command};
 /// 128 + signal number when stopped.
 pub fn run() -> ExitCode {
     let args = Args::parse();
-    if let Command::Render(args) = &args.command {
-        render::check(args).unwrap_or_else(|error| error.exit());
-    }
+    usage::check(&args.command).unwrap_or_else(|error| error.exit());
     signals::watch();
     let error = match bugs::caught(|| work(args.command)) {
         Ok(Ok(())) => return ExitCode::SUCCESS,

@@ -1,7 +1,6 @@
 //! `caustica render`.
 
 use std::{
-    collections::HashSet,
     io,
     path::{Path, PathBuf},
     time::Instant,
@@ -18,12 +17,10 @@ use caustica::{
     stats::{Stats, timed},
 };
 
-use clap::{CommandFactory, error::ErrorKind};
-
 use super::{
-    args::{Args, RenderArgs},
+    args::RenderArgs,
     bugs,
-    files::{Files, identity, make_folder},
+    files::{Files, make_folder},
     outlook::{Outlook, Plan},
     passes::{self, Inputs, Picture},
     progress::Display,
@@ -33,13 +30,13 @@ use super::{
 };
 
 /// A scene and the pictures that are made of it.
-struct Job {
-    scene: PathBuf,
-    pictures: Vec<PathBuf>,
+pub(super) struct Job {
+    pub scene: PathBuf,
+    pub pictures: Vec<PathBuf>,
 }
 
 /// Jobs of the command, scene by scene.
-fn jobs(args: &RenderArgs) -> Vec<Job> {
+pub(super) fn jobs(args: &RenderArgs) -> Vec<Job> {
     let pictures = |scene: &PathBuf| match &args.output_dir {
         None => args.outputs.clone(),
         Some(folder) => {
@@ -54,34 +51,8 @@ fn jobs(args: &RenderArgs) -> Vec<Job> {
     args.scenes.iter().map(|scene| Job { scene: scene.clone(), pictures: pictures(scene) }).collect()
 }
 
-/// Refuses wrong usage that no single argument shows: two outputs that are one file, and several
-/// scenes without a folder for their pictures.
-pub fn check(args: &RenderArgs) -> std::result::Result<(), clap::Error> {
-    let mut known = HashSet::new();
-    let jobs = jobs(args);
-    let twice = (args.scenes.len() == 1 || args.output_dir.is_some())
-        .then(|| jobs.iter().flat_map(|job| outputs(args, job)).find(|path| !known.insert(identity(path))))
-        .flatten();
-    // A negative number is no option, and reads like one more scene.
-    let stray = args.scenes[1..].iter().find(|scene| scene.to_string_lossy().starts_with('-'));
-    let problem = match twice {
-        _ if stray.is_some() => {
-            format!("unexpected argument '{}' found", stray.map_or("".into(), |s| s.to_string_lossy()))
-        }
-        Some(path) => format!("{} is another output as well", path.display()),
-        None if args.scenes.len() > 1 && args.output_dir.is_none() => {
-            format!("{} scenes need --output-dir for their pictures", args.scenes.len())
-        }
-        None => return Ok(()),
-    };
-    let mut command = Args::command();
-    command.build();
-    let usage_of = command.find_subcommand_mut("render").expect("this is its check");
-    Err(usage_of.error(ErrorKind::ArgumentConflict, problem))
-}
-
 /// All files that a run over one scene writes.
-fn outputs<'a>(args: &'a RenderArgs, job: &'a Job) -> impl Iterator<Item = &'a PathBuf> {
+pub(super) fn outputs<'a>(args: &'a RenderArgs, job: &'a Job) -> impl Iterator<Item = &'a PathBuf> {
     job.pictures.iter().chain(&args.stats).chain(&args.passes.part).chain(&args.passes.checkpoint)
 }
 
