@@ -16,6 +16,7 @@ mod merge_args;
 mod options;
 mod outlook;
 mod pass_args;
+mod pass_lines;
 mod passes;
 mod progress;
 mod render;

@@ -4,7 +4,7 @@ use std::{
     io,
     path::Path,
     sync::atomic::{AtomicBool, Ordering},
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use caustica::{
@@ -18,10 +18,11 @@ use caustica::{
     stats::{DeviceStats, PassStats, Stats},
 };
 
-use super::{args::RenderArgs, progress::Display, values::words_of_seconds};
-
-/// Passes from which on their spread is trusted to end a run.
-const LEAST_PASSES: u32 = 4;
+use super::{
+    args::RenderArgs,
+    pass_lines::{is_reached, line, outlook, verdict},
+    progress::Display,
+};
 
 /// A picture of passes.
 pub struct Picture {
@@ -149,11 +150,6 @@ fn is_over(inputs: &Inputs, next: u32, range: PassRange, error: Option<&ErrorEst
     next >= range.end || target.is_some_and(|(target, error)| is_reached(target, error, next - range.first))
 }
 
-/// Whether passes enough to trust their spread have an error of the target at most.
-fn is_reached(target: f64, error: &ErrorEstimate, passes: u32) -> bool {
-    passes >= LEAST_PASSES && error.total() <= target
-}
-
 /// Estimated errors, if somebody wants to know.
 fn estimate(inputs: &Inputs, done: &Done) -> Result<Option<ErrorEstimate>> {
     let options = &inputs.args.passes;
@@ -162,69 +158,6 @@ fn estimate(inputs: &Inputs, done: &Done) -> Result<Option<ErrorEstimate>> {
     }
     let total = done.sum.total()?;
     Ok(total.and_then(|total| ErrorEstimate::of(total.film(), options.region)))
-}
-
-/// Fraction of the run that is done, and seconds left, by the passes and the time that are wanted;
-/// of a run that a target alone ends, nothing is known.
-fn outlook(
-    time: Option<Duration>,
-    count: Option<u32>,
-    done: u32,
-    elapsed: Duration,
-    each: Duration,
-) -> (f64, Option<f64>) {
-    let of_passes = count.map(|count| {
-        let left = each.as_secs_f64() * f64::from(count.saturating_sub(done));
-        (f64::from(done) / f64::from(count), left)
-    });
-    let of_time = time.map(|time| {
-        let part = elapsed.as_secs_f64() / time.as_secs_f64().max(f64::MIN_POSITIVE);
-        (part, time.saturating_sub(elapsed).as_secs_f64())
-    });
-    let ends = || of_passes.into_iter().chain(of_time);
-    let fraction = ends().map(|(fraction, _)| fraction).fold(0.0, f64::max);
-    (fraction.min(1.0), ends().map(|(_, left)| left).reduce(f64::min))
-}
-
-fn percent(x: f64) -> String {
-    format!("{:.2} %", 100.0 * x)
-}
-
-/// State of a run in one line: passes that are done, of how many, the error and that which is
-/// wanted, and the seconds left.
-fn line(
-    done: u32,
-    count: Option<u32>,
-    wanted: Option<f64>,
-    error: Option<&ErrorEstimate>,
-    left: Option<f64>,
-) -> String {
-    let of = count.map_or(String::new(), |count| format!(" of {count}"));
-    let wanted = wanted.map_or(String::new(), |wanted| format!(", {} wanted", percent(wanted)));
-    let error = error.map_or(String::new(), |error| {
-        let (total, noise, bias) = (percent(error.total()), percent(error.noise), percent(error.bias));
-        format!("; estimated error {total} (noise {noise}, bias {bias}){wanted}")
-    });
-    let left = left.filter(|left| *left >= 0.5);
-    let left = left.map_or(String::new(), |left| format!("; {} left", words_of_seconds(left)));
-    format!("passes: {done}{of}{error}{left}")
-}
-
-/// Whether a run reached the error that was wanted, in one line.
-fn verdict(target: f64, error: Option<&ErrorEstimate>, passes: Option<PassRange>) -> String {
-    let count = passes.map_or(0, |passes| passes.count());
-    let after = if count == 1 { "1 pass".to_owned() } else { format!("{count} passes") };
-    match error {
-        Some(error) if is_reached(target, error, count) => {
-            format!("--target-error {target} is reached after {after}: {}", percent(error.total()))
-        }
-        Some(error) if error.total() > target => {
-            format!("warning: --target-error {target} is not reached after {after}: {}", percent(error.total()))
-        }
-        _ => format!(
-            "warning: --target-error {target} is not known to be reached after {after}: it takes {LEAST_PASSES} to tell"
-        ),
-    }
 }
 
 /// Passes of a sum as words.
@@ -330,44 +263,5 @@ impl Progress for Stages<'_> {
 
     fn stop_requested(&self) -> bool {
         self.display.stop_requested()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_line_tells_passes_error_and_time() {
-        let error = ErrorEstimate { noise: 0.03, bias: 0.04 };
-        let expected = "passes: 2 of 8; estimated error 5.00 % (noise 3.00 %, bias 4.00 %); 12 s left";
-        assert_eq!(line(2, Some(8), None, Some(&error), Some(12.0)), expected);
-        let expected = "passes: 5; estimated error 5.00 % (noise 3.00 %, bias 4.00 %), 1.00 % wanted";
-        assert_eq!(line(5, None, Some(0.01), Some(&error), None), expected);
-        assert_eq!(line(5, None, None, None, Some(8.0)), "passes: 5; 8 s left");
-        assert_eq!(line(1, None, Some(0.01), None, None), "passes: 1");
-    }
-
-    #[test]
-    fn time_left_is_that_of_the_earlier_end() {
-        let at = |time, count| outlook(time, count, 5, Duration::from_secs(10), Duration::from_secs(2));
-        let seconds = |time| Some(Duration::from_secs(time));
-        assert_eq!(at(None, Some(10)), (0.5, Some(10.0)));
-        assert_eq!(at(seconds(12), Some(10)), (10.0 / 12.0, Some(2.0)));
-        assert_eq!(at(seconds(100), Some(10)), (0.5, Some(10.0)));
-        assert_eq!(at(seconds(40), None), (0.25, Some(30.0)));
-        assert_eq!(at(None, None), (0.0, None), "nobody knows when a target is reached");
-    }
-
-    #[test]
-    fn a_target_is_reached_or_not() {
-        let error = ErrorEstimate { noise: 0.03, bias: 0.04 };
-        let passes = |end| Some(PassRange { first: 0, end });
-        let said = |target, end| verdict(target, Some(&error), passes(end));
-        assert_eq!(said(0.06, 9), "--target-error 0.06 is reached after 9 passes: 5.00 %");
-        assert_eq!(said(0.01, 9), "warning: --target-error 0.01 is not reached after 9 passes: 5.00 %");
-        let unknown = "warning: --target-error 0.06 is not known to be reached after 1 pass: it takes 4 to tell";
-        assert_eq!(verdict(0.06, None, passes(1)), unknown);
-        assert_eq!(said(0.06, 3), unknown.replace("1 pass", "3 passes"));
     }
 }
