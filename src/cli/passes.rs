@@ -14,7 +14,7 @@ use caustica::{
     progress::{Progress, Stage},
     renderer::{LightGroups, Progressive, size_of},
     scene::Scene,
-    settings::{PassRange, Settings},
+    settings::{Crop, PassRange, Settings},
     stats::{DeviceStats, PassStats, Stats},
 };
 
@@ -23,6 +23,9 @@ use super::{
     pass_lines::{is_reached, line, outlook, verdict},
     progress::Display,
 };
+
+/// Advice where a run cannot go on with a file.
+const ANEW: &str = "without the file, it is begun anew";
 
 /// A picture of passes.
 pub struct Picture {
@@ -168,13 +171,18 @@ fn passes(sum: &PassSum) -> String {
 fn check_region(inputs: &Inputs) -> Result<()> {
     let Some(region) = inputs.args.passes.region else { return Ok(()) };
     let size = size_of(inputs.scene, &inputs.settings.picture)?;
-    let window = inputs.settings.picture.window(size);
-    if region.touches((window.column, window.row), (window.width, window.height)) {
-        return Ok(());
+    let Crop { column, row, width, height } = region;
+    let refuse =
+        |problem| Err(Error::Setting { name: "--region", value: format!("{column},{row},{width},{height}"), problem });
+    let is_inside = |first: u32, count: u32, whole: u32| u64::from(first) + u64::from(count) <= u64::from(whole);
+    if !is_inside(column, width, size.0) || !is_inside(row, height, size.1) {
+        return refuse(format!("must have pixels, all of them in the picture of {}x{}", size.0, size.1));
     }
-    let value = format!("{},{},{},{}", region.column, region.row, region.width, region.height);
-    let problem = format!("has no pixel of the picture of {}x{}, or of its crop", size.0, size.1);
-    Err(Error::Setting { name: "--region", value, problem })
+    let window = inputs.settings.picture.window(size);
+    if !region.touches((window.column, window.row), (window.width, window.height)) {
+        return refuse("has no pixel of `picture.crop`".to_owned());
+    }
+    Ok(())
 }
 
 /// Attributes of the pictures and parts of the run.
@@ -199,7 +207,12 @@ fn resume<'a>(inputs: &Inputs<'a>, range: PassRange, done: &mut Done) -> Result<
     if !options.resume {
         return refuse("is there already; --resume goes on with it".to_owned());
     }
-    let (header, sum) = read_part(path)?;
+    let (header, sum) = read_part(path).map_err(|error| match error {
+        Error::Io { path, source } => {
+            Error::Io { path, source: io::Error::new(source.kind(), format!("{source}; {ANEW}")) }
+        }
+        other => other,
+    })?;
     let ours = attributes(inputs, &done.stats);
     let mut told = differences(&ours, &header.attributes);
     let theirs = |name: &str| header.attributes.get(name).map_or("unknown", String::as_str).to_owned();
@@ -219,7 +232,7 @@ fn resume<'a>(inputs: &Inputs<'a>, range: PassRange, done: &mut Done) -> Result<
         told.push(format!("it has the passes {}, and {range} are asked for", header.passes));
     }
     if !told.is_empty() {
-        return refuse(format!("is {what} of another run: {}; without the file, it is begun anew", told.join(", ")));
+        return refuse(format!("is {what} of another run: {}; {ANEW}", told.join(", ")));
     }
     inputs.display.note(&format!("goes on after the passes {} of {}", header.passes, path.display()));
     done.sum = sum;

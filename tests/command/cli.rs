@@ -99,6 +99,8 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_right() {
         ("render scene.gltf -o a.exr --passes 2 --alpha 0", "a number above 0, at most 1"),
         ("render scene.gltf -o a.exr --alpha 0.5", "--passes"),
         ("render scene.gltf -o a.exr --time 5", "90s, 10m or 2h"),
+        ("render scene.gltf -o a.exr --time -5s", "90s, 10m or 2h"),
+        ("render scene.gltf -o a.exr --passes 2 --checkpoint a --every -5s", "90s, 10m or 2h"),
         ("render scene.gltf -o a.exr --target-error 2", "a number above 0, at most 1"),
         ("render scene.gltf -o a.exr --passes 2 --resume", "--checkpoint"),
         ("render scene.gltf -o a.exr --passes 2 --part a.png", "does not end in .exr"),

@@ -170,7 +170,11 @@ fn a_run_that_goes_on_has_the_bytes_of_one_that_never_stopped() {
     succeeds(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr"));
     assert!(bytes(folder, "again.exr") == bytes(folder, "one.exr"), "nothing was left to do");
     fs::write(folder.join("kept"), &bytes(folder, "kept")[..2000]).expect("it can be written");
-    assert!(fails(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr")).contains("kept: "));
+    let cut = fails(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr"));
+    assert!(cut.contains("kept: is ") && cut.ends_with("; without the file, it is begun anew\n"), "{cut}");
+    fs::write(folder.join("kept"), "text").expect("it can be written");
+    let text = fails(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr"));
+    assert!(text.contains("kept: is no part of a picture: "), "{text}");
 }
 
 #[test]
@@ -197,11 +201,28 @@ fn a_run_goes_on_with_a_part_that_is_there() {
         fs::write(folder.join("kept"), &two).expect("it is written");
     }
     begin_anew();
+    succeeds(folder, &small("--part alone.exr --passes 2"));
+    succeeds(folder, &small("--part alone.exr --passes 3 --resume"));
+    assert!(bytes(folder, "alone.exr") == bytes(folder, "one.exr"), "without a checkpoint");
     succeeds(folder, &part("--passes 3 --resume"));
     assert!(bytes(folder, "p.exr") == bytes(folder, "one.exr"));
     begin_anew();
     succeeds(folder, &part("--passes 2 --seed 3"));
     assert!(bytes(folder, "p.exr") != two, "control: without --resume it is written anew");
+}
+
+#[test]
+fn a_region_lies_in_the_picture() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let render = |words: &str| fails(folder.path(), &small(&format!("--passes 1 -o a.exr {words}")));
+    for region in ["16,0,1,1", "0,0,17,1", "4294967295,0,4294967295,1"] {
+        let said = render(&format!("--region {region}"));
+        let expected = format!("error: --region {region}: must have pixels, all of them in the picture of 16x16\n");
+        assert_eq!(said, expected);
+    }
+    let said = render("--region 0,0,4,4 --crop 4,0,4,4");
+    assert_eq!(said, "error: --region 0,0,4,4: has no pixel of --crop\n");
+    succeeds(folder.path(), &small("--passes 1 -o a.exr --region 0,0,16,16"));
 }
 
 /// Starts a run without an end and waits for the file of that name.
