@@ -97,7 +97,8 @@ fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
         assert!(other.contains(part), "{other}");
     }
     succeeds(folder, &small("--passes 5..6 --part scene.exr").replace(SCENE, OTHER_SCENE));
-    assert!(fails(folder, "merge a.exr b.exr scene.exr -o y.exr").contains("sceneHash is "));
+    let other = fails(folder, "merge a.exr b.exr scene.exr -o y.exr");
+    assert!(other.contains("sceneHash is ") && other.contains(" (area-light.gltf), not "), "{other}");
     let none = fails(folder, "merge one.exr -o y.exr");
     assert!(none.contains("one.exr: is no part of a picture: render --part or --checkpoint did not"), "{none}");
     assert!(fails(folder, "merge a.exr b.exr -o a.exr").contains("is a part as well"));
@@ -108,6 +109,13 @@ fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
     }
     let more = fails(folder, "merge a.exr b.exr --passes 0..3 -o y.exr");
     assert!(more.contains("parts have the passes 0..5, and 0..3 are asked for"), "{more}");
+    let of_three = |words: &str| succeeds(folder, &format!("status a.exr b.exr --passes 0..3 {words}"));
+    let status: Value = serde_json::from_str(&of_three("--json")).expect("JSON");
+    assert_eq!((&status["complete"], &status["surplus"]), (&Value::from(false), &serde_json::json!(["0..5"])));
+    assert!(of_three("").contains("\nmore than asked for: passes 0..5\n"), "{}", of_three(""));
+    let status: Value = serde_json::from_str(&succeeds(folder, "status a.exr b.exr --passes 5 --json")).expect("JSON");
+    assert_eq!((&status["complete"], &status["surplus"]), (&Value::from(true), &serde_json::json!([])));
+    assert!(succeeds(folder, "status a.exr").contains(": passes 0..2 in 1 part\n"));
     assert!(!folder.join("y.exr").exists());
 }
 
