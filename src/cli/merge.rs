@@ -10,6 +10,7 @@ use caustica::{
 use serde_json::json;
 
 use super::{
+    failures::Failures,
     files::Files,
     merge_args::{MergeArgs, StatusArgs},
     progress::Display,
@@ -61,18 +62,22 @@ pub fn run(args: &MergeArgs) -> Result<()> {
     };
     let (frame, attributes) = merge(&found, &check)?;
     check(total)?;
+    let mut failures = Failures::default();
     for path in &args.outputs {
-        match extension(path).as_str() {
-            "png" => {
-                write_png(path, &frame, args.exposure.of(&frame), args.tonemap.into())?;
+        let is_png = extension(path) == "png";
+        let written = match is_png {
+            true => write_png(path, &frame, args.exposure.of(&frame), args.tonemap.into()),
+            false => write_exr_with(path, &frame, &attributes),
+        };
+        if failures.take(written) {
+            if is_png {
                 display.note(&exposure_line(args.exposure, &frame));
             }
-            _ => write_exr_with(path, &frame, &attributes)?,
+            display.note(&format!("wrote {}", path.display()));
         }
-        display.note(&format!("wrote {}", path.display()));
     }
     display.note(&format!("merged {} in {:.1} s", parts(total), started.elapsed().as_secs_f64()));
-    Ok(())
+    failures.outcome()
 }
 
 /// Says what there is.

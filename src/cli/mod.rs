@@ -7,6 +7,7 @@ mod bugs;
 mod compare;
 mod devices;
 mod environment;
+mod failures;
 mod files;
 mod flags;
 mod info;

@@ -20,6 +20,7 @@ use caustica::{
 
 use super::{
     args::RenderArgs,
+    failures::Failures,
     pass_lines::{is_reached, line, outlook, verdict},
     progress::Display,
 };
@@ -32,6 +33,8 @@ pub struct Picture {
     pub frame: Frame,
     pub attributes: Attributes,
     pub stats: Stats,
+    /// Of a checkpoint or a part.
+    pub failures: Failures,
 }
 
 /// Inputs of a run.
@@ -41,7 +44,7 @@ pub struct Inputs<'a> {
     pub settings: &'a Settings,
     pub args: &'a RenderArgs,
     pub display: &'a Display,
-    /// Writes the outputs.
+    /// Writes the pictures.
     pub write: &'a dyn Fn(&Frame, &Attributes) -> Result<()>,
 }
 
@@ -54,7 +57,8 @@ struct Done {
 }
 
 /// Renders the passes that are left. A run with a checkpoint that is asked to end writes it first,
-/// and its outputs as far as they are.
+/// and its outputs as far as they are. A checkpoint or a part that cannot be written is among the
+/// failures of the picture.
 pub fn render(inputs: &Inputs) -> Result<Picture> {
     let started = Instant::now();
     let Inputs { args, settings, display, .. } = *inputs;
@@ -68,27 +72,32 @@ pub fn render(inputs: &Inputs) -> Result<Picture> {
     let from = resume(inputs, range, &mut done)?;
     let ended = run(inputs, range, started, &mut done);
     display.finish();
+    let mut failures = Failures::default();
     // What was read and got nothing new stays as it is.
     let is_new = |path: &Path| done.passes > 0 || from != Some(path);
     if let Some(path) = options.checkpoint.as_deref().filter(|_| !done.sum.blocks().is_empty()) {
-        if is_new(path) {
-            save(inputs, path, &done)?;
+        if failures.take(if is_new(path) { save(inputs, path, &done) } else { Ok(()) }) {
+            display.note(&format!("checkpoint: {} is in {}", passes(&done.sum), path.display()));
         }
         if ended.is_err() {
-            let picture = picture(inputs, &done)?;
-            (inputs.write)(&picture.frame, &picture.attributes)?;
+            failures.take(write_pictures(inputs, &done));
         }
-        display.note(&format!("checkpoint: {} is in {}", passes(&done.sum), path.display()));
     }
-    ended?;
+    if let Err(error) = ended {
+        if !matches!(error, Error::Stopped) {
+            failures.take(Err(error));
+        }
+        return Err(failures.outcome().err().unwrap_or(Error::Stopped));
+    }
     if let Some(target) = options.target_error {
         display.note(&verdict(target, estimate(inputs, &done)?.as_ref(), done.sum.range()));
     }
     if let Some(path) = options.part.as_deref().filter(|path| is_new(path)) {
-        save(inputs, path, &done)?;
-        display.note(&format!("wrote {}", path.display()));
+        if failures.take(save(inputs, path, &done)) {
+            display.note(&format!("wrote {}", path.display()));
+        }
     }
-    picture(inputs, &done)
+    picture(inputs, &done, failures)
 }
 
 /// Renders passes until the end.
@@ -137,11 +146,10 @@ fn run(inputs: &Inputs, range: PassRange, started: Instant, done: &mut Done) -> 
         display.check()?;
         if let Some(path) = options.checkpoint.as_deref().filter(|_| saved.elapsed() >= options.every) {
             // The work goes on if the disk is full for a while; the last checkpoint must succeed.
-            let kept = save(inputs, path, done).and_then(|()| {
-                let picture = picture(inputs, done)?;
-                (inputs.write)(&picture.frame, &picture.attributes)
-            });
-            kept.unwrap_or_else(|problem| display.note(&format!("warning: no checkpoint now: {problem}")));
+            let written = [("checkpoint", save(inputs, path, done)), ("picture", write_pictures(inputs, done))];
+            for (what, result) in written {
+                result.unwrap_or_else(|problem| display.note(&format!("warning: no {what} now: {problem}")));
+            }
             saved = Instant::now();
         }
     }
@@ -243,8 +251,14 @@ fn save(inputs: &Inputs, path: &Path, done: &Done) -> Result<()> {
     write_part(path, &done.sum, &attributes(inputs, &done.stats))
 }
 
+/// Writes the pictures so far.
+fn write_pictures(inputs: &Inputs, done: &Done) -> Result<()> {
+    let Picture { frame, attributes, .. } = picture(inputs, done, Failures::default())?;
+    (inputs.write)(&frame, &attributes)
+}
+
 /// The picture so far.
-fn picture(inputs: &Inputs, done: &Done) -> Result<Picture> {
+fn picture(inputs: &Inputs, done: &Done, failures: Failures) -> Result<Picture> {
     let total = done.sum.total()?.ok_or_else(|| Error::Incomplete("no pass was rendered".to_owned()))?;
     let mut stats = done.stats.clone();
     (stats.photons.global, stats.photons.caustic) = (total.photons().global, total.photons().caustic);
@@ -258,7 +272,7 @@ fn picture(inputs: &Inputs, done: &Done) -> Result<Picture> {
         noise: error.map(|error| error.noise),
         bias: error.map(|error| error.bias),
     });
-    Ok(Picture { frame: total.film().finish_with_errors(), attributes, stats })
+    Ok(Picture { frame: total.film().finish_with_errors(), attributes, stats, failures })
 }
 
 /// Shows the stages of the first pass; further ones are reported as wholes.

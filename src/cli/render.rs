@@ -20,6 +20,7 @@ use caustica::{
 use super::{
     args::RenderArgs,
     bugs,
+    failures::Failures,
     files::{Files, make_folder},
     outlook::{Outlook, Plan},
     passes::{self, Inputs, Picture},
@@ -123,7 +124,11 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
     };
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
     let write = |frame: &Frame, attributes: &Attributes| {
-        job.pictures.iter().try_for_each(|path| write_picture(path, frame, attributes, args))
+        let mut failures = Failures::default();
+        for path in &job.pictures {
+            failures.take(write_picture(path, frame, attributes, args));
+        }
+        failures.outcome()
     };
     let picture = if args.passes.are_given() {
         let (gpu, scene, settings) = (&*gpu, &scene, &settings);
@@ -133,9 +138,10 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
         let result = renderer::render(gpu, &scene, &settings, display);
         display.finish();
         let renderer::Render { frame, stats } = result?;
-        Picture { frame, attributes: scene.origin(&settings, &stats).attributes(), stats }
+        let attributes = scene.origin(&settings, &stats).attributes();
+        Picture { frame, attributes, stats, failures: Failures::default() }
     };
-    let Picture { frame, attributes, mut stats } = picture;
+    let Picture { frame, attributes, mut stats, mut failures } = picture;
     for warning in stats.warnings.iter().filter(|w| !scene.warnings.contains(w)) {
         display.note(&format!("warning: {warning}"));
     }
@@ -145,7 +151,9 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
 
     for path in &job.pictures {
         display.check()?;
-        write_picture(path, &frame, &attributes, args)?;
+        if !failures.take(write_picture(path, &frame, &attributes, args)) {
+            continue;
+        }
         if extension(path) == "png" {
             display.note(&exposure_line(options.shared.exposure, &frame));
         }
@@ -156,7 +164,10 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
     if options.shared.verbose {
         display.note(&summary(&stats));
     }
-    args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats))
+    if let Some(path) = &args.stats {
+        failures.take(write_stats(path, &stats));
+    }
+    failures.outcome()
 }
 
 /// Note on why a kd-tree's picture differs from the default one.

@@ -8,6 +8,7 @@
 //! | lost flux | is that of one pass, however many there are | rays are counted |
 //! | checkpoints | a run that goes on has the bytes of one that never stopped; other runs are refused | |
 //! | parts | a part that is there is gone on with, stays if nothing is left to do, or is refused by name | without `--resume` |
+//! | lost outputs | an output or a checkpoint that cannot be written costs no other one, and each is named | |
 //! | killed | after SIGKILL and SIGTERM, nothing is lost but the running pass | SIGTERM without a checkpoint |
 
 use std::{
@@ -231,6 +232,49 @@ fn a_region_lies_in_the_picture() {
     let said = render("--region 0,0,4,4 --crop 4,0,4,4");
     assert_eq!(said, "error: --region 0,0,4,4: has no pixel of --crop\n");
     succeeds(folder.path(), &small("--passes 1 -o a.exr --region 0,0,16,16"));
+}
+
+/// A command whose files may have no more than a kilobyte: enough for a small PNG.
+#[cfg(target_os = "linux")]
+fn with_small_files(folder: &Path, line: &str) -> String {
+    let mut shell = Command::new("bash");
+    shell.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "bash", env!("CARGO_BIN_EXE_caustica")]);
+    let output = shell.current_dir(folder).args(line.split_whitespace()).output().expect("it starts");
+    let said = String::from_utf8(output.stderr).expect("messages are text");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(!said.contains(".caustica-"), "the temporary name says nothing: {said}");
+    said
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn outputs_that_cannot_be_written_cost_no_other_one() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let too_large = "File too large (os error 27)";
+    let outputs = "-o a.exr -o a.png --stats s.json";
+    let said = with_small_files(folder, &small(&format!("--passes 2 --part p.exr --checkpoint kept {outputs}")));
+    assert_eq!(
+        said,
+        format!("error: kept: {too_large}; p.exr: {too_large}; a.exr: {too_large}; s.json: {too_large}\n")
+    );
+    assert!(folder.join("a.png").exists());
+    fs::remove_file(folder.join("a.png")).expect("it is there");
+    // During a run, failures are warnings.
+    let line = small("--passes 2 --checkpoint kept --every 0s -o a.png").replace(" -q", "");
+    let said = with_small_files(folder, &line);
+    assert!(said.contains(&format!("\nwarning: no checkpoint now: kept: {too_large}\n")), "{said}");
+    assert!(said.contains("\nwrote a.png\n") && !said.contains("no picture now"), "{said}");
+    fs::remove_file(folder.join("a.png")).expect("it is there");
+    with_small_files(folder, &small("-o a.exr -o a.png"));
+    assert!(folder.join("a.png").exists(), "without passes");
+    fs::remove_file(folder.join("a.png")).expect("it is there");
+    succeeds(folder, &small("--passes 1 --part p.exr"));
+    let said = with_small_files(folder, "merge p.exr -o a.exr -o a.png");
+    assert!(said.contains("\nmerge: 1 of 1 part\n") && said.contains("\nmerged 1 part in "), "{said}");
+    assert!(folder.join("a.png").exists(), "merged");
+    let left = fs::read_dir(folder).expect("it can be listed").count();
+    assert_eq!(left, 2, "nothing else than part and PNG");
 }
 
 /// Starts a run without an end and waits for the file of that name.
