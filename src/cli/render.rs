@@ -142,6 +142,9 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
         Picture { frame, attributes, stats, failures: Failures::default() }
     };
     let Picture { frame, attributes, mut stats, mut failures } = picture;
+    if is_empty(&frame) {
+        stats.warnings.push(unseen(&scene, &settings)?);
+    }
     for warning in stats.warnings.iter().filter(|w| !scene.warnings.contains(w)) {
         display.note(&format!("warning: {warning}"));
     }
@@ -168,6 +171,20 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
         failures.take(write_stats(path, &stats));
     }
     failures.outcome()
+}
+
+/// Whether no sample has met a surface, and no light comes from beyond.
+fn is_empty(frame: &Frame) -> bool {
+    let is_zero = |numbers: &[f32]| numbers.iter().all(|x| *x == 0.0);
+    is_zero(frame.alpha()) && is_zero(frame.layer("radiance"))
+}
+
+/// Warning of an empty picture.
+fn unseen(scene: &Scene, settings: &Settings) -> Result<String> {
+    let number = scene.camera_number(settings.picture.camera.as_deref())?;
+    let place = if settings.picture.crop.is_some() { " in this crop" } else { "" };
+    let name = &scene.cameras[number].name;
+    Ok(format!("the camera {number} {name:?} sees nothing of the scene{place}: the picture is empty"))
 }
 
 /// Note on why a kd-tree's picture differs from the default one.
@@ -239,6 +256,15 @@ fn summary(stats: &Stats) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_picture_of_nothing_has_neither_surfaces_nor_light() {
+        let mut frame = Frame::new(2, 1, &[[0.0; 3]; 2]);
+        assert!(is_empty(&frame));
+        frame.layer_mut("alpha")[1] = 0.25;
+        assert!(!is_empty(&frame), "a black surface");
+        assert!(!is_empty(&Frame::new(2, 1, &[[0.0; 3], [0.0, 0.0, 1e-9]])), "a sky");
+    }
 
     #[test]
     fn a_picture_that_is_all_but_dark_is_named() {

@@ -235,6 +235,34 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
 }
 
 #[test]
+fn a_camera_that_sees_nothing_is_named() {
+    let folder = folder();
+    let camera = r#""cameras": [{"type": "perspective", "name": "away", "perspective": {"yfov": 0.6, "znear": 0.1}}],
+  "scene": 0,"#;
+    let scene = SCENE.replace("POSITIONS", TRIANGLE).replace(r#""scene": 0,"#, camera);
+    let scene = scene.replace(r#""nodes": [0, 1]}"#, r#""nodes": [0, 1, 2]}"#);
+    // It looks along -Z.
+    let at = |z: i32| {
+        scene.replace(
+            r#""nodes": [{"mesh": 0}"#,
+            &format!(r#""nodes": [{{"mesh": 0}}, {{"camera": 0, "translation": [0, 0.5, {z}]}}"#),
+        )
+    };
+    let said = |z: i32| {
+        let scene = at(z).replace(r#""nodes": [0, 1, 2]"#, r#""nodes": [0, 2, 1]"#);
+        fs::write(folder.path().join("scene.gltf"), scene).expect("can be written");
+        let ended = render(folder.path(), "--mode direct-rays -o a.png --stats s.json");
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        ended.stderr
+    };
+    let warning = r#"the camera 0 "away" sees nothing of the scene: the picture is empty"#;
+    let away = said(-50);
+    assert!(away.lines().any(|line| line == format!("warning: {warning}")), "{away}");
+    assert!(fs::read_to_string(folder.path().join("s.json")).expect("text").contains("sees nothing"), "statistics");
+    assert!(!said(5).contains("sees nothing"), "control");
+}
+
+#[test]
 fn help_and_version_go_to_stdout() {
     let folder = folder();
     let help = |words: &str| {
