@@ -59,11 +59,11 @@ const PARTS: Row = ("write_part", "render --part or --checkpoint");
 
 /// Replaces the settings in a line by flags: "`picture.crop`" becomes "--crop". The name that
 /// begins the message of a refused setting, as in "error: picture.spp 0: must be at least 1",
-/// becomes the flag without its dashes.
+/// becomes the flag too.
 pub fn with_flags(line: &str) -> String {
     FLAGS.iter().chain([&ENVIRONMENT, &PARTS]).fold(line.to_owned(), |line, (setting, flag)| {
         let line = line.replace(&format!("`{setting}`"), flag);
-        line.replace(&format!(": {setting} "), &format!(": {} ", flag.trim_start_matches('-')))
+        line.replace(&format!(": {setting} "), &format!(": {flag} "))
     })
 }
 
@@ -145,8 +145,8 @@ mod tests {
     #[test]
     fn lines_name_flags_instead_of_settings() {
         for (line, expected) in [
-            ("error: picture.spp 0: must be at least 1", "error: spp 0: must be at least 1"),
-            ("failed: cell 3: picture.aperture 1: needs a focus", "failed: cell 3: aperture 1: needs a focus"),
+            ("error: picture.spp 0: must be at least 1", "error: --spp 0: must be at least 1"),
+            ("failed: cell 3: picture.aperture 1: needs a focus", "failed: cell 3: --aperture 1: needs a focus"),
             (
                 "error: ask for fewer `photons.global` or a smaller `estimate.neighbors`",
                 "error: ask for fewer --photons or a smaller -k",

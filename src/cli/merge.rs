@@ -1,6 +1,6 @@
 //! `caustica merge` and `caustica status`.
 
-use std::{fmt::Write as _, time::Instant};
+use std::{collections::BTreeSet, fmt::Write as _, time::Instant};
 
 use caustica::{
     Error, Result,
@@ -10,6 +10,7 @@ use caustica::{
 use serde_json::json;
 
 use super::{
+    failures::Failures,
     files::Files,
     merge_args::{MergeArgs, StatusArgs},
     progress::Display,
@@ -33,11 +34,8 @@ pub fn run(args: &MergeArgs) -> Result<()> {
     if !found.overlaps.is_empty() {
         return Err(Error::Differs(format!("parts overlap: {}", listed(&found.overlaps))));
     }
-    if let Some(wanted) = args.passes {
-        let there = found.windows.iter().flat_map(|parts| parts.passes());
-        if let Some(more) = there.into_iter().find(|there| there.first < wanted.first || there.end > wanted.end) {
-            return Err(Error::Differs(format!("parts have the passes {more}, and {wanted} are asked for")));
-        }
+    if let Some((more, wanted)) = surplus(&found, args.passes).first().zip(args.passes) {
+        return Err(Error::Differs(format!("parts have the passes {more}, and {wanted} are asked for")));
     }
     let missing = missing(&found, args.passes);
     match (missing.is_empty(), args.allow_gaps) {
@@ -59,42 +57,48 @@ pub fn run(args: &MergeArgs) -> Result<()> {
     let total = args.parts.len();
     let check = |done: usize| {
         let tenth = |done: usize| 10 * done / total;
-        display.state(&format!("merge: {done} of {total} parts"), 0.0, done == 0 || tenth(done) > tenth(done - 1));
+        display.state(&format!("merge: {done} of {}", parts(total)), 0.0, done == 0 || tenth(done) > tenth(done - 1));
         if signals::stop_requested() { Err(Error::Stopped) } else { Ok(()) }
     };
     let (frame, attributes) = merge(&found, &check)?;
+    check(total)?;
+    let mut failures = Failures::default();
     for path in &args.outputs {
-        match extension(path).as_str() {
-            "png" => {
-                write_png(path, &frame, args.exposure.of(&frame), args.tonemap.into())?;
+        let is_png = extension(path) == "png";
+        let written = match is_png {
+            true => write_png(path, &frame, args.exposure.of(&frame), args.tonemap.into()),
+            false => write_exr_with(path, &frame, &attributes),
+        };
+        if failures.take(written) {
+            if is_png {
                 display.note(&exposure_line(args.exposure, &frame));
             }
-            _ => write_exr_with(path, &frame, &attributes)?,
+            display.note(&format!("wrote {}", path.display()));
         }
-        display.note(&format!("wrote {}", path.display()));
     }
-    display.note(&format!("merged {total} parts in {:.1} s", started.elapsed().as_secs_f64()));
-    Ok(())
+    display.note(&format!("merged {} in {:.1} s", parts(total), started.elapsed().as_secs_f64()));
+    failures.outcome()
 }
 
 /// Says what there is.
 pub fn status(args: &StatusArgs) -> Result<()> {
     let found = survey(&args.parts)?;
-    let missing = missing(&found, args.passes);
+    let (missing, surplus) = (missing(&found, args.passes), surplus(&found, args.passes));
     if args.json {
-        let mut text = serde_json::to_string_pretty(&report(&found, &missing)).expect("it is JSON");
+        let mut text = serde_json::to_string_pretty(&report(&found, &missing, &surplus)).expect("it is JSON");
         text.push('\n');
         return print(&text);
     }
     let (width, height) = found.whole;
     let mut text = format!("picture: {width}x{height}\n");
     let mut line = |label: &str, value: &str| writeln!(text, "{label}: {value}").expect("a String can be written");
-    for parts in &found.windows {
-        let passes: Vec<_> = parts.passes().iter().map(ToString::to_string).collect();
-        let rectangle = words(parts.window);
-        line("pixels", &format!("{rectangle}: passes {} in {} parts", passes.join(", "), parts.parts.len()));
+    for of_window in &found.windows {
+        let passes: Vec<_> = of_window.passes().iter().map(ToString::to_string).collect();
+        let rectangle = words(of_window.window);
+        line("pixels", &format!("{rectangle}: passes {} in {}", passes.join(", "), parts(of_window.parts.len())));
     }
     missing.iter().for_each(|missing| line("missing", missing));
+    surplus.iter().for_each(|more| line("more than asked for", &format!("passes {more}")));
     if !found.around_crop().is_empty() {
         let around: Vec<_> = found.around_crop().into_iter().map(|crop| format!("--crop {}", words(crop))).collect();
         line("around this crop", &format!("no part has {}", around.join(", ")));
@@ -104,7 +108,7 @@ pub fn status(args: &StatusArgs) -> Result<()> {
     print(&text)
 }
 
-fn report(found: &Survey, missing: &[String]) -> serde_json::Value {
+fn report(found: &Survey, missing: &[String], surplus: &[PassRange]) -> serde_json::Value {
     let window = |parts: &WindowParts| {
         let passes: Vec<_> = parts.passes().iter().map(ToString::to_string).collect();
         json!({ "crop": parts.window, "passes": passes, "parts": parts.parts.len() })
@@ -113,10 +117,11 @@ fn report(found: &Survey, missing: &[String]) -> serde_json::Value {
     let devices: Vec<_> =
         found.devices.iter().map(|(name, driver)| json!({ "name": name, "driver": driver })).collect();
     json!({
-        "complete": missing.is_empty() && found.overlaps.is_empty(),
+        "complete": missing.is_empty() && surplus.is_empty() && found.overlaps.is_empty(),
         "size": found.whole,
         "windows": windows,
         "missing": missing,
+        "surplus": surplus.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "around": found.around_crop(),
         "overlaps": found.overlaps,
         "devices": devices,
@@ -130,6 +135,19 @@ fn missing(found: &Survey, wanted: Option<PassRange>) -> Vec<String> {
         format!("{crop}--passes {passes}")
     };
     found.missing(wanted.unwrap_or(found.passes())).into_iter().map(options).collect()
+}
+
+/// Ranges of passes that parts hold and that are not all asked for.
+fn surplus(found: &Survey, wanted: Option<PassRange>) -> Vec<PassRange> {
+    let Some(wanted) = wanted else { return Vec::new() };
+    let there = found.windows.iter().flat_map(WindowParts::passes);
+    let is_more = |there: &PassRange| there.first < wanted.first || there.end > wanted.end;
+    there.filter(is_more).collect::<BTreeSet<_>>().into_iter().collect()
+}
+
+/// A number of parts.
+fn parts(count: usize) -> String {
+    if count == 1 { "1 part".to_owned() } else { format!("{count} parts") }
 }
 
 /// A crop as `--crop` has it.

@@ -7,6 +7,7 @@ mod bugs;
 mod compare;
 mod devices;
 mod environment;
+mod failures;
 mod files;
 mod flags;
 mod info;
@@ -16,6 +17,7 @@ mod merge_args;
 mod options;
 mod outlook;
 mod pass_args;
+mod pass_lines;
 mod passes;
 mod progress;
 mod render;
@@ -24,6 +26,7 @@ mod signals;
 mod study;
 mod study_args;
 mod study_progress;
+mod usage;
 mod values;
 
 use std::process::ExitCode;
@@ -37,9 +40,7 @@ use args::{Args, Command};
 /// 128 + signal number when stopped.
 pub fn run() -> ExitCode {
     let args = Args::parse();
-    if let Command::Render(args) = &args.command {
-        render::check(args).unwrap_or_else(|error| error.exit());
-    }
+    usage::check(&args.command).unwrap_or_else(|error| error.exit());
     signals::watch();
     let error = match bugs::caught(|| work(args.command)) {
         Ok(Ok(())) => return ExitCode::SUCCESS,

@@ -13,6 +13,7 @@ const TARGET_ERROR: Range<f64> = Range::above(0.0, 1.0);
 /// Which passes are rendered, and when they end.
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("progressive").multiple(true))]
+#[command(group = clap::ArgGroup::new("kept").multiple(true))]
 pub struct PassOptions {
     /// Render the passes from 0 to N, or from A to B, B left out; each has photons and samples of
     /// its own and smaller radii, so that together they converge [default: a single picture]
@@ -25,7 +26,8 @@ pub struct PassOptions {
     pub alpha: f64,
 
     /// Render whole passes for this time, as 90s, 10m or 2h, and at least one
-    #[arg(long, value_name = "T", value_parser = duration, group = "progressive", help_heading = "Passes")]
+    #[arg(long, value_name = "T", value_parser = duration, allow_hyphen_values = true, help_heading = "Passes")]
+    #[arg(group = "progressive")]
     pub time: Option<Duration>,
 
     /// Stop when the estimated relative error of the picture is at most this, as 0.01
@@ -39,20 +41,20 @@ pub struct PassOptions {
 
     /// Write the sums of the passes to this .exr, for `caustica merge`
     #[arg(long, value_name = "PART.exr", help_heading = "Passes")]
-    #[arg(value_parser = PathBufValueParser::new().try_map(part), group = "progressive")]
+    #[arg(value_parser = PathBufValueParser::new().try_map(part), groups = ["progressive", "kept"])]
     pub part: Option<PathBuf>,
 
     /// Keep what is done in this file, a part as by --part, and the outputs up to date beside it
-    #[arg(long, value_name = "FILE", requires = "progressive", help_heading = "Passes")]
+    #[arg(long, value_name = "FILE", requires = "progressive", group = "kept", help_heading = "Passes")]
     pub checkpoint: Option<PathBuf>,
 
     /// Time between checkpoints, as 30s or 5m; 0s is after every pass
     #[arg(long, value_name = "T", value_parser = duration, default_value = "60s", help_heading = "Passes")]
-    #[arg(requires = "checkpoint")]
+    #[arg(requires = "checkpoint", allow_hyphen_values = true)]
     pub every: Duration,
 
     /// Go on with the checkpoint, or with the part of an earlier run, if there is one
-    #[arg(long, requires = "checkpoint", help_heading = "Passes")]
+    #[arg(long, requires = "kept", help_heading = "Passes")]
     pub resume: bool,
 }
 

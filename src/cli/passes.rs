@@ -4,7 +4,7 @@ use std::{
     io,
     path::Path,
     sync::atomic::{AtomicBool, Ordering},
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use caustica::{
@@ -14,20 +14,27 @@ use caustica::{
     progress::{Progress, Stage},
     renderer::{LightGroups, Progressive, size_of},
     scene::Scene,
-    settings::{PassRange, Settings},
+    settings::{Crop, PassRange, Settings},
     stats::{DeviceStats, PassStats, Stats},
 };
 
-use super::{args::RenderArgs, progress::Display, values::words_of_seconds};
+use super::{
+    args::RenderArgs,
+    failures::Failures,
+    pass_lines::{is_reached, line, outlook, verdict},
+    progress::Display,
+};
 
-/// Passes from which on their spread is trusted to end a run.
-const LEAST_PASSES: u32 = 4;
+/// Advice where a run cannot go on with a file.
+const ANEW: &str = "without the file, it is begun anew";
 
 /// A picture of passes.
 pub struct Picture {
     pub frame: Frame,
     pub attributes: Attributes,
     pub stats: Stats,
+    /// Of a checkpoint or a part.
+    pub failures: Failures,
 }
 
 /// Inputs of a run.
@@ -37,7 +44,7 @@ pub struct Inputs<'a> {
     pub settings: &'a Settings,
     pub args: &'a RenderArgs,
     pub display: &'a Display,
-    /// Writes the outputs.
+    /// Writes the pictures.
     pub write: &'a dyn Fn(&Frame, &Attributes) -> Result<()>,
 }
 
@@ -50,7 +57,8 @@ struct Done {
 }
 
 /// Renders the passes that are left. A run with a checkpoint that is asked to end writes it first,
-/// and its outputs as far as they are.
+/// and its outputs as far as they are. A checkpoint or a part that cannot be written is among the
+/// failures of the picture.
 pub fn render(inputs: &Inputs) -> Result<Picture> {
     let started = Instant::now();
     let Inputs { args, settings, display, .. } = *inputs;
@@ -64,27 +72,32 @@ pub fn render(inputs: &Inputs) -> Result<Picture> {
     let from = resume(inputs, range, &mut done)?;
     let ended = run(inputs, range, started, &mut done);
     display.finish();
+    let mut failures = Failures::default();
     // What was read and got nothing new stays as it is.
     let is_new = |path: &Path| done.passes > 0 || from != Some(path);
     if let Some(path) = options.checkpoint.as_deref().filter(|_| !done.sum.blocks().is_empty()) {
-        if is_new(path) {
-            save(inputs, path, &done)?;
+        if failures.take(if is_new(path) { save(inputs, path, &done) } else { Ok(()) }) {
+            display.note(&format!("checkpoint: {} is in {}", passes(&done.sum), path.display()));
         }
         if ended.is_err() {
-            let picture = picture(inputs, &done)?;
-            (inputs.write)(&picture.frame, &picture.attributes)?;
+            failures.take(write_pictures(inputs, &done));
         }
-        display.note(&format!("checkpoint: {} is in {}", passes(&done.sum), path.display()));
     }
-    ended?;
+    if let Err(error) = ended {
+        if !matches!(error, Error::Stopped) {
+            failures.take(Err(error));
+        }
+        return Err(failures.outcome().err().unwrap_or(Error::Stopped));
+    }
     if let Some(target) = options.target_error {
         display.note(&verdict(target, estimate(inputs, &done)?.as_ref(), done.sum.range()));
     }
     if let Some(path) = options.part.as_deref().filter(|path| is_new(path)) {
-        save(inputs, path, &done)?;
-        display.note(&format!("wrote {}", path.display()));
+        if failures.take(save(inputs, path, &done)) {
+            display.note(&format!("wrote {}", path.display()));
+        }
     }
-    picture(inputs, &done)
+    picture(inputs, &done, failures)
 }
 
 /// Renders passes until the end.
@@ -133,11 +146,10 @@ fn run(inputs: &Inputs, range: PassRange, started: Instant, done: &mut Done) -> 
         display.check()?;
         if let Some(path) = options.checkpoint.as_deref().filter(|_| saved.elapsed() >= options.every) {
             // The work goes on if the disk is full for a while; the last checkpoint must succeed.
-            let kept = save(inputs, path, done).and_then(|()| {
-                let picture = picture(inputs, done)?;
-                (inputs.write)(&picture.frame, &picture.attributes)
-            });
-            kept.unwrap_or_else(|problem| display.note(&format!("warning: no checkpoint now: {problem}")));
+            let written = [("checkpoint", save(inputs, path, done)), ("picture", write_pictures(inputs, done))];
+            for (what, result) in written {
+                result.unwrap_or_else(|problem| display.note(&format!("warning: no {what} now: {problem}")));
+            }
             saved = Instant::now();
         }
     }
@@ -147,11 +159,6 @@ fn run(inputs: &Inputs, range: PassRange, started: Instant, done: &mut Done) -> 
 fn is_over(inputs: &Inputs, next: u32, range: PassRange, error: Option<&ErrorEstimate>) -> bool {
     let target = inputs.args.passes.target_error.zip(error);
     next >= range.end || target.is_some_and(|(target, error)| is_reached(target, error, next - range.first))
-}
-
-/// Whether passes enough to trust their spread have an error of the target at most.
-fn is_reached(target: f64, error: &ErrorEstimate, passes: u32) -> bool {
-    passes >= LEAST_PASSES && error.total() <= target
 }
 
 /// Estimated errors, if somebody wants to know.
@@ -164,69 +171,6 @@ fn estimate(inputs: &Inputs, done: &Done) -> Result<Option<ErrorEstimate>> {
     Ok(total.and_then(|total| ErrorEstimate::of(total.film(), options.region)))
 }
 
-/// Fraction of the run that is done, and seconds left, by the passes and the time that are wanted;
-/// of a run that a target alone ends, nothing is known.
-fn outlook(
-    time: Option<Duration>,
-    count: Option<u32>,
-    done: u32,
-    elapsed: Duration,
-    each: Duration,
-) -> (f64, Option<f64>) {
-    let of_passes = count.map(|count| {
-        let left = each.as_secs_f64() * f64::from(count.saturating_sub(done));
-        (f64::from(done) / f64::from(count), left)
-    });
-    let of_time = time.map(|time| {
-        let part = elapsed.as_secs_f64() / time.as_secs_f64().max(f64::MIN_POSITIVE);
-        (part, time.saturating_sub(elapsed).as_secs_f64())
-    });
-    let ends = || of_passes.into_iter().chain(of_time);
-    let fraction = ends().map(|(fraction, _)| fraction).fold(0.0, f64::max);
-    (fraction.min(1.0), ends().map(|(_, left)| left).reduce(f64::min))
-}
-
-fn percent(x: f64) -> String {
-    format!("{:.2} %", 100.0 * x)
-}
-
-/// State of a run in one line: passes that are done, of how many, the error and that which is
-/// wanted, and the seconds left.
-fn line(
-    done: u32,
-    count: Option<u32>,
-    wanted: Option<f64>,
-    error: Option<&ErrorEstimate>,
-    left: Option<f64>,
-) -> String {
-    let of = count.map_or(String::new(), |count| format!(" of {count}"));
-    let wanted = wanted.map_or(String::new(), |wanted| format!(", {} wanted", percent(wanted)));
-    let error = error.map_or(String::new(), |error| {
-        let (total, noise, bias) = (percent(error.total()), percent(error.noise), percent(error.bias));
-        format!("; estimated error {total} (noise {noise}, bias {bias}){wanted}")
-    });
-    let left = left.filter(|left| *left >= 0.5);
-    let left = left.map_or(String::new(), |left| format!("; {} left", words_of_seconds(left)));
-    format!("passes: {done}{of}{error}{left}")
-}
-
-/// Whether a run reached the error that was wanted, in one line.
-fn verdict(target: f64, error: Option<&ErrorEstimate>, passes: Option<PassRange>) -> String {
-    let count = passes.map_or(0, |passes| passes.count());
-    let after = if count == 1 { "1 pass".to_owned() } else { format!("{count} passes") };
-    match error {
-        Some(error) if is_reached(target, error, count) => {
-            format!("--target-error {target} is reached after {after}: {}", percent(error.total()))
-        }
-        Some(error) if error.total() > target => {
-            format!("warning: --target-error {target} is not reached after {after}: {}", percent(error.total()))
-        }
-        _ => format!(
-            "warning: --target-error {target} is not known to be reached after {after}: it takes {LEAST_PASSES} to tell"
-        ),
-    }
-}
-
 /// Passes of a sum as words.
 fn passes(sum: &PassSum) -> String {
     sum.range().map_or("none".to_owned(), |range| range.to_string())
@@ -235,13 +179,18 @@ fn passes(sum: &PassSum) -> String {
 fn check_region(inputs: &Inputs) -> Result<()> {
     let Some(region) = inputs.args.passes.region else { return Ok(()) };
     let size = size_of(inputs.scene, &inputs.settings.picture)?;
-    let window = inputs.settings.picture.window(size);
-    if region.touches((window.column, window.row), (window.width, window.height)) {
-        return Ok(());
+    let Crop { column, row, width, height } = region;
+    let refuse =
+        |problem| Err(Error::Setting { name: "--region", value: format!("{column},{row},{width},{height}"), problem });
+    let is_inside = |first: u32, count: u32, whole: u32| u64::from(first) + u64::from(count) <= u64::from(whole);
+    if !is_inside(column, width, size.0) || !is_inside(row, height, size.1) {
+        return refuse(format!("must have pixels, all of them in the picture of {}x{}", size.0, size.1));
     }
-    let value = format!("{},{},{},{}", region.column, region.row, region.width, region.height);
-    let problem = format!("has no pixel of the picture of {}x{}, or of its crop", size.0, size.1);
-    Err(Error::Setting { name: "--region", value, problem })
+    let window = inputs.settings.picture.window(size);
+    if !region.touches((window.column, window.row), (window.width, window.height)) {
+        return refuse("has no pixel of `picture.crop`".to_owned());
+    }
+    Ok(())
 }
 
 /// Attributes of the pictures and parts of the run.
@@ -266,7 +215,12 @@ fn resume<'a>(inputs: &Inputs<'a>, range: PassRange, done: &mut Done) -> Result<
     if !options.resume {
         return refuse("is there already; --resume goes on with it".to_owned());
     }
-    let (header, sum) = read_part(path)?;
+    let (header, sum) = read_part(path).map_err(|error| match error {
+        Error::Io { path, source } => {
+            Error::Io { path, source: io::Error::new(source.kind(), format!("{source}; {ANEW}")) }
+        }
+        other => other,
+    })?;
     let ours = attributes(inputs, &done.stats);
     let mut told = differences(&ours, &header.attributes);
     let theirs = |name: &str| header.attributes.get(name).map_or("unknown", String::as_str).to_owned();
@@ -286,7 +240,7 @@ fn resume<'a>(inputs: &Inputs<'a>, range: PassRange, done: &mut Done) -> Result<
         told.push(format!("it has the passes {}, and {range} are asked for", header.passes));
     }
     if !told.is_empty() {
-        return refuse(format!("is {what} of another run: {}; without the file, it is begun anew", told.join(", ")));
+        return refuse(format!("is {what} of another run: {}; {ANEW}", told.join(", ")));
     }
     inputs.display.note(&format!("goes on after the passes {} of {}", header.passes, path.display()));
     done.sum = sum;
@@ -297,8 +251,14 @@ fn save(inputs: &Inputs, path: &Path, done: &Done) -> Result<()> {
     write_part(path, &done.sum, &attributes(inputs, &done.stats))
 }
 
+/// Writes the pictures so far.
+fn write_pictures(inputs: &Inputs, done: &Done) -> Result<()> {
+    let Picture { frame, attributes, .. } = picture(inputs, done, Failures::default())?;
+    (inputs.write)(&frame, &attributes)
+}
+
 /// The picture so far.
-fn picture(inputs: &Inputs, done: &Done) -> Result<Picture> {
+fn picture(inputs: &Inputs, done: &Done, failures: Failures) -> Result<Picture> {
     let total = done.sum.total()?.ok_or_else(|| Error::Incomplete("no pass was rendered".to_owned()))?;
     let mut stats = done.stats.clone();
     (stats.photons.global, stats.photons.caustic) = (total.photons().global, total.photons().caustic);
@@ -312,7 +272,7 @@ fn picture(inputs: &Inputs, done: &Done) -> Result<Picture> {
         noise: error.map(|error| error.noise),
         bias: error.map(|error| error.bias),
     });
-    Ok(Picture { frame: total.film().finish_with_errors(), attributes, stats })
+    Ok(Picture { frame: total.film().finish_with_errors(), attributes, stats, failures })
 }
 
 /// Shows the stages of the first pass; further ones are reported as wholes.
@@ -330,44 +290,5 @@ impl Progress for Stages<'_> {
 
     fn stop_requested(&self) -> bool {
         self.display.stop_requested()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_line_tells_passes_error_and_time() {
-        let error = ErrorEstimate { noise: 0.03, bias: 0.04 };
-        let expected = "passes: 2 of 8; estimated error 5.00 % (noise 3.00 %, bias 4.00 %); 12 s left";
-        assert_eq!(line(2, Some(8), None, Some(&error), Some(12.0)), expected);
-        let expected = "passes: 5; estimated error 5.00 % (noise 3.00 %, bias 4.00 %), 1.00 % wanted";
-        assert_eq!(line(5, None, Some(0.01), Some(&error), None), expected);
-        assert_eq!(line(5, None, None, None, Some(8.0)), "passes: 5; 8 s left");
-        assert_eq!(line(1, None, Some(0.01), None, None), "passes: 1");
-    }
-
-    #[test]
-    fn time_left_is_that_of_the_earlier_end() {
-        let at = |time, count| outlook(time, count, 5, Duration::from_secs(10), Duration::from_secs(2));
-        let seconds = |time| Some(Duration::from_secs(time));
-        assert_eq!(at(None, Some(10)), (0.5, Some(10.0)));
-        assert_eq!(at(seconds(12), Some(10)), (10.0 / 12.0, Some(2.0)));
-        assert_eq!(at(seconds(100), Some(10)), (0.5, Some(10.0)));
-        assert_eq!(at(seconds(40), None), (0.25, Some(30.0)));
-        assert_eq!(at(None, None), (0.0, None), "nobody knows when a target is reached");
-    }
-
-    #[test]
-    fn a_target_is_reached_or_not() {
-        let error = ErrorEstimate { noise: 0.03, bias: 0.04 };
-        let passes = |end| Some(PassRange { first: 0, end });
-        let said = |target, end| verdict(target, Some(&error), passes(end));
-        assert_eq!(said(0.06, 9), "--target-error 0.06 is reached after 9 passes: 5.00 %");
-        assert_eq!(said(0.01, 9), "warning: --target-error 0.01 is not reached after 9 passes: 5.00 %");
-        let unknown = "warning: --target-error 0.06 is not known to be reached after 1 pass: it takes 4 to tell";
-        assert_eq!(verdict(0.06, None, passes(1)), unknown);
-        assert_eq!(said(0.06, 3), unknown.replace("1 pass", "3 passes"));
     }
 }

@@ -20,8 +20,16 @@ enum Target {
     Nowhere,
     /// Number of tenths last reported for each stage.
     Lines(Mutex<Vec<(Stage, u64)>>),
-    /// The bar, and the stage that it shows.
-    Bar(ProgressBar, Mutex<Option<Stage>>),
+    /// The bar, and what it shows.
+    Bar(ProgressBar, Mutex<Shown>),
+}
+
+/// What a bar shows.
+#[derive(Debug, Default)]
+struct Shown {
+    stage: Option<Stage>,
+    /// Line of [`Display::state`].
+    state: Option<String>,
 }
 
 /// Listener that shows the progress of a render and passes stop signals to it.
@@ -92,8 +100,12 @@ impl Display {
             Target::Nowhere => {}
             Target::Lines(_) if new => say(line),
             Target::Lines(_) => {}
-            Target::Bar(bar, _) => {
-                bar.set_message(line.to_string());
+            Target::Bar(bar, shown) => {
+                if lock(shown).state.replace(line.to_owned()).is_none() {
+                    // The line is drawn without the bar, which is still that of a stage.
+                    bar.set_style(words());
+                }
+                bar.set_message(line.to_owned());
                 bar.set_style(state_style());
                 bar.update(|state| {
                     state.set_len(1000);
@@ -103,10 +115,13 @@ impl Display {
         }
     }
 
-    /// Removes the bar.
+    /// Removes the bar. The last state of long work stays as a line.
     pub fn finish(&self) {
-        if let Target::Bar(bar, _) = &self.target {
+        if let Target::Bar(bar, shown) = &self.target {
             bar.finish_and_clear();
+            if let Some(line) = lock(shown).state.take() {
+                say(&line);
+            }
         }
     }
 }
@@ -122,7 +137,7 @@ impl Progress for Display {
                 }
             }
             Target::Bar(bar, shown) => {
-                let is_new = lock(shown).replace(stage) != Some(stage);
+                let is_new = lock(shown).stage.replace(stage) != Some(stage);
                 let unit = unit(stage, total);
                 if is_new || unit.is_none() {
                     // The bar is drawn without numbers until it has those of the stage.
@@ -223,7 +238,7 @@ fn style(unit: &str, left: &str) -> ProgressStyle {
 }
 
 fn state_style() -> ProgressStyle {
-    ProgressStyle::with_template("{bar:24} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
+    ProgressStyle::with_template("{bar:10} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! `caustica render`.
 
 use std::{
-    collections::HashSet,
     io,
     path::{Path, PathBuf},
     time::Instant,
@@ -18,12 +17,11 @@ use caustica::{
     stats::{Stats, timed},
 };
 
-use clap::{CommandFactory, error::ErrorKind};
-
 use super::{
-    args::{Args, RenderArgs},
+    args::RenderArgs,
     bugs,
-    files::{Files, identity, make_folder},
+    failures::Failures,
+    files::{Files, make_folder},
     outlook::{Outlook, Plan},
     passes::{self, Inputs, Picture},
     progress::Display,
@@ -33,13 +31,13 @@ use super::{
 };
 
 /// A scene and the pictures that are made of it.
-struct Job {
-    scene: PathBuf,
-    pictures: Vec<PathBuf>,
+pub(super) struct Job {
+    pub scene: PathBuf,
+    pub pictures: Vec<PathBuf>,
 }
 
 /// Jobs of the command, scene by scene.
-fn jobs(args: &RenderArgs) -> Vec<Job> {
+pub(super) fn jobs(args: &RenderArgs) -> Vec<Job> {
     let pictures = |scene: &PathBuf| match &args.output_dir {
         None => args.outputs.clone(),
         Some(folder) => {
@@ -54,34 +52,8 @@ fn jobs(args: &RenderArgs) -> Vec<Job> {
     args.scenes.iter().map(|scene| Job { scene: scene.clone(), pictures: pictures(scene) }).collect()
 }
 
-/// Refuses wrong usage that no single argument shows: two outputs that are one file, and several
-/// scenes without a folder for their pictures.
-pub fn check(args: &RenderArgs) -> std::result::Result<(), clap::Error> {
-    let mut known = HashSet::new();
-    let jobs = jobs(args);
-    let twice = (args.scenes.len() == 1 || args.output_dir.is_some())
-        .then(|| jobs.iter().flat_map(|job| outputs(args, job)).find(|path| !known.insert(identity(path))))
-        .flatten();
-    // A negative number is no option, and reads like one more scene.
-    let stray = args.scenes[1..].iter().find(|scene| scene.to_string_lossy().starts_with('-'));
-    let problem = match twice {
-        _ if stray.is_some() => {
-            format!("unexpected argument '{}' found", stray.map_or("".into(), |s| s.to_string_lossy()))
-        }
-        Some(path) => format!("{} is another output as well", path.display()),
-        None if args.scenes.len() > 1 && args.output_dir.is_none() => {
-            format!("{} scenes need --output-dir for their pictures", args.scenes.len())
-        }
-        None => return Ok(()),
-    };
-    let mut command = Args::command();
-    command.build();
-    let usage_of = command.find_subcommand_mut("render").expect("this is its check");
-    Err(usage_of.error(ErrorKind::ArgumentConflict, problem))
-}
-
 /// All files that a run over one scene writes.
-fn outputs<'a>(args: &'a RenderArgs, job: &'a Job) -> impl Iterator<Item = &'a PathBuf> {
+pub(super) fn outputs<'a>(args: &'a RenderArgs, job: &'a Job) -> impl Iterator<Item = &'a PathBuf> {
     job.pictures.iter().chain(&args.stats).chain(&args.passes.part).chain(&args.passes.checkpoint)
 }
 
@@ -152,7 +124,11 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
     };
     display.note(&format!("device: {} ({})", gpu.name, gpu.driver));
     let write = |frame: &Frame, attributes: &Attributes| {
-        job.pictures.iter().try_for_each(|path| write_picture(path, frame, attributes, args))
+        let mut failures = Failures::default();
+        for path in &job.pictures {
+            failures.take(write_picture(path, frame, attributes, args));
+        }
+        failures.outcome()
     };
     let picture = if args.passes.are_given() {
         let (gpu, scene, settings) = (&*gpu, &scene, &settings);
@@ -162,9 +138,13 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
         let result = renderer::render(gpu, &scene, &settings, display);
         display.finish();
         let renderer::Render { frame, stats } = result?;
-        Picture { frame, attributes: scene.origin(&settings, &stats).attributes(), stats }
+        let attributes = scene.origin(&settings, &stats).attributes();
+        Picture { frame, attributes, stats, failures: Failures::default() }
     };
-    let Picture { frame, attributes, mut stats } = picture;
+    let Picture { frame, attributes, mut stats, mut failures } = picture;
+    if is_empty(&frame) {
+        stats.warnings.push(unseen(&scene, &settings)?);
+    }
     for warning in stats.warnings.iter().filter(|w| !scene.warnings.contains(w)) {
         display.note(&format!("warning: {warning}"));
     }
@@ -174,7 +154,9 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
 
     for path in &job.pictures {
         display.check()?;
-        write_picture(path, &frame, &attributes, args)?;
+        if !failures.take(write_picture(path, &frame, &attributes, args)) {
+            continue;
+        }
         if extension(path) == "png" {
             display.note(&exposure_line(options.shared.exposure, &frame));
         }
@@ -185,7 +167,24 @@ fn render_one(args: &RenderArgs, job: &Job, display: &Display, device: &mut Opti
     if options.shared.verbose {
         display.note(&summary(&stats));
     }
-    args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats))
+    if let Some(path) = &args.stats {
+        failures.take(write_stats(path, &stats));
+    }
+    failures.outcome()
+}
+
+/// Whether no sample has met a surface, and no light comes from beyond.
+fn is_empty(frame: &Frame) -> bool {
+    let is_zero = |numbers: &[f32]| numbers.iter().all(|x| *x == 0.0);
+    is_zero(frame.alpha()) && is_zero(frame.layer("radiance"))
+}
+
+/// Warning of an empty picture.
+fn unseen(scene: &Scene, settings: &Settings) -> Result<String> {
+    let number = scene.camera_number(settings.picture.camera.as_deref())?;
+    let place = if settings.picture.crop.is_some() { " in this crop" } else { "" };
+    let name = &scene.cameras[number].name;
+    Ok(format!("the camera {number} {name:?} sees nothing of the scene{place}: the picture is empty"))
 }
 
 /// Note on why a kd-tree's picture differs from the default one.
@@ -257,6 +256,15 @@ fn summary(stats: &Stats) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_picture_of_nothing_has_neither_surfaces_nor_light() {
+        let mut frame = Frame::new(2, 1, &[[0.0; 3]; 2]);
+        assert!(is_empty(&frame));
+        frame.layer_mut("alpha")[1] = 0.25;
+        assert!(!is_empty(&frame), "a black surface");
+        assert!(!is_empty(&Frame::new(2, 1, &[[0.0; 3], [0.0, 0.0, 1e-9]])), "a sky");
+    }
 
     #[test]
     fn a_picture_that_is_all_but_dark_is_named() {

@@ -55,9 +55,12 @@ pub fn choose(wanted: Option<&str>) -> Result<AdapterReport> {
         Some(w) => find(&all, w),
     };
     let Some(index) = index else {
-        let names: Vec<_> = all.iter().enumerate().map(|(i, a)| format!("{i}: {}", a.name)).collect();
+        let names: Vec<_> = all.iter().enumerate().map(|(i, a)| format!("{i} {:?}", a.name)).collect();
         let wanted = wanted.unwrap_or_default();
-        return Err(Error::Device(format!("no adapter is called '{wanted}'; there are {}", names.join(", "))));
+        return Err(Error::Device(format!(
+            "no adapter is called '{wanted}'; this machine has the adapters {}",
+            names.join(", ")
+        )));
     };
     let chosen = all.swap_remove(index);
     match &chosen.unusable {

@@ -94,6 +94,11 @@ pub(super) fn our_attributes<'a>(all: impl Iterator<Item = (&'a Text, &'a Attrib
 }
 
 pub(super) fn open(path: &Path) -> Result<ReadImage> {
+    open_or(path, |error| failure(path, error))
+}
+
+/// Variant of [`open`] with another error for what the decoder refuses.
+pub(super) fn open_or(path: &Path, refused: impl FnOnce(exr::error::Error) -> Error) -> Result<ReadImage> {
     let mut bytes = Vec::new();
     open_regular(path)
         .and_then(|mut file| file.read_to_end(&mut bytes))
@@ -108,7 +113,7 @@ pub(super) fn open(path: &Path) -> Result<ReadImage> {
         // Decodes on one thread: a panic in a worker thread of the exr crate would end the process.
         .non_parallel()
         .from_buffered(Cursor::new(bytes))
-        .map_err(|e| failure(path, e))
+        .map_err(refused)
 }
 
 /// Refuses a file that claims more numbers than its bytes can hold, before memory is taken for

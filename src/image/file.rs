@@ -43,7 +43,9 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
             return File::options().write(true).open(path)?.write_all(bytes);
         };
         let mut temporary = create_beside(&target)?;
-        let written = temporary.write_all(bytes).and_then(|()| temporary.as_file().sync_all());
+        // Errors of the file itself do not name it.
+        let file = temporary.as_file_mut();
+        let written = file.write_all(bytes).and_then(|()| file.sync_all());
         put_in_place(temporary, written, &target)
     };
     write().map_err(|source| Error::Io { path: path.to_path_buf(), source })
@@ -162,7 +164,8 @@ fn explain(error: io::Error, folder: &Path) -> io::Error {
             "cannot be written"
         }
         io::ErrorKind::NotADirectory => "is not a folder",
-        _ => return error,
+        // The temporary name ends the message.
+        _ => return io::Error::new(kind, error.to_string().split(" at path ").next().unwrap_or_default().to_owned()),
     };
     io::Error::new(kind, format!("the folder {} {why}", folder.display()))
 }
@@ -212,6 +215,12 @@ mod tests {
         assert!(text(&protected).contains("write-protected"));
         assert_eq!(fs::read(&protected).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["old.exr"]);
+    }
+
+    #[test]
+    fn messages_do_not_have_the_temporary_name() {
+        let error = io::Error::new(io::ErrorKind::StorageFull, "no space at path \"/a/.caustica-1.part\"");
+        assert_eq!(explain(error, Path::new("/")).to_string(), "no space");
     }
 
     #[cfg(unix)]

@@ -26,7 +26,7 @@ const MOST_TOLD: usize = 3;
 pub struct Survey {
     /// Width and height of the picture, pixels.
     pub whole: (u32, u32),
-    /// Attributes of the first part.
+    /// Attributes of the part with the first pass, of several crops the upper left one.
     pub attributes: Attributes,
     /// Parts of the picture's pixels, from the top and the left.
     pub windows: Vec<WindowParts>,
@@ -71,9 +71,15 @@ pub fn survey(paths: &[PathBuf]) -> Result<Survey> {
         devices: BTreeSet::new(),
         overlaps: Vec::new(),
     };
+    let place = |part: &PartHeader| (part.passes.first, part.window.row, part.window.column);
+    let mut earliest = place(&first);
     for path in paths {
         let part = read_part_header(path)?;
         refuse_others(&part, path, &first, &paths[0])?;
+        if place(&part) < earliest {
+            earliest = place(&part);
+            survey.attributes.clone_from(&part.attributes);
+        }
         let attribute = |name: &str| part.attributes.get(name).cloned().unwrap_or_default();
         survey.devices.insert((attribute("device"), attribute("driver")));
         let entry = (part.passes, path.clone());
@@ -90,7 +96,7 @@ pub fn survey(paths: &[PathBuf]) -> Result<Survey> {
 
 fn refuse_others(part: &PartHeader, path: &Path, first: &PartHeader, first_path: &Path) -> Result<()> {
     let mut told = differences(&first.attributes, &part.attributes);
-    if part.whole != first.whole {
+    if part.whole != first.whole && !told.iter().any(|line| line.starts_with("`picture.size`")) {
         let size = |(width, height)| format!("{width}x{height}");
         told.push(format!("the size is {}, not {}", size(part.whole), size(first.whole)));
     }
@@ -328,7 +334,9 @@ mod tests {
     const WHOLE: (u32, u32) = (4, 3);
 
     /// Writes the passes of some pixels. Each pixel has values of its own in each pass.
+    /// The name of the scene is that of the file.
     fn write(path: &Path, window: Crop, passes: std::ops::Range<u32>, version: &str) -> PathBuf {
+        let scene = path.file_name().unwrap().to_str().unwrap();
         let mut sum = PassSum::default();
         for index in passes {
             let mut film = Film::new(WHOLE, window, 2);
@@ -344,7 +352,7 @@ mod tests {
             let film = film.with_bandwidth(1.0 / f64::from(index + 1));
             sum.push(PassBlock::of_pass(index, film, &Stats::default())).unwrap();
         }
-        let attributes = [("version", version)].map(|(a, b)| (a.to_owned(), b.to_owned())).into();
+        let attributes = [("version", version), ("scene", scene)].map(|(a, b)| (a.to_owned(), b.to_owned())).into();
         write_part(path, &sum, &attributes).unwrap();
         path.to_path_buf()
     }
@@ -373,6 +381,24 @@ mod tests {
         ];
         assert_eq!(merged(&crops), one);
         assert_ne!(merged(&passes[1..]), one, "control");
+    }
+
+    #[test]
+    fn attributes_are_those_of_the_first_pass_whatever_the_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
+        let (top, rest) = (Crop { height: 1, ..ALL }, Crop { row: 1, height: 2, ..ALL });
+        let parts = [
+            write(&file("late"), top, 3..4, "1"),
+            write(&file("low"), rest, 0..4, "1"),
+            write(&file("first"), top, 0..3, "1"),
+        ];
+        for turn in 0..3 {
+            let mut parts = parts.clone();
+            parts.rotate_left(turn);
+            let attributes = merge(&survey(&parts).unwrap(), &|_| Ok(())).unwrap().1;
+            assert_eq!(attributes["scene"], "first", "{turn}");
+        }
     }
 
     #[test]

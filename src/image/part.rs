@@ -18,7 +18,7 @@ use super::{
     bias_check::BiasCheck,
     cryptomatte::{Matte, RANKS},
     exr::{Attributes, channels_of, count_photons, count_samples, encode, failure},
-    exr_read::{attributes_of, open, our_attributes, window_of},
+    exr_read::{attributes_of, open_or, our_attributes, window_of},
     file::{open_regular, write_file},
     film::Film,
     film_sums::{Bandwidth, ExtraSums, Moments},
@@ -200,7 +200,10 @@ fn range(rows: &[BlockRow]) -> PassRange {
 /// [`Error::Io`] if the file cannot be read, is not a part, or is cut off.
 pub fn read_part_header(path: &Path) -> Result<PartHeader> {
     let file = open_regular(path).map_err(|source| Error::Io { path: path.to_path_buf(), source })?;
-    let file = exr::block::read(BufReader::new(file), false).map_err(|e| failure(path, e))?;
+    let file = exr::block::read(BufReader::new(file), false).map_err(|error| match error {
+        exr::error::Error::Io(source) => Error::Io { path: path.to_path_buf(), source },
+        _ => no_part(path),
+    })?;
     let [header] = file.headers() else { return Err(no_part(path)) };
     let attributes = our_attributes(header.shared_attributes.other.iter().chain(&header.own_attributes.other));
     let size = (header.layer_size.width() as u32, header.layer_size.height() as u32);
@@ -226,7 +229,8 @@ pub fn read_part_header(path: &Path) -> Result<PartHeader> {
 /// # Errors
 /// [`Error::Io`] if the file cannot be read or is not a part.
 pub fn read_part(path: &Path) -> Result<(PartHeader, PassSum)> {
-    let image = open(path)?;
+    // What the decoder refuses is no part, or is cut off, or else has a damaged line.
+    let image = open_or(path, |_| read_part_header(path).err().unwrap_or_else(|| damaged(path)))?;
     let attributes = attributes_of(&image);
     let rows = rows(path, &attributes)?;
     let layer = &image.layer_data;
@@ -333,6 +337,10 @@ fn rows(path: &Path, attributes: &Attributes) -> Result<Vec<BlockRow>> {
 
 fn cut_off(path: &Path) -> Error {
     failure(path, "is a broken part: the end of the file is missing")
+}
+
+fn damaged(path: &Path) -> Error {
+    failure(path, "is a broken part: its pixels are damaged")
 }
 
 fn no_part(path: &Path) -> Error {
@@ -458,6 +466,16 @@ mod tests {
             let message = read_part_header(&path).unwrap_err().to_string();
             assert!(message.ends_with("a.exr: is a broken part: the end of the file is missing"), "{message}");
             assert!(read_part(&path).is_err());
+        }
+        let mut damaged = whole.clone();
+        let middle = whole.len() - 300;
+        damaged[middle..middle + 40].fill(255);
+        std::fs::write(&path, &damaged).unwrap();
+        let message = read_part(&path).unwrap_err().to_string();
+        assert!(message.contains("is a broken part: its pixels are damaged"), "{message}");
+        for bytes in [&b"no picture at all"[..], b"", &whole[..100]] {
+            std::fs::write(&path, bytes).unwrap();
+            assert!(said(&path).contains("is no part of a picture"), "{}", said(&path));
         }
         for blocks in ["[]", "{}", "7", r#"[{"passes":{"first":3,"end":9}}]"#] {
             let mut attributes = attributes();

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use super::exr::Attributes;
+use super::exr::{Attributes, CRYPTOMATTE};
 
 /// Attributes that parts of one picture may differ in, since they follow from where and what a part
 /// is.
@@ -26,21 +26,41 @@ const OF_PART: [&str; 12] = [
 /// Attributes that hold settings as JSON.
 const OF_SETTINGS: [&str; 2] = ["settings", "loading"];
 
+/// Characters of a hash that a message has: enough to tell scenes apart.
+const SHORT_HASH: usize = 12;
+
 /// Differences between the pictures of two parts: scene, settings or version, one by one. Names of
 /// settings stand in backquotes.
 #[must_use]
 pub fn differences(one: &Attributes, other: &Attributes) -> Vec<String> {
-    let (one, other) = (identity(one), identity(other));
-    let names: BTreeSet<&String> = one.keys().chain(other.keys()).collect();
-    let differ = names.into_iter().filter(|name| one.get(*name) != other.get(*name));
-    let value = |of: &BTreeMap<String, String>, name: &String| of.get(name).map_or("none", String::as_str).to_owned();
-    differ.map(|name| format!("{name} is {}, not {}", value(&other, name), value(&one, name))).collect()
+    let (ours, theirs) = (identity(one), identity(other));
+    let names: BTreeSet<&String> = ours.keys().chain(theirs.keys()).collect();
+    let differ = names.into_iter().filter(|name| ours.get(*name) != theirs.get(*name));
+    let told = |name: &String| {
+        format!("{name} is {}, not {}", words(name, theirs.get(name), other), words(name, ours.get(name), one))
+    };
+    differ.map(told).collect()
+}
+
+/// A value in words; a hash with the name of the scene.
+fn words(name: &str, value: Option<&String>, attributes: &Attributes) -> String {
+    match value.map(String::as_str) {
+        None | Some("null") => "none".to_owned(),
+        Some(hash) if name == "sceneHash" => {
+            let short: String = hash.chars().take(SHORT_HASH).collect();
+            attributes.get("scene").map_or(short.clone(), |scene| format!("{short} ({scene})"))
+        }
+        Some(size) if name == "`picture.size`" => size.trim_matches(['[', ']']).replace(',', "x"),
+        Some(value) => value.to_owned(),
+    }
 }
 
 /// All that decides the pixels of a picture, by name.
 fn identity(attributes: &Attributes) -> BTreeMap<String, String> {
     let mut all = BTreeMap::new();
-    for (name, value) in attributes.iter().filter(|(name, _)| !OF_PART.contains(&name.as_str())) {
+    // Mattes follow from the scene and the settings.
+    let is_of_picture = |name: &str| !OF_PART.contains(&name) && !name.starts_with(CRYPTOMATTE);
+    for (name, value) in attributes.iter().filter(|(name, _)| is_of_picture(name)) {
         let settings = serde_json::from_str::<Value>(value).ok().filter(|_| OF_SETTINGS.contains(&name.as_str()));
         match settings {
             Some(Value::Object(fields)) => {
@@ -94,5 +114,20 @@ mod tests {
         let mut lacking = one.clone();
         lacking.remove("sceneHash");
         assert_eq!(differences(&one, &lacking), ["sceneHash is none, not ab"]);
+    }
+
+    #[test]
+    fn scenes_sizes_and_what_is_none_are_told_in_words() {
+        let settings = Settings::default();
+        let named = |settings: &Settings, hash: &str, scene: &str, matte: &str| {
+            let mut all = attributes(settings, &hash.repeat(32));
+            all.insert("scene".to_owned(), scene.to_owned());
+            all.insert(format!("{CRYPTOMATTE}12ab/manifest"), matte.to_owned());
+            all
+        };
+        let one = named(&settings.clone().with(|s| s.picture.size = Some((8, 6))), "ab", "a.glb", "{}");
+        assert_eq!(differences(&one, &named(&settings, "ab", "b.glb", "{}")), ["`picture.size` is none, not 8x6"]);
+        let other = named(&settings.with(|s| s.picture.size = Some((8, 6))), "cd", "b.glb", "{\"a\":1}");
+        assert_eq!(differences(&one, &other), ["sceneHash is cdcdcdcdcdcd (b.glb), not abababababab (a.glb)"]);
     }
 }

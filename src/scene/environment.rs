@@ -64,7 +64,12 @@ impl Environment {
         }
         let name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
         let black = (brightest == 0.0).then(|| "is black: it gives no light".to_owned());
-        let warnings = picture.notes.into_iter().chain(black).map(|note| format!("{name}: {note}")).collect();
+        let (width, height) = (picture.width, picture.height);
+        let stretched = (picture.pixels.len() > 1 && u64::from(width) != 2 * u64::from(height)).then(|| {
+            format!("is {width}x{height}: it is stretched, as pictures of all directions are twice as wide as high")
+        });
+        let warnings =
+            picture.notes.into_iter().chain(black).chain(stretched).map(|note| format!("{name}: {note}")).collect();
         Ok(Self {
             name,
             hash: hash(bytes),
@@ -249,6 +254,9 @@ mod tests {
         assert_eq!(sky.hash, digest);
         write(255);
         assert_ne!(load(1.0, 0.0).expect("it loads").hash, digest);
+        let square = [&b"#?RGBE\n\n-Y 2 +X 2\n"[..], &[128; 16]].concat();
+        let square = Environment::from_bytes(&square, &path, 1.0, 0.0).expect("it loads").warnings;
+        assert!(matches!(&square[..], [line] if line.starts_with("sky.hdr: is 2x2: it is stretched")), "{square:?}");
         let refused = |strength: f32, rotation: f32| {
             let error = load(strength, rotation).expect_err("it must be refused").to_string();
             error.replace(&path.display().to_string(), "sky.hdr")

@@ -99,6 +99,8 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_right() {
         ("render scene.gltf -o a.exr --passes 2 --alpha 0", "a number above 0, at most 1"),
         ("render scene.gltf -o a.exr --alpha 0.5", "--passes"),
         ("render scene.gltf -o a.exr --time 5", "90s, 10m or 2h"),
+        ("render scene.gltf -o a.exr --time -5s", "90s, 10m or 2h"),
+        ("render scene.gltf -o a.exr --passes 2 --checkpoint a --every -5s", "90s, 10m or 2h"),
         ("render scene.gltf -o a.exr --target-error 2", "a number above 0, at most 1"),
         ("render scene.gltf -o a.exr --passes 2 --resume", "--checkpoint"),
         ("render scene.gltf -o a.exr --passes 2 --part a.png", "does not end in .exr"),
@@ -108,6 +110,12 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_right() {
         ("render scene.gltf -o a.exr -o a.exr", "another output"),
         ("render scene.gltf -o a.exr -o ./a.exr", "another output"),
         ("render scene.gltf -o a.exr --stats a.exr", "another output"),
+        ("merge old.exr -o a.exr -o ./a.exr", "another output"),
+        ("render scene.gltf -o a.exr --radius 0.1", "error: --radius 0.1: goes with the search by radius only"),
+        (
+            "render scene.gltf -o a.exr --final-gather 4 --mode photons",
+            "error: --final-gather 4: goes with the modes hybrid and indirect-photons",
+        ),
         ("render scene.gltf -o a.exr --mode fast", "direct-rays"),
         ("render scene.gltf -o a.exr --mode fast", "the numbers 0 to 4"),
         ("render scene.gltf -o a.exr --mode 5", "direct-rays"),
@@ -198,12 +206,10 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
         ("render nan.gltf -o a.exr", "nan.gltf"),
         ("render dark.gltf -o a.exr --default-light none", "file, or give --env, --background or --default-light sky"),
         ("render empty.gltf -o a.exr", "empty.gltf"),
-        ("render scene.gltf -o a.exr --camera none", "error: camera none: scene.gltf has the cameras 0"),
-        ("render scene.gltf -o a.exr --device no-such-adapter", "no-such-adapter"),
-        ("render scene.gltf -o a.exr --radius 0.1", "error: radius 0.1: goes with the search by radius only"),
+        ("render scene.gltf -o a.exr --camera none", "error: --camera none: scene.gltf has the cameras 0"),
         (
-            "render scene.gltf -o a.exr --final-gather 4 --mode photons",
-            "error: final-gather 4: goes with the modes hybrid and indirect-photons",
+            "render scene.gltf -o a.exr --device no-such-adapter",
+            "error: no adapter is called 'no-such-adapter'; this machine has the adapters 0 \"",
         ),
         ("render scene.gltf -o folder.exr", "folder.exr: is a folder"),
         ("render scene.gltf -o nowhere/a.exr", "the folder nowhere does not exist"),
@@ -226,6 +232,34 @@ fn failures_are_exit_code_1_and_one_line_with_the_place() {
     let left = ["dark.gltf", "empty.gltf", "folder.exr", "nan.gltf", "old.exr", "scene.gltf", "sky", "text.gltf"];
     assert_eq!(names(folder.path()), left);
     assert_eq!(names(&folder.path().join("sky")), ["grid.exr", "study.csv"]);
+}
+
+#[test]
+fn a_camera_that_sees_nothing_is_named() {
+    let folder = folder();
+    let camera = r#""cameras": [{"type": "perspective", "name": "away", "perspective": {"yfov": 0.6, "znear": 0.1}}],
+  "scene": 0,"#;
+    let scene = SCENE.replace("POSITIONS", TRIANGLE).replace(r#""scene": 0,"#, camera);
+    let scene = scene.replace(r#""nodes": [0, 1]}"#, r#""nodes": [0, 1, 2]}"#);
+    // It looks along -Z.
+    let at = |z: i32| {
+        scene.replace(
+            r#""nodes": [{"mesh": 0}"#,
+            &format!(r#""nodes": [{{"mesh": 0}}, {{"camera": 0, "translation": [0, 0.5, {z}]}}"#),
+        )
+    };
+    let said = |z: i32| {
+        let scene = at(z).replace(r#""nodes": [0, 1, 2]"#, r#""nodes": [0, 2, 1]"#);
+        fs::write(folder.path().join("scene.gltf"), scene).expect("can be written");
+        let ended = render(folder.path(), "--mode direct-rays -o a.png --stats s.json");
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        ended.stderr
+    };
+    let warning = r#"the camera 0 "away" sees nothing of the scene: the picture is empty"#;
+    let away = said(-50);
+    assert!(away.lines().any(|line| line == format!("warning: {warning}")), "{away}");
+    assert!(fs::read_to_string(folder.path().join("s.json")).expect("text").contains("sees nothing"), "statistics");
+    assert!(!said(5).contains("sees nothing"), "control");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | manifest | `kubernetes-validate --strict` accepts the manifest | a member of another name |
 //! | engines | GNU parallel, Open Job Description and Slurm give the bytes of one run, whatever is killed or requeued meanwhile | fewer passes |
+//! | wrong numbers | recipes refuse passes and outputs that cannot be, before any work | |
 //! | again | a recipe that is called again renders what is missing, and refuses parts of other options | |
 
 use std::{
@@ -83,6 +84,29 @@ fn kill_a_render(parts: &Path) {
     waits("a checkpoint", || kept(parts));
     let pid = waits("a render", || render_of(parts));
     Command::new("kill").args(["-KILL", &pid]).status().expect("kill runs");
+}
+
+#[test]
+fn recipes_refuse_what_cannot_be_rendered() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for recipe in ["parallel/render", "slurm/submit"] {
+        for (words, wrong) in [
+            ("scene.gltf a.exr 8 0", "PER_TASK '0'"),
+            ("scene.gltf a.exr 0 2", "PASSES '0'"),
+            ("scene.gltf a.exr many 2", "PASSES 'many'"),
+            ("scene.gltf a.exr 8 2.5", "PER_TASK '2.5'"),
+            ("scene.gltf a.exr 08 2", "PASSES '08'"),
+            ("scene.gltf a.jpg 8 2", "OUT 'a.jpg' ends in neither .exr nor .png"),
+        ] {
+            let mut run = Command::new(format!("{ROOT}/deploy/{recipe}"));
+            let ended = run.current_dir(&folder).args(words.split(' ')).env("CAUSTICA", PROGRAM).output();
+            let ended = ended.expect("it starts");
+            let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+            assert_eq!(ended.status.code(), Some(2), "{recipe} {words}: {said}");
+            assert!(said.starts_with(&format!("error: {wrong}")) && said.contains("SCENE OUT.exr"), "{recipe}: {said}");
+        }
+    }
+    assert_eq!(fs::read_dir(&folder).expect("it can be listed").count(), 0);
 }
 
 #[test]

@@ -8,6 +8,7 @@
 //! | lost flux | is that of one pass, however many there are | rays are counted |
 //! | checkpoints | a run that goes on has the bytes of one that never stopped; other runs are refused | |
 //! | parts | a part that is there is gone on with, stays if nothing is left to do, or is refused by name | without `--resume` |
+//! | lost outputs | an output or a checkpoint that cannot be written costs no other one, and each is named | |
 //! | killed | after SIGKILL and SIGTERM, nothing is lost but the running pass | SIGTERM without a checkpoint |
 
 use std::{
@@ -97,7 +98,8 @@ fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
         assert!(other.contains(part), "{other}");
     }
     succeeds(folder, &small("--passes 5..6 --part scene.exr").replace(SCENE, OTHER_SCENE));
-    assert!(fails(folder, "merge a.exr b.exr scene.exr -o y.exr").contains("sceneHash is "));
+    let other = fails(folder, "merge a.exr b.exr scene.exr -o y.exr");
+    assert!(other.contains("sceneHash is ") && other.contains(" (area-light.gltf), not "), "{other}");
     let none = fails(folder, "merge one.exr -o y.exr");
     assert!(none.contains("one.exr: is no part of a picture: render --part or --checkpoint did not"), "{none}");
     assert!(fails(folder, "merge a.exr b.exr -o a.exr").contains("is a part as well"));
@@ -108,6 +110,13 @@ fn splits_over_passes_and_pixels_give_the_bytes_of_one_run() {
     }
     let more = fails(folder, "merge a.exr b.exr --passes 0..3 -o y.exr");
     assert!(more.contains("parts have the passes 0..5, and 0..3 are asked for"), "{more}");
+    let of_three = |words: &str| succeeds(folder, &format!("status a.exr b.exr --passes 0..3 {words}"));
+    let status: Value = serde_json::from_str(&of_three("--json")).expect("JSON");
+    assert_eq!((&status["complete"], &status["surplus"]), (&Value::from(false), &serde_json::json!(["0..5"])));
+    assert!(of_three("").contains("\nmore than asked for: passes 0..5\n"), "{}", of_three(""));
+    let status: Value = serde_json::from_str(&succeeds(folder, "status a.exr b.exr --passes 5 --json")).expect("JSON");
+    assert_eq!((&status["complete"], &status["surplus"]), (&Value::from(true), &serde_json::json!([])));
+    assert!(succeeds(folder, "status a.exr").contains(": passes 0..2 in 1 part\n"));
     assert!(!folder.join("y.exr").exists());
 }
 
@@ -132,7 +141,7 @@ fn a_run_says_what_ends_it() {
     let reached = said("--target-error 0.9");
     let lines = states(&reached);
     assert!(lines.iter().all(|line| !line.contains(" of ") && !line.contains("left")), "{reached}");
-    assert!(lines.last().is_some_and(|line| line.ends_with(", 90.00 % wanted")), "{reached}");
+    assert!(lines.last().is_some_and(|line| line.contains(" %, 90.00 % wanted (noise ")), "{reached}");
     assert!(reached.contains("\n--target-error 0.9 is reached after 4 passes: "), "{reached}");
     let missed = said("--target-error 0.0001 --passes 5");
     assert!(missed.contains("\nwarning: --target-error 0.0001 is not reached after 5 passes: "), "{missed}");
@@ -170,7 +179,11 @@ fn a_run_that_goes_on_has_the_bytes_of_one_that_never_stopped() {
     succeeds(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr"));
     assert!(bytes(folder, "again.exr") == bytes(folder, "one.exr"), "nothing was left to do");
     fs::write(folder.join("kept"), &bytes(folder, "kept")[..2000]).expect("it can be written");
-    assert!(fails(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr")).contains("kept: "));
+    let cut = fails(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr"));
+    assert!(cut.contains("kept: is ") && cut.ends_with("; without the file, it is begun anew\n"), "{cut}");
+    fs::write(folder.join("kept"), "text").expect("it can be written");
+    let text = fails(folder, &small("--passes 3 --checkpoint kept --resume -o again.exr"));
+    assert!(text.contains("kept: is no part of a picture: "), "{text}");
 }
 
 #[test]
@@ -197,11 +210,71 @@ fn a_run_goes_on_with_a_part_that_is_there() {
         fs::write(folder.join("kept"), &two).expect("it is written");
     }
     begin_anew();
+    succeeds(folder, &small("--part alone.exr --passes 2"));
+    succeeds(folder, &small("--part alone.exr --passes 3 --resume"));
+    assert!(bytes(folder, "alone.exr") == bytes(folder, "one.exr"), "without a checkpoint");
     succeeds(folder, &part("--passes 3 --resume"));
     assert!(bytes(folder, "p.exr") == bytes(folder, "one.exr"));
     begin_anew();
     succeeds(folder, &part("--passes 2 --seed 3"));
     assert!(bytes(folder, "p.exr") != two, "control: without --resume it is written anew");
+}
+
+#[test]
+fn a_region_lies_in_the_picture() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let render = |words: &str| fails(folder.path(), &small(&format!("--passes 1 -o a.exr {words}")));
+    for region in ["16,0,1,1", "0,0,17,1", "4294967295,0,4294967295,1"] {
+        let said = render(&format!("--region {region}"));
+        let expected = format!("error: --region {region}: must have pixels, all of them in the picture of 16x16\n");
+        assert_eq!(said, expected);
+    }
+    let said = render("--region 0,0,4,4 --crop 4,0,4,4");
+    assert_eq!(said, "error: --region 0,0,4,4: has no pixel of --crop\n");
+    succeeds(folder.path(), &small("--passes 1 -o a.exr --region 0,0,16,16"));
+}
+
+/// A command whose files may have no more than a kilobyte: enough for a small PNG.
+#[cfg(target_os = "linux")]
+fn with_small_files(folder: &Path, line: &str) -> String {
+    let mut shell = Command::new("bash");
+    shell.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "bash", env!("CARGO_BIN_EXE_caustica")]);
+    let output = shell.current_dir(folder).args(line.split_whitespace()).output().expect("it starts");
+    let said = String::from_utf8(output.stderr).expect("messages are text");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(!said.contains(".caustica-"), "the temporary name says nothing: {said}");
+    said
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn outputs_that_cannot_be_written_cost_no_other_one() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let too_large = "File too large (os error 27)";
+    let outputs = "-o a.exr -o a.png --stats s.json";
+    let said = with_small_files(folder, &small(&format!("--passes 2 --part p.exr --checkpoint kept {outputs}")));
+    assert_eq!(
+        said,
+        format!("error: kept: {too_large}; p.exr: {too_large}; a.exr: {too_large}; s.json: {too_large}\n")
+    );
+    assert!(folder.join("a.png").exists());
+    fs::remove_file(folder.join("a.png")).expect("it is there");
+    // During a run, failures are warnings.
+    let line = small("--passes 2 --checkpoint kept --every 0s -o a.png").replace(" -q", "");
+    let said = with_small_files(folder, &line);
+    assert!(said.contains(&format!("\nwarning: no checkpoint now: kept: {too_large}\n")), "{said}");
+    assert!(said.contains("\nwrote a.png\n") && !said.contains("no picture now"), "{said}");
+    fs::remove_file(folder.join("a.png")).expect("it is there");
+    with_small_files(folder, &small("-o a.exr -o a.png"));
+    assert!(folder.join("a.png").exists(), "without passes");
+    fs::remove_file(folder.join("a.png")).expect("it is there");
+    succeeds(folder, &small("--passes 1 --part p.exr"));
+    let said = with_small_files(folder, "merge p.exr -o a.exr -o a.png");
+    assert!(said.contains("\nmerge: 1 of 1 part\n") && said.contains("\nmerged 1 part in "), "{said}");
+    assert!(folder.join("a.png").exists(), "merged");
+    let left = fs::read_dir(folder).expect("it can be listed").count();
+    assert_eq!(left, 2, "nothing else than part and PNG");
 }
 
 /// Starts a run without an end and waits for the file of that name.
