@@ -227,6 +227,13 @@ fn glb_chunks_are_read_and_unknown_ones_skipped() {
     for length in 0..whole.len() {
         assert!(load_bytes(&whole[..length]).is_err(), "cut to {length} bytes");
     }
+    assert_eq!(scene.warnings, [""; 0]);
+    let padded = load_bytes(&glb(&[(b"JSON", format!("{text}\0\0\0").as_bytes()), (b"BIN\0", &data)]));
+    let padded = padded.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(padded.triangles, scene.triangles);
+    assert_eq!(padded.warnings, ["the JSON of the GLB is padded with NUL bytes, not with spaces"]);
+    let within = glb(&[(b"JSON", format!("{text}\0 ").as_bytes()), (b"BIN\0", &data)]);
+    assert!(message(load_bytes(&within)).starts_with("JSON: trailing characters"));
     assert_eq!(message(load_bytes(&glb(&[(b"BIN\0", &data)]))), "GLB chunk: the first chunk is not JSON");
     let mut long = whole.clone();
     long[12] += 200;
