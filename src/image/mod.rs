@@ -22,6 +22,7 @@ mod part;
 mod part_identity;
 mod pass_sum;
 mod png;
+mod primaries;
 mod radiance;
 mod tonemap;
 mod weights;

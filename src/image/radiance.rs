@@ -7,14 +7,16 @@ use std::{
 
 use exr::{
     math::Vec2,
-    meta::{MetaData, header::Header},
+    meta::{MetaData, attribute::Chromaticities, header::Header},
     prelude::{ReadChannels, ReadLayers, ReadSpecificChannel},
 };
+use glam::{DVec2, dvec2};
 use image::{ImageDecoder, ImageError, codecs::hdr::HdrDecoder};
 
 use super::{
     file::open_regular,
     orientation::{Orientation, size_line},
+    primaries::Primaries,
 };
 use crate::error::{Error, Result};
 
@@ -32,7 +34,7 @@ const PIXELS_PER_BYTE: u64 = 1032;
 const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 const HDR: &[u8] = b"#?";
 
-/// Scene-linear colours, row 0 at the top. All values are finite and ≥ 0.
+/// Linear Rec.709 colours, row 0 at the top. All values are finite and ≥ 0.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RadiancePicture {
     pub width: u32,
@@ -67,7 +69,7 @@ pub(crate) fn read_radiance_bytes(path: &Path) -> Result<Vec<u8>> {
     read().map_err(|problem| failure(path, problem))
 }
 
-/// Decodes the bytes from [`read_radiance_bytes`]. NaN and negative values become 0, infinity the
+/// Decodes the bytes from [`read_radiance_bytes`]. Other primaries are converted; NaN and negative values become 0, infinity the
 /// largest finite value of the picture.
 ///
 /// # Errors
@@ -127,15 +129,41 @@ fn decode_hdr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
     let reader = bytes[..line.start].chain(usual.as_bytes()).chain(&bytes[line.end..]);
     // The strict decoder accepts only one of the signatures in use; this one accepts any.
     let decoder = HdrDecoder::new_nonstrict(reader).map_err(hdr_problem)?;
-    let exposure = decoder.metadata().exposure.unwrap_or(1.0);
+    let header = decoder.metadata();
     let (along, across) = decoder.dimensions();
     let (along, across) = checked_size(along.into(), across.into(), bytes.len())?;
     let mut pixels = vec![[0.0; 3]; along as usize * across as usize];
     decoder.read_image(bytemuck::cast_slice_mut(&mut pixels)).map_err(hdr_problem)?;
-    let (pixels, (width, height)) = orientation.turned(pixels, (along as usize, across as usize));
+    let (mut pixels, (width, height)) = orientation.turned(pixels, (along as usize, across as usize));
     let (width, height) = (width as u32, height as u32);
-    let note = format!("its EXPOSURE of {exposure} is not undone, as in other renderers");
-    Ok(RadiancePicture { width, height, pixels, notes: Vec::from_iter((exposure != 1.0).then_some(note)) })
+    let mut notes = Vec::new();
+    let exposure = header.exposure.unwrap_or(1.0);
+    if exposure != 1.0 {
+        notes.push(format!("its EXPOSURE of {exposure} is not undone, as in other renderers"));
+    }
+    let (r, g, b) = header.color_correction.unwrap_or((1.0, 1.0, 1.0));
+    if [r, g, b] != [1.0; 3] {
+        notes.push(format!("its COLORCORR of {r} {g} {b} is not undone, as in other renderers"));
+    }
+    let primaries = header.custom_attributes.iter().rfind(|(name, _)| name == "PRIMARIES");
+    notes.extend(primaries.and_then(|(_, numbers)| match hdr_primaries(numbers) {
+        Some(primaries) => primaries.convert(&mut pixels),
+        None => Some(format!("its PRIMARIES, {:?}, are not eight numbers: Rec.709 is assumed", numbers.trim())),
+    }));
+    Ok(RadiancePicture { width, height, pixels, notes })
+}
+
+/// Primaries of a Radiance HDR file: x and y of red, green, blue and white.
+fn hdr_primaries(text: &str) -> Option<Primaries> {
+    let numbers = text.split_whitespace().map(str::parse).collect::<std::result::Result<Vec<f64>, _>>().ok()?;
+    let numbers: [f64; 8] = numbers.try_into().ok()?;
+    Some(Primaries([0, 2, 4, 6].map(|i| DVec2::from_slice(&numbers[i..]))))
+}
+
+impl From<Chromaticities> for Primaries {
+    fn from(Chromaticities { red, green, blue, white }: Chromaticities) -> Self {
+        Self([red, green, blue, white].map(|at| dvec2(at.x().into(), at.y().into())))
+    }
 }
 
 /// Channels of an OpenEXR part that hold the colour.
@@ -168,7 +196,9 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
     let (width, height) = checked_size(display.size.width() as u64, display.size.height() as u64, bytes.len())?;
     let window = Window { width, height, offset: header.own_attributes.layer_position - display.position };
     let read = exr::prelude::read().no_deep_data().largest_resolution_level().specific_channels();
-    let pixels = match channels {
+    // Luminance has no hue.
+    let primaries = header.shared_attributes.chromaticities.filter(|_| matches!(channels, Channels::Rgb(_)));
+    let mut pixels = match channels {
         Channels::Rgb([r, g, b]) => {
             read.required(r.as_str())
                 .required(g.as_str())
@@ -202,7 +232,8 @@ fn decode_exr(bytes: &[u8]) -> std::result::Result<RadiancePicture, Problem> {
                 .pixels
         }
     };
-    Ok(RadiancePicture { width, height, pixels, notes: Vec::new() })
+    let note = primaries.and_then(|primaries| Primaries::from(primaries).convert(&mut pixels));
+    Ok(RadiancePicture { width, height, pixels, notes: Vec::from_iter(note) })
 }
 
 /// Display window of an OpenEXR file. Data outside it is cropped; pixels without data are black.

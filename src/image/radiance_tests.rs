@@ -3,7 +3,7 @@
 
 use exr::{
     image::{AnyChannel, AnyChannels, FlatSamples, Image, Layer},
-    meta::attribute::IntegerBounds,
+    meta::attribute::{Chromaticities, IntegerBounds},
     prelude::{Encoding, LayerAttributes, WritableImage, f16},
 };
 
@@ -12,11 +12,17 @@ use super::*;
 /// OpenEXR file of `columns` columns and two rows, whose data window is offset by `at` from the
 /// display window.
 fn exr(columns: usize, at: Vec2<i32>, channels: &[(&str, FlatSamples)]) -> Vec<u8> {
+    exr_of(None, columns, at, channels)
+}
+
+/// The same with chromaticities.
+fn exr_of(space: Option<Chromaticities>, columns: usize, at: Vec2<i32>, channels: &[(&str, FlatSamples)]) -> Vec<u8> {
     let list = channels.iter().map(|(name, samples)| AnyChannel::new(*name, samples.clone())).collect();
     let attributes = LayerAttributes { layer_position: at, ..LayerAttributes::default() };
     let layer = Layer::new((columns, 2), attributes, Encoding::UNCOMPRESSED, AnyChannels::sort(list));
     let mut image = Image::from_layer(layer);
     image.attributes.display_window = IntegerBounds::new(Vec2(0, 0), Vec2(2, 2));
+    image.attributes.chromaticities = space;
     let mut file = Cursor::new(Vec::new());
     image.write().to_buffered(&mut file).expect("it can be written");
     file.into_inner()
@@ -99,6 +105,46 @@ fn radiance_files_of_either_signature_are_read() {
     let exposed = decoded(&hdr("#?RADIANCE\nEXPOSURE=2\nEXPOSURE=1.5", 3, 1, &pixels));
     assert_eq!(exposed.pixels, expected);
     assert_eq!(exposed.notes, ["its EXPOSURE of 3 is not undone, as in other renderers"]);
+    let corrected = decoded(&hdr("#?RADIANCE\nCOLORCORR=2 1 1\nCOLORCORR= 1 1 0.5", 3, 1, &pixels));
+    assert_eq!(corrected.pixels, expected);
+    assert_eq!(corrected.notes, ["its COLORCORR of 2 1 0.5 is not undone, as in other renderers"]);
+    assert_eq!(decoded(&hdr("#?RADIANCE\nCOLORCORR=1 1 1", 3, 1, &pixels)).notes, [""; 0]);
+}
+
+#[test]
+fn other_primaries_are_converted_to_rec709() {
+    let space = |[rx, ry, gx, gy, bx, by, wx, wy]: [f32; 8]| Chromaticities {
+        red: Vec2(rx, ry),
+        green: Vec2(gx, gy),
+        blue: Vec2(bx, by),
+        white: Vec2(wx, wy),
+    };
+    let rec709 = space([0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329]);
+    let rec2020 = space([0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329]);
+    let (r, g, b) = (floats(&[1.0, 0.5, 2.0, 0.0]), floats(&[0.0, 0.5, 1.0, 0.0]), floats(&[0.0, 0.5, 1.0, 0.0]));
+    let of = |space| decoded(&exr_of(space, 2, Vec2(0, 0), &[("B", b.clone()), ("G", g.clone()), ("R", r.clone())]));
+    let plain = of(None);
+    assert_eq!(of(Some(rec709)), plain, "no bit is changed");
+    assert_eq!(plain.pixels, [[1.0, 0.0, 0.0], [0.5; 3], [2.0, 1.0, 1.0], [0.0; 3]]);
+    let wide = of(Some(rec2020));
+    // ITU-R BT.2087-0. Green and blue of the first are below 0.
+    let expected = [[1.6605, 0.0, 0.0], [0.5; 3], [2.6605, 0.8754, 0.9818], [0.0; 3]];
+    let errors = wide.pixels.as_flattened().iter().zip(expected.as_flattened()).map(|(a, b)| (a - b).abs());
+    assert!(errors.fold(0.0, f32::max) < 2e-4, "{:?}", wide.pixels);
+    let said = ["primaries of Rec.2020 are converted to linear Rec.709", "numbers below 0 or NaN, read as 0: 2"];
+    assert_eq!(wide.notes, said);
+    let grey = decoded(&exr_of(Some(rec2020), 2, Vec2(0, 0), &[("Y", r.clone())]));
+    assert_eq!((grey.pixels[2], grey.notes.len()), ([2.0; 3], 0));
+
+    let hdr_of = |line: &str| decoded(&hdr(&format!("#?RADIANCE\n{line}"), 1, 1, &[[128, 128, 128, 130]]));
+    let said = |line: &str| hdr_of(line).notes.concat();
+    assert_eq!(said("PRIMARIES= .64 .33 .30 .60 .15 .06 .3127 .3290"), "");
+    let own = hdr_of("PRIMARIES=0.64 0.33 0.29 0.6 0.15 0.06 0.3333 0.3333");
+    assert_eq!(own.notes, ["primaries 0.64 0.33, 0.29 0.6, 0.15 0.06, 0.3333 0.3333 are converted to linear Rec.709"]);
+    assert!(own.pixels[0].iter().all(|x| (x - 2.0).abs() < 1e-5), "white stays white: {:?}", own.pixels);
+    for line in ["PRIMARIES=0.64 0.33", "PRIMARIES=red"] {
+        assert_eq!(said(line), format!("its PRIMARIES, {:?}, are not eight numbers: Rec.709 is assumed", &line[10..]));
+    }
 }
 
 #[test]

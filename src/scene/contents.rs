@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::{
     Attributes, Bounds, Camera, Environment, Image, Instance, Light, LoadOptions, Material, SharedMesh, Sphere,
-    Surface, Triangle, instance_bounds, reach_of_instances,
+    Surface, Textures, Triangle, instance_bounds, reach_of_instances,
 };
 use crate::{
     Error, Result,
@@ -158,6 +158,21 @@ impl Scene {
             Some(_) => false,
             None => casts(1.0, 1.0),
         }
+    }
+
+    /// Whether a surface has a diffuse lobe, which photons are gathered for.
+    #[must_use]
+    pub fn has_diffuse(&self) -> bool {
+        self.uses_material(|_, material| {
+            let Textures { metallic_roughness, transmission, .. } = material.textures;
+            let is_diffuse = match material.surface {
+                Surface::Diffuse { .. } => true,
+                Surface::Mirror { .. } => false,
+                Surface::Layered { metallic, .. } => metallic < 1.0 || metallic_roughness.is_some(),
+                Surface::Glass { .. } | Surface::Pane { .. } => material.transmission < 1.0 || transmission.is_some(),
+            };
+            is_diffuse && !material.unlit
+        })
     }
 
     /// Whether a surface has another lobe than a diffuse one.

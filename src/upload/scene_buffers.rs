@@ -61,6 +61,8 @@ pub struct SceneBuffers {
     pub lights: LightBuffers,
     /// Solids and the surfaces that bound them.
     pub solids: Solids,
+    /// Some surface has a diffuse lobe.
+    pub has_diffuse: bool,
     /// Nothing but panes and plates that rays to lights pass casts caustics.
     pub only_clear_surfaces_cast: bool,
 }
@@ -138,6 +140,7 @@ impl SceneBuffers {
             no_lists: Arc::new(gpu.storage::<u32>("no lists", 1)?),
             contacts,
             only_clear_surfaces_cast: only_clear_surfaces_cast(scene, &solids),
+            has_diffuse: scene.has_diffuse(),
             has_lobes: scene.has_lobes(),
             splits: scene
                 .materials

@@ -160,7 +160,7 @@ fn faults_of_lights_and_emission_are_named_with_their_place() {
         assert_eq!(emission(json!([0, 0, 0]), strength), expected);
     }
     let emission = refusal(|g| g["materials"][0]["emissiveFactor"] = json!([1, 1]));
-    assert_eq!(emission, "materials[0]: invalid length 2, expected an array of length 3");
+    assert_eq!(emission, "materials[0].emissiveFactor: invalid length 2, expected an array of length 3");
 }
 
 #[test]
@@ -227,6 +227,13 @@ fn glb_chunks_are_read_and_unknown_ones_skipped() {
     for length in 0..whole.len() {
         assert!(load_bytes(&whole[..length]).is_err(), "cut to {length} bytes");
     }
+    assert_eq!(scene.warnings, [""; 0]);
+    let padded = load_bytes(&glb(&[(b"JSON", format!("{text}\0\0\0").as_bytes()), (b"BIN\0", &data)]));
+    let padded = padded.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(padded.triangles, scene.triangles);
+    assert_eq!(padded.warnings, ["the JSON of the GLB is padded with NUL bytes, not with spaces"]);
+    let within = glb(&[(b"JSON", format!("{text}\0 ").as_bytes()), (b"BIN\0", &data)]);
+    assert!(message(load_bytes(&within)).starts_with("JSON: trailing characters"));
     assert_eq!(message(load_bytes(&glb(&[(b"BIN\0", &data)]))), "GLB chunk: the first chunk is not JSON");
     let mut long = whole.clone();
     long[12] += 200;
@@ -271,11 +278,27 @@ fn json_that_is_wrong_is_named_with_its_place() {
     check(|g| g["samplers"] = json!([[]]), "samplers[0]: is not an object");
     check(
         |g| g["nodes"][0]["mesh"] = json!(-1),
-        "nodes[0]: invalid type: integer `-1`, expected index into child of root",
+        "nodes[0].mesh: invalid type: integer `-1`, expected index into child of root",
     );
     check(
         |g| g["nodes"][0]["mesh"] = json!(0.5),
-        "nodes[0]: invalid type: floating point `0.5`, expected index into child of root",
+        "nodes[0].mesh: invalid type: floating point `0.5`, expected index into child of root",
+    );
+    check(
+        |g| g["nodes"][0]["rotation"] = json!([0, 0, 1]),
+        "nodes[0].rotation: invalid length 3, expected an array of length 4",
+    );
+    check(
+        |g| g["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(-1),
+        "meshes[0].primitives[0].attributes.POSITION: invalid type: integer `-1`, expected index into child of root",
+    );
+    check(
+        |g| g["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = json!([1, 1]),
+        "extensions.KHR_lights_punctual.lights[0].color: invalid length 2, expected an array of length 3",
+    );
+    check(
+        |g| g["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = json!([1, 1, 1, 1]),
+        "extensions.KHR_lights_punctual.lights[0].color: invalid length 4, expected fewer elements in array",
     );
     check(
         |g| g["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = json!([1, 1]),

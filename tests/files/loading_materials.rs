@@ -294,7 +294,7 @@ fn what_lies_above_a_base_is_read() {
         ),
         (
             json!({ "KHR_materials_sheen": { "sheenColorFactor": [0, 1] } }),
-            "sheen: invalid length 2, expected an array of length 3",
+            "sheen.sheenColorFactor: invalid length 2, expected an array of length 3",
         ),
     ] {
         assert_eq!(refusal(with(json!({}), extension)), format!("{place}{said}"));
@@ -365,6 +365,6 @@ fn a_variant_exchanges_materials() {
     assert_eq!(refused(|mapping| mapping["variants"] = json!([0, 2])), format!("{place}[0].variants: 2 of 2"));
     assert_eq!(
         refused(|mapping| mapping["material"] = json!(-1)),
-        format!("{place}: invalid value: integer `-1`, expected usize")
+        format!("{place}[0].material: invalid value: integer `-1`, expected usize")
     );
 }

@@ -109,9 +109,9 @@ fn transforms_scale_turn_and_move() {
         assert_eq!(message(placed(odd)), format!("{place}: is not a transform of finite numbers"));
     }
     let text = message(placed(json!({ "scale": ["a", 1] })));
-    assert_eq!(text, format!("{place}: invalid type: string \"a\", expected f32"));
+    assert_eq!(text, format!("{place}.scale[0]: invalid type: string \"a\", expected f32"));
     let short = message(placed(json!({ "offset": [1] })));
-    assert_eq!(short, format!("{place}: invalid length 1, expected an array of length 2"));
+    assert_eq!(short, format!("{place}.offset: invalid length 1, expected an array of length 2"));
 }
 
 #[test]

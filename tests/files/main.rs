@@ -8,6 +8,7 @@ mod loading;
 mod loading_attributes;
 mod loading_geometry;
 mod loading_materials;
+mod loading_notes;
 mod loading_textures;
 mod loading_values;
 mod loading_views;

@@ -109,6 +109,8 @@ mod tests {
             ng: octahedral(Vec3::Y),
             irradiance: if i % 2 == 1 { [-1.0; 3] } else { [if i / 2 % 6 > 2 { bright } else { 1.0 }; 3] },
             reach: 0.0,
+            coat: [-1.0; 3],
+            coat_reach: 0.0,
         };
         (0..60).map(record).collect()
     }

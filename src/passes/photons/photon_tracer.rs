@@ -187,8 +187,7 @@ impl PhotonTracer {
             if plan.paths.count.is_none() && first_path.is_multiple_of(growth_paths) {
                 for &kind in plan.fills {
                     let warning = traced.maps[kind].close_if_idle(kind.name(), growth_paths);
-                    // What windows alone reflect is little, and mostly out of the house.
-                    let is_expected = kind == MapKind::Caustic && scene.only_clear_surfaces_cast;
+                    let is_expected = is_rightly_idle(scene, settings, kind, &traced.maps[kind]);
                     traced.warnings.extend(warning.filter(|_| !is_expected));
                 }
                 let is_asked = plan.is_for_caustics(settings) && traced.maps.caustic.open;
@@ -230,6 +229,17 @@ impl PhotonTracer {
     }
 }
 
+/// Whether a map that hardly grows has nothing more to take.
+fn is_rightly_idle(scene: &SceneBuffers, settings: &PhotonSettings, kind: MapKind, map: &RawMap) -> bool {
+    let by_kind = match kind {
+        // Light of what the cameras see meets nothing else.
+        MapKind::Global => map.stored == 0 && scene.lights.enclosure == 0.0 && !settings.mode.stores_direct(),
+        // What windows alone reflect is little, and mostly out of the house.
+        MapKind::Caustic => scene.only_clear_surfaces_cast,
+    };
+    by_kind || !scene.has_diffuse
+}
+
 /// Maps that take photons.
 fn open(traced: &TracedPhotons) -> ByKind<bool> {
     ByKind { global: traced.maps.global.open, caustic: traced.maps.caustic.open }
@@ -245,7 +255,56 @@ fn paths_that_matter(fraction: f64, capacity: u64, least: f64) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::paths_that_matter;
+    use glam::{Vec3, vec3};
+
+    use super::*;
+    use crate::{
+        bvh::Bvh,
+        progress::Silent,
+        scene::{Bounds, Camera, Light, LightKind, Material, Scene, Sphere, Surface},
+        settings::LightSettings,
+    };
+
+    /// Warnings of the maps of balls of those surfaces, so many metres apart, in sunlight. The camera
+    /// sees the first.
+    fn warnings(surfaces: &[Surface], apart: f32) -> Vec<String> {
+        let gpu = Gpu::open(None).expect("tests need an adapter");
+        let ball =
+            |i: usize| Sphere { center: vec3(apart * i as f32, 0.0, 0.0), radius: 1.0, material: i as u32, object: 0 };
+        let mut scene = Scene {
+            spheres: (0..surfaces.len()).map(ball).collect(),
+            objects: vec!["balls".to_owned()],
+            materials: surfaces.iter().map(|surface| Material::new("", *surface)).collect(),
+            ..Scene::default()
+        };
+        scene.lights.push(Light {
+            name: "sun".to_owned(),
+            group: None,
+            kind: LightKind::Directional,
+            position: Vec3::ZERO,
+            direction: Vec3::NEG_Y,
+            intensity: Vec3::ONE,
+        });
+        scene.cameras.push(Camera::framing(Bounds::from(&scene.spheres[0])));
+        let buffers = SceneBuffers::new(&gpu, &scene, &Bvh::build(&scene), &LightSettings::default()).expect("fits");
+        let settings = PhotonSettings { global: 100_000, caustic: 100_000, ..PhotonSettings::default() };
+        let tracer = PhotonTracer::new(&gpu, &buffers, settings.sampler);
+        let traced = tracer.trace(&gpu, &buffers, &settings, scene.has_specular(), &Silent).expect("it is traced");
+        assert!(traced.maps.global.stored < 10 && traced.maps.caustic.stored < 10);
+        traced.warnings
+    }
+
+    #[test]
+    fn maps_that_have_nothing_to_take_are_no_fault() {
+        let (mirror, diffuse) = (Surface::Mirror { tint: Vec3::ONE }, Surface::Diffuse { albedo: Vec3::ONE });
+        assert_eq!(warnings(&[mirror, mirror], 3.0), [""; 0], "nothing shows photons");
+        assert_eq!(warnings(&[Surface::Glass { ior: 1.5, tint: Vec3::ONE }], 3.0), [""; 0], "nothing shows photons");
+        assert_eq!(warnings(&[diffuse], 3.0), [""; 0], "nothing is lit by another thing");
+        // Photons would be seen, but next to none of the mirror's light meets the other ball.
+        let control = warnings(&[mirror, diffuse], 2000.0);
+        let said = |name: &str| control.iter().any(|line| line.starts_with(&format!("the {name} map hardly grows")));
+        assert!(said("caustic") && said("global"), "{control:?}");
+    }
 
     #[test]
     fn open_scenes_take_fewer_paths() {

@@ -1,6 +1,6 @@
 //! Cameras of nodes, in world space and f64, before the scene's centre is subtracted.
 
-use std::f32::consts::PI;
+use std::{collections::HashSet, f32::consts::PI};
 
 use glam::{DMat4, DVec3, Vec3};
 use gltf::json;
@@ -69,6 +69,15 @@ fn mirrored(camera: &json::Camera, name: &str, notes: &mut Notes) -> [bool; 2] {
     };
     notes.add(format!("camera {name:?}: a negative magnification mirrors the picture, {ways}"));
     mirrored
+}
+
+/// Notes names that several cameras have. [`crate::scene::Scene::camera`] finds the first.
+pub(super) fn note_equal_names(cameras: &[Camera], notes: &mut Notes) {
+    let mut known = HashSet::new();
+    let repeated = cameras.iter().filter(|camera| !known.insert(&camera.name));
+    repeated.for_each(|camera| {
+        notes.add(format!("camera {:?}: others have this name too; it chooses the first, an index any", camera.name));
+    });
 }
 
 /// Notes where the view of a camera ends before the scene does.

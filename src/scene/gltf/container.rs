@@ -1,10 +1,10 @@
 //! Container: the chunks of a GLB, or plain JSON.
 
-use super::fault::{Read, fault};
+use super::fault::{Notes, Read, fault};
 
 /// JSON text and binary chunk of a file.
-pub(super) fn split(bytes: &[u8]) -> Read<(&[u8], Option<&[u8]>)> {
-    let (text, bin) = if bytes.starts_with(b"glTF") { split_glb(bytes)? } else { (bytes, None) };
+pub(super) fn split<'a>(bytes: &'a [u8], notes: &mut Notes) -> Read<(&'a [u8], Option<&'a [u8]>)> {
+    let (text, bin) = if bytes.starts_with(b"glTF") { split_glb(bytes, notes)? } else { (bytes, None) };
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     match text.iter().find(|byte| !byte.is_ascii_whitespace()) {
         Some(b'{') => Ok((text, bin)),
@@ -13,7 +13,7 @@ pub(super) fn split(bytes: &[u8]) -> Read<(&[u8], Option<&[u8]>)> {
 }
 
 /// Chunks of a GLB; unknown chunks are skipped, as the format requires.
-fn split_glb(bytes: &[u8]) -> Read<(&[u8], Option<&[u8]>)> {
+fn split_glb<'a>(bytes: &'a [u8], notes: &mut Notes) -> Read<(&'a [u8], Option<&'a [u8]>)> {
     let word = |at: usize| -> Option<u32> { bytes.get(at..at + 4)?.try_into().ok().map(u32::from_le_bytes) };
     let (Some(version), Some(length)) = (word(4), word(8)) else {
         return fault("GLB header", format!("needs 12 bytes, the file has {}", bytes.len()));
@@ -40,5 +40,10 @@ fn split_glb(bytes: &[u8]) -> Read<(&[u8], Option<&[u8]>)> {
         }
         at += 8 + size as usize;
     }
-    json.map_or_else(|| fault("GLB chunk", "the first chunk is not JSON"), |json| Ok((json, bin)))
+    let Some(json) = json else { return fault("GLB chunk", "the first chunk is not JSON") };
+    let padding = json.iter().rev().take_while(|byte| **byte == 0).count();
+    if padding > 0 {
+        notes.add("the JSON of the GLB is padded with NUL bytes, not with spaces");
+    }
+    Ok((&json[..json.len() - padding], bin))
 }

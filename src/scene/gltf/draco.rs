@@ -12,6 +12,7 @@ use serde::Deserialize;
 use super::accessor::Document;
 use super::fault::{Read, fault};
 use super::format::{Format, MAX_ZEROS, Unpacked};
+use super::strict_json::typed;
 
 const NAME: &str = "KHR_draco_mesh_compression";
 
@@ -71,7 +72,7 @@ fn packed<'a>(
     let extensions = primitive.extensions.as_ref();
     let Some(extension) = extensions.and_then(|extensions| extensions.others.get(NAME)) else { return Ok(None) };
     let place = format!("{place}.extensions.{NAME}");
-    let compressed = Compressed::deserialize(extension).or_else(|error| fault(&place, error.to_string()))?;
+    let compressed = typed::<Compressed>(extension, &place)?;
     let mut accessors = primitive.attributes.values().copied().chain(primitive.indices);
     if accessors
         .try_fold(true, |all, accessor| Ok(all && document.accessor(accessor.value(), &place)?.buffer_view.is_some()))?

@@ -106,10 +106,11 @@ pub(super) fn read(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<S
 
 /// The JSON part, with its graph of nodes checked, and the binary chunk.
 fn parse<'a>(bytes: &'a [u8], options: &LoadOptions, notes: &mut Notes) -> Read<(json::Root, Option<&'a [u8]>)> {
-    let (text, bin) = container::split(bytes)?;
+    let (text, bin) = container::split(bytes, notes)?;
     let root = root::read(text, &options.ignore_required, notes)?;
     nodes::check(&root)?;
     textures::check(&root)?;
+    extras::note_unread(&root, notes);
     Ok((root, bin))
 }
 
@@ -127,7 +128,7 @@ fn assemble(
     skins::check(&document)?;
     let shapes = meshes::check(&document, &mut notes)?;
 
-    let worlds = nodes::worlds(root)?;
+    let worlds = nodes::worlds(root, &mut notes)?;
     let placed = nodes::flatten(root, chosen, &worlds, &mut notes)?;
     let mut cache = MeshCache::new(&document, &placed.shown, &shapes, &mut notes)?;
     let contents = NodeContents::read(root, &placed, &mut notes)?;
@@ -263,6 +264,7 @@ impl NodeContents {
         scene.cameras = self.cameras.into_iter().map(|(_, p, camera)| Camera { position: at(p), ..camera }).collect();
         let bounds = scene.bounds();
         scene.cameras.iter().for_each(|camera| cameras::note_end(camera, bounds, notes));
+        cameras::note_equal_names(&scene.cameras, notes);
         if scene.cameras.is_empty() {
             if bounds != Bounds::EMPTY {
                 notes.add("no camera: one is made that frames the whole scene");

@@ -1,7 +1,7 @@
 //! Node graph: checked for cycles, flattened in the order of the file, with transforms accumulated
 //! in f64.
 
-use glam::{DMat4, DQuat, DVec3};
+use glam::{DMat4, DQuat, DVec3, DVec4};
 use gltf::json;
 use json::scene::Node;
 use serde_json::Value;
@@ -9,6 +9,9 @@ use serde_json::Value;
 use super::extensions::NODE_VISIBILITY;
 use super::fault::{Notes, Read, fault};
 use crate::{Error, Result};
+
+/// Largest difference of the last row of a matrix from 0 0 0 1 that is taken for rounding.
+const ROUNDING: f64 = 1e-4;
 
 /// A node with its transform to the world.
 #[derive(Clone, Copy, Debug)]
@@ -85,15 +88,15 @@ pub(super) fn choose_scene(root: &json::Root, wanted: Option<&str>, file_name: &
 }
 
 /// World transform of every node, whether a scene shows it or not. Needs [`check`].
-pub(super) fn worlds(root: &json::Root) -> Read<Vec<DMat4>> {
+pub(super) fn worlds(root: &json::Root, notes: &mut Notes) -> Read<Vec<DMat4>> {
     let mut worlds = vec![DMat4::IDENTITY; root.nodes.len()];
     let mut open = roots(root);
     for i in &open {
-        worlds[*i] = local(&root.nodes[*i], *i)?;
+        worlds[*i] = local(&root.nodes[*i], *i, notes)?;
     }
     while let Some(node) = open.pop() {
         for child in root.nodes[node].children.iter().flatten().map(|child| child.value()) {
-            worlds[child] = worlds[node] * local(&root.nodes[child], child)?;
+            worlds[child] = worlds[node] * local(&root.nodes[child], child, notes)?;
             open.push(child);
         }
     }
@@ -153,9 +156,20 @@ fn visibility(node: &Node, index: usize) -> Read<bool> {
 }
 
 /// Local transform of a node.
-fn local(node: &Node, index: usize) -> Read<DMat4> {
+fn local(node: &Node, index: usize, notes: &mut Notes) -> Read<DMat4> {
     if let Some(matrix) = node.matrix {
-        return Ok(DMat4::from_cols_array(&matrix.map(f64::from)));
+        let matrix = DMat4::from_cols_array(&matrix.map(f64::from));
+        let last = matrix.row(3);
+        if !last.abs_diff_eq(DVec4::W, ROUNDING) {
+            let DVec4 { x, y, z, w } = last;
+            let problem = format!("its last row is {x} {y} {z} {w}, not 0 0 0 1: glTF has matrices column by column");
+            return fault(format!("nodes[{index}].matrix"), problem);
+        }
+        if node.translation.is_some() || node.rotation.is_some() || node.scale.is_some() {
+            let name = node.name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("node {index}"));
+            notes.about("node", &name, ": its matrix is read, not the translation, rotation or scale beside it");
+        }
+        return Ok(matrix);
     }
     let scale = node.scale.map_or(DVec3::ONE, |scale| DVec3::from_array(scale.map(f64::from)));
     let translation = node.translation.map_or(DVec3::ZERO, |by| DVec3::from_array(by.map(f64::from)));

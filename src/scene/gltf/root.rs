@@ -5,7 +5,7 @@ use serde_json::{Map, Value};
 
 use super::extensions;
 use super::fault::{Notes, Read, fault};
-use super::strict_json::{elements, member, objects, parse, read_element};
+use super::strict_json::{elements, member, objects, parse, typed};
 
 /// Maximum number of materials in a file.
 const MAX_MATERIALS: usize = 1 << 16;
@@ -113,7 +113,7 @@ fn read_scenes(file: &mut Map<String, Value>) -> Read<Vec<json::Scene>> {
         if let Some(scene) = scene.as_object_mut() {
             scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
         }
-        scenes.push(read_element(scene, "scenes", i)?);
+        scenes.push(typed(&scene, format_args!("scenes[{i}]"))?);
     }
     Ok(scenes)
 }

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::fault::{Notes, Read, fault};
 use super::nodes::PlacedNode;
+use super::strict_json::typed;
 
 /// Largest relative difference of a transform's axes that still counts as a uniform scale.
 const UNIFORM: f64 = 1e-4;
@@ -68,7 +69,7 @@ pub(super) fn read(root: &json::Root, placed: &PlacedNode, notes: &mut Notes) ->
         return fault(format!("{at}.extensions.{NAME}.shape"), format!("{shape} of {}", shapes.len()));
     };
     let place = format!("extensions.{NAME}.shapes[{index}]");
-    let shape = Shape::deserialize(shape).or_else(|error| fault(&place, error.to_string()))?;
+    let shape = typed::<Shape>(shape, &place)?;
     if shape.kind != "sphere" {
         notes.add(format!("implicit shapes of type {:?} are not drawn, only spheres", shape.kind));
         return Ok(None);

@@ -24,14 +24,9 @@ pub(super) fn elements<T: DeserializeOwned>(object: &mut Map<String, Value>, nam
     let list = objects(object, name)?;
     let mut elements = Vec::with_capacity(list.len());
     for (i, element) in list.into_iter().enumerate() {
-        elements.push(read_element(element, name, i)?);
+        elements.push(typed(&element, format_args!("{name}[{i}]"))?);
     }
     Ok(elements)
-}
-
-/// Element `i` of a list.
-pub(super) fn read_element<T: DeserializeOwned>(element: Value, list: &str, i: usize) -> Read<T> {
-    T::deserialize(element).or_else(|error| fault(format!("{list}[{i}]"), error.to_string()))
 }
 
 /// The elements of a list as they are, which must be objects; none where the list is missing.
@@ -50,7 +45,42 @@ pub(super) fn objects(object: &mut Map<String, Value>, name: &str) -> Read<Vec<V
 /// A member read as a `T`; none where it is missing.
 pub(super) fn member<T: DeserializeOwned>(object: &mut Map<String, Value>, name: &str) -> Read<Option<T>> {
     let Some(value) = object.remove(name) else { return Ok(None) };
-    T::deserialize(value).map(Some).or_else(|error| fault(name, error.to_string()))
+    typed(&value, name).map(Some)
+}
+
+/// A value at JSON path `place`, read as a `T`. Errors name the innermost place in it that is at
+/// fault.
+pub(super) fn typed<T: DeserializeOwned>(value: &Value, place: impl fmt::Display) -> Read<T> {
+    T::deserialize(value).or_else(|error| {
+        let problem = error.to_string();
+        // What lacks a member alone lacks others too: the object is not looked for.
+        let is_missing = problem.starts_with("missing field");
+        let path = if is_missing { String::new() } else { path_to_fault::<T>(value, &problem, &|value| value) };
+        fault(format!("{place}{path}"), problem)
+    })
+}
+
+/// Path from a part of a value to the innermost part of it with which alone, as `whole` makes the
+/// value of it, the problem stays the same.
+fn path_to_fault<T: DeserializeOwned>(part: &Value, problem: &str, whole: &dyn Fn(Value) -> Value) -> String {
+    let is_at_fault = |part: Value| T::deserialize(whole(part)).is_err_and(|error| error.to_string() == problem);
+    match part {
+        Value::Array(list) => {
+            let alone = |element: Value| Value::Array(vec![element]);
+            let at = list.iter().position(|element| is_at_fault(alone(element.clone())));
+            at.map_or(String::new(), |i| {
+                format!("[{i}]{}", path_to_fault::<T>(&list[i], problem, &|element| whole(alone(element))))
+            })
+        }
+        Value::Object(members) => {
+            let alone = |name: &String, member: Value| Value::Object(Map::from_iter([(name.clone(), member)]));
+            let at = members.iter().find(|(name, member)| is_at_fault(alone(name, (*member).clone())));
+            at.map_or(String::new(), |(name, member)| {
+                format!(".{name}{}", path_to_fault::<T>(member, problem, &|member| whole(alone(name, member))))
+            })
+        }
+        _ => String::new(),
+    }
 }
 
 /// Value whose objects have no duplicate names.
@@ -130,6 +160,37 @@ mod tests {
         let value = parse(b"[5.0, 5, 5.5, -5, -0.0, 1e3, 1e30, null, true, \"x\", {\"a\": [1]}]").expect("it is JSON");
         let expected = serde_json::json!([5, 5, 5.5, -5, -0.0, 1000, 1e30, null, true, "x", { "a": [1] }]);
         assert_eq!(value, expected);
+    }
+
+    #[test]
+    fn faults_are_named_by_their_innermost_place() {
+        #[derive(Debug, serde::Deserialize)]
+        #[allow(dead_code, reason = "only read")]
+        struct Shape {
+            name: String,
+            sizes: [f32; 2],
+            #[serde(default)]
+            parts: Vec<Shape>,
+        }
+        let place = |value: Value| format!("{:?}", typed::<Shape>(&value, "shape").expect_err("it must be refused"));
+        let of = |sizes: Value| serde_json::json!({ "name": "a", "sizes": sizes });
+        let with =
+            |part: Value| serde_json::json!({ "name": "a", "sizes": [1, 2], "parts": [of([1, 2].into()), part] });
+        assert!(typed::<Shape>(&with(of([3, 4].into())), "shape").is_ok());
+        for (value, expected) in [
+            (of([1, 2, 3].into()), "shape.sizes"),
+            (of([1].into()), "shape.sizes"),
+            (of(serde_json::json!([1, "b"])), "shape.sizes[1]"),
+            (with(of([1].into())), "shape.parts[1].sizes"),
+            (with(with(of("b".into()))), "shape.parts[1].parts[1].sizes"),
+            (with(Value::Null), "shape.parts[1]"),
+            (serde_json::json!({ "name": "a" }), "shape"),
+            (with(serde_json::json!({ "sizes": [1, 2] })), "shape"),
+            (Value::Null, "shape"),
+        ] {
+            let found = place(value);
+            assert!(found.starts_with(&format!("Fault {{ place: {expected:?}, ")), "{found}, expected {expected}");
+        }
     }
 
     #[test]

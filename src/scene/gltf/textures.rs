@@ -11,6 +11,7 @@ use serde_json::{Map, Value};
 
 use super::extensions::{BASISU, TEXTURE_TRANSFORM, WEBP};
 use super::fault::{Notes, Read, fault};
+use super::strict_json::typed;
 use crate::scene::{Texture, Wrap};
 
 /// In place of TEXCOORD_n: along what a material without such textures is anisotropic. Tangents of
@@ -132,7 +133,7 @@ pub(super) fn sampled(
     let transform = match reference.extensions.and_then(|extensions| extensions.get(TEXTURE_TRANSFORM)) {
         Some(transform) => {
             let place = format!("{place}.extensions.{TEXTURE_TRANSFORM}");
-            let transform = Transform::deserialize(transform).or_else(|error| fault(&place, error.to_string()))?;
+            let transform = typed::<Transform>(transform, &place)?;
             (transform.rows(&place)?, transform.tex_coord)
         }
         None => (Texture::IDENTITY, None),

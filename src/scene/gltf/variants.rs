@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::extensions::VARIANTS;
 use super::fault::{Read, fault};
+use super::strict_json::typed;
 use crate::{Error, Result};
 
 #[derive(Deserialize)]
@@ -26,7 +27,7 @@ pub(super) fn names(root: &json::Root) -> Read<Vec<String>> {
     let Some(extension) = extension else { return Ok(Vec::new()) };
     let place = format!("extensions.{VARIANTS}.variants");
     let variants = extension.get("variants").unwrap_or(&Value::Null);
-    let variants = Vec::<Named>::deserialize(variants).or_else(|error| fault(place, error.to_string()))?;
+    let variants = typed::<Vec<Named>>(variants, place)?;
     Ok(variants.into_iter().map(|variant| variant.name).collect())
 }
 
@@ -68,5 +69,5 @@ fn mappings(primitive: &Primitive, place: &dyn Fn() -> String) -> Read<Vec<Mappi
     let extension = primitive.extensions.as_ref().and_then(|extensions| extensions.others.get(VARIANTS));
     let Some(extension) = extension else { return Ok(Vec::new()) };
     let mappings = extension.get("mappings").unwrap_or(&Value::Null);
-    Vec::<Mapping>::deserialize(mappings).or_else(|error| fault(place(), error.to_string()))
+    typed(mappings, place())
 }

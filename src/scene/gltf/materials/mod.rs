@@ -172,5 +172,12 @@ fn emission(material: &json::Material, name: &str, place: &str, notes: &mut Note
     if factor != Vec3::ZERO && emission == Vec3::ZERO {
         notes.about("material", name, &format!(": emissive strength {strength} gives no light"));
     }
+    let has_texture = material.emissive_texture.is_some();
+    // Exporters write strength 1, the default, for every material.
+    if factor == Vec3::ZERO && (has_texture || (strength > 0.0 && strength != 1.0)) {
+        let what = if has_texture { "texture" } else { "strength" };
+        let note = format!(": its emissiveFactor is 0, so that its emissive {what} gives no light");
+        notes.about("material", name, &note);
+    }
     Ok(emission)
 }

@@ -5,6 +5,7 @@ use serde::de::DeserializeOwned;
 
 use super::super::fault::{Notes, Read, fault};
 use super::super::images::{Content, ImageList};
+use super::super::strict_json::typed;
 use super::super::textures::{self, AXES, Reference};
 use crate::scene::{Alpha, ImageValues, Texture, UV_SETS};
 use glam::Vec3;
@@ -36,9 +37,7 @@ impl Reader<'_> {
     pub(super) fn extension<T: DeserializeOwned>(&self, name: &str) -> Read<Option<T>> {
         let extension = self.material.extensions.as_ref().and_then(|extensions| extensions.others.get(name));
         let Some(extension) = extension else { return Ok(None) };
-        T::deserialize(extension)
-            .map(Some)
-            .or_else(|error| fault(format!("{}.extensions.{name}", self.place), error.to_string()))
+        typed(extension, format_args!("{}.extensions.{name}", self.place)).map(Some)
     }
 
     /// A number of the material, clamped to 0..1; `what` it is in notes, `at` in the file.

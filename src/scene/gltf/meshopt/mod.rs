@@ -8,6 +8,7 @@ use serde_json::Value;
 use super::buffers::{Buffers, slice};
 use super::extensions::MESHOPT;
 use super::fault::{Read, fault};
+use super::strict_json::typed;
 
 mod filters;
 mod indices;
@@ -51,7 +52,7 @@ fn decode_view(
     left: &mut u64,
     place: &str,
 ) -> Read<Vec<u8>> {
-    let asked = Compressed::deserialize(extension).or_else(|error| fault(place, error.to_string()))?;
+    let asked = typed::<Compressed>(extension, place)?;
     let Compressed { byte_stride: stride, count, .. } = asked;
     let size = count.checked_mul(stride).filter(|size| *size == view.byte_length.0);
     let Some(size) = size else {
