@@ -58,7 +58,7 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
 fn read_extensions(file: &mut Map<String, Value>) -> Read<Option<json::extensions::root::Root>> {
     let lights = file.get("extensions").and_then(|all| all.pointer("/KHR_lights_punctual/lights"));
     for (i, light) in lights.and_then(Value::as_array).into_iter().flatten().enumerate() {
-        read_element::<Light>(light.clone(), "extensions.KHR_lights_punctual.lights", i)?;
+        typed::<Light>(light, format_args!("extensions.KHR_lights_punctual.lights[{i}]"))?;
     }
     member(file, "extensions")
 }
