@@ -69,8 +69,8 @@ pub(crate) fn read_radiance_bytes(path: &Path) -> Result<Vec<u8>> {
     read().map_err(|problem| failure(path, problem))
 }
 
-/// Decodes the bytes from [`read_radiance_bytes`]. Other primaries are converted; NaN and negative values become 0, infinity the
-/// largest finite value of the picture.
+/// Decodes the bytes from [`read_radiance_bytes`]. Other primaries are converted; NaN and negative
+/// values become 0, infinity the largest finite value of the picture.
 ///
 /// # Errors
 /// [`Error::Io`] with the path if the bytes are damaged, hold neither R, G, B nor luminance, or the

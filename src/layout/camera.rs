@@ -247,7 +247,8 @@ pub struct ArrivingLight {
     /// Inverse distances to what was hit, 1/m.
     pub nearness: f32,
     /// Of a coat, over its albedo: radiance that it reflects to the viewer, W/(m² sr), and inverse
-    /// distances to what was hit, as it sees them, 1/m. The latter is 0 where there is no such coat.
+    /// distances to what was hit, as it sees them, 1/m. The latter is 0 where there is no such
+    /// coat.
     pub coat: [f32; 4],
 }
 

@@ -205,8 +205,8 @@ impl<'a> CameraPass<'a> {
     }
 
     /// Has rays of final gathering bring the light of wide coats too, where the picture shows all
-    /// light: see [`CameraTile::gathers_coats`](crate::layout::CameraTile::gathers_coats). Layers of
-    /// components and of estimates are about each way of light.
+    /// light: see [`CameraTile::gathers_coats`](crate::layout::CameraTile::gathers_coats). Layers
+    /// of components and of estimates are about each way of light.
     pub fn gathering_coats(mut self) -> Self {
         if self.direct && self.final_rays() > 0 && self.scene.materials.has_rough && !self.is_apart() {
             let others = self.obstacles.scene.has_light_beside_gathers() || self.scene.has_veils();

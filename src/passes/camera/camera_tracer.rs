@@ -155,8 +155,8 @@ impl CameraTracer {
         self.view.cells_from = width;
     }
 
-    /// Has rays of final gathering bring the light of wide coats. `others`: some light comes by ways
-    /// that these leave out.
+    /// Has rays of final gathering bring the light of wide coats. `others`: some light comes by
+    /// ways that these leave out.
     pub fn gather_coats(&mut self, others: bool) {
         self.view.gathers_coats = if others { 1 } else { layout::NO_LIGHTS_LEFT };
     }

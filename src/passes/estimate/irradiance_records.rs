@@ -25,8 +25,8 @@ pub fn filter_footprint(radius: f32, spacing: u32) -> u32 {
 /// Largest reach of a record: that of the widest filter, `MAX_RADIUS` in `filter_irradiance.wesl`.
 const MAX_REACH: f32 = 8.0;
 
-/// Reach of a coat's record as a fraction of that of irradiance, of a lobe of width 1: what it shows
-/// is blurred over twice its width times the distance, and the filter adds little to that.
+/// Reach of a coat's record as a fraction of that of irradiance, of a lobe of width 1: what it
+/// shows is blurred over twice its width times the distance, and the filter adds little to that.
 const COAT_REACH: f32 = 0.3;
 
 /// A slot without a point.

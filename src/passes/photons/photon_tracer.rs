@@ -44,6 +44,10 @@ const PATHS_PER_PHOTON_AT_PANES: u64 = 8;
 /// Least number of the same of photons for caustics, however faint these are.
 const MIN_CAUSTIC_PATHS_PER_PHOTON: f64 = 8.0;
 
+/// Enclosure below which what the cameras see is open. By rounding, some rays meet the very surface
+/// that they leave.
+const OPEN: f64 = 0.05;
+
 /// Result of the photon pass.
 #[derive(Debug)]
 pub struct TracedPhotons {
@@ -233,7 +237,7 @@ impl PhotonTracer {
 fn is_rightly_idle(scene: &SceneBuffers, settings: &PhotonSettings, kind: MapKind, map: &RawMap) -> bool {
     let by_kind = match kind {
         // Light of what the cameras see meets nothing else.
-        MapKind::Global => map.stored == 0 && scene.lights.enclosure == 0.0 && !settings.mode.stores_direct(),
+        MapKind::Global => map.stored == 0 && scene.lights.enclosure < OPEN && !settings.mode.stores_direct(),
         // What windows alone reflect is little, and mostly out of the house.
         MapKind::Caustic => scene.only_clear_surfaces_cast,
     };
@@ -265,8 +269,8 @@ mod tests {
         settings::LightSettings,
     };
 
-    /// Warnings of the maps of balls of those surfaces, so many metres apart, in sunlight. The camera
-    /// sees the first.
+    /// Warnings of the maps of balls of those surfaces, so many metres apart, in sunlight. The
+    /// camera sees the first.
     fn warnings(surfaces: &[Surface], apart: f32) -> Vec<String> {
         let gpu = Gpu::open(None).expect("tests need an adapter");
         let ball =

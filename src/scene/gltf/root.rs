@@ -1,6 +1,6 @@
 //! JSON part of a file, read element by element, so that errors name the element.
 
-use gltf::json::{self, extensions::scene::khr_lights_punctual::Light};
+use gltf::json;
 use serde_json::{Map, Value};
 
 use super::extensions;
@@ -46,21 +46,11 @@ pub(super) fn read(text: &[u8], ignored: &[String], notes: &mut Notes) -> Read<j
         images,
         textures,
         samplers,
-        extensions: read_extensions(&mut file)?,
+        extensions: member(&mut file, "extensions")?,
         extensions_used: used,
         extensions_required: required,
         ..json::Root::default()
     })
-}
-
-/// Extensions of the file. Each light is read by itself before: an error of them all would not name
-/// it.
-fn read_extensions(file: &mut Map<String, Value>) -> Read<Option<json::extensions::root::Root>> {
-    let lights = file.get("extensions").and_then(|all| all.pointer("/KHR_lights_punctual/lights"));
-    for (i, light) in lights.and_then(Value::as_array).into_iter().flatten().enumerate() {
-        typed::<Light>(light, format_args!("extensions.KHR_lights_punctual.lights[{i}]"))?;
-    }
-    member(file, "extensions")
 }
 
 /// Checks the indices of textures in all materials, used or not, extensions included: those of

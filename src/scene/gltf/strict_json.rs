@@ -61,15 +61,16 @@ pub(super) fn typed<T: DeserializeOwned>(value: &Value, place: impl fmt::Display
 }
 
 /// Path from a part of a value to the innermost part of it with which alone, as `whole` makes the
-/// value of it, the problem stays the same.
+/// value of it, the problem stays the same. With an element twice too: otherwise, the length of the
+/// list is at fault.
 fn path_to_fault<T: DeserializeOwned>(part: &Value, problem: &str, whole: &dyn Fn(Value) -> Value) -> String {
     let is_at_fault = |part: Value| T::deserialize(whole(part)).is_err_and(|error| error.to_string() == problem);
     match part {
         Value::Array(list) => {
-            let alone = |element: Value| Value::Array(vec![element]);
-            let at = list.iter().position(|element| is_at_fault(alone(element.clone())));
+            let times = |count: usize, element: &Value| Value::Array(vec![element.clone(); count]);
+            let at = list.iter().position(|element| (1..=2).all(|count| is_at_fault(times(count, element))));
             at.map_or(String::new(), |i| {
-                format!("[{i}]{}", path_to_fault::<T>(&list[i], problem, &|element| whole(alone(element))))
+                format!("[{i}]{}", path_to_fault::<T>(&list[i], problem, &|element| whole(times(1, &element))))
             })
         }
         Value::Object(members) => {
