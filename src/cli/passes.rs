@@ -92,10 +92,10 @@ pub fn render(inputs: &Inputs) -> Result<Picture> {
     if let Some(target) = options.target_error {
         display.note(&verdict(target, estimate(inputs, &done)?.as_ref(), done.sum.range()));
     }
-    if let Some(path) = options.part.as_deref().filter(|path| is_new(path)) {
-        if failures.take(save(inputs, path, &done)) {
-            display.note(&format!("wrote {}", path.display()));
-        }
+    if let Some(path) = options.part.as_deref().filter(|path| is_new(path))
+        && failures.take(save(inputs, path, &done))
+    {
+        display.note(&format!("wrote {}", path.display()));
     }
     picture(inputs, &done, failures)
 }

@@ -43,6 +43,9 @@ fn within(triangles: &[Triangle], shell: &Shell) -> Vec<u32> {
     if left.iter().all(is_inside) { left } else { Vec::new() }
 }
 
+/// Faces of each part that run along an edge, less those that run against it.
+type Faces = BTreeMap<usize, i32>;
+
 fn of_choice(parts: &[Part], kept: usize) -> impl Iterator<Item = &Part> {
     parts.iter().enumerate().filter(move |(i, _)| kept >> i & 1 == 1).map(|(_, part)| part)
 }
@@ -50,7 +53,7 @@ fn of_choice(parts: &[Part], kept: usize) -> impl Iterator<Item = &Part> {
 /// The parts of a shell, and for each edge that has another number of faces than two, those that
 /// run along it less those against it, by part. `None` if no edge has more than two, or there are
 /// too many parts.
-fn parts(triangles: &[Triangle], shell: &Shell) -> Option<(Vec<Part>, Vec<BTreeMap<usize, i32>>)> {
+fn parts(triangles: &[Triangle], shell: &Shell) -> Option<(Vec<Part>, Vec<Faces>)> {
     let mut edges: HashMap<(Key, Key), Vec<(u32, i32)>> = HashMap::new();
     for (face, i) in (0..).zip(&shell.triangles) {
         let corners = triangles[*i as usize].positions.map(vertex_bits);
@@ -81,7 +84,7 @@ fn parts(triangles: &[Triangle], shell: &Shell) -> Option<(Vec<Part>, Vec<BTreeM
         part_of_face.push(number);
     }
     let counts = |faces: &Vec<(u32, i32)>| {
-        let mut of_parts = BTreeMap::new();
+        let mut of_parts = Faces::new();
         faces.iter().for_each(|(face, n)| *of_parts.entry(part_of_face[*face as usize]).or_default() += n);
         of_parts
     };
